@@ -1,0 +1,1 @@
+//! Safe bindings to Intel Embree 3 and 4.
