@@ -20,3 +20,5 @@ pub mod bsdf;
 pub mod material;
 
 pub mod scene;
+
+pub mod photon;
