@@ -49,8 +49,6 @@
 //! prove: that the file found under Embree's name is Embree (loading it runs its initialisers), and
 //! that its C interface is the one its version number promises, of which the trial above checks what
 //! can be checked. A loaded library is never unloaded: Embree's worker threads outlive its devices.
-#![warn(missing_docs)]
-#![deny(unsafe_op_in_unsafe_fn)]
 
 mod api;
 mod device;

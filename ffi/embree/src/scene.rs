@@ -34,9 +34,9 @@ impl fmt::Display for GeometryId {
 /// Scenes are robust: rays do not slip between triangles that share an edge. At corners Embree leaves a gap about
 /// as wide as rounding: of rays aimed exactly at the corners of a tessellated sphere, one or two in a hundred miss.
 ///
-/// Scenes are of medium build quality, on purpose: which of two triangles is hit by a ray through their common edge
-/// then depends neither on the number of threads nor on the run. With high quality, which splits triangles in
-/// parallel, it does both (Embree's issue 20).
+/// Which of two triangles is hit by a ray through their common edge depends neither on the number of threads nor on
+/// the run. Build quality is medium for that reason: of Embree's builders only the one for high quality is not
+/// deterministic (Embree's issue 20). Robust scenes do without it in any case.
 pub struct SceneBuilder {
     owned: Owned,
     kinds: HashMap<GeometryId, Kind>,
@@ -56,7 +56,8 @@ enum Kind {
 /// Embree's scene, and what it points to. The fields are dropped in this order.
 struct Owned {
     raw: RawScene,
-    filters: Vec<Box<Filter>>,
+    /// `Arc`s, and so at addresses that stay: Embree holds them.
+    filters: Vec<Arc<Filter>>,
     children: Vec<Scene>,
 }
 
@@ -257,11 +258,11 @@ impl SceneBuilder {
             Some(Kind::Empty) => return Ok(()),
             Some(Kind::Instance(_)) | None => return Err(Error::NoSuchMesh(id)),
         };
-        let filter = Box::new(filter);
+        let filter = Arc::new(filter);
         let common = self.owned.raw.device.common();
-        // SAFETY: the mesh is alive; the box is kept as long as the scene, and its address does not change.
+        // SAFETY: the mesh is alive; the filter is kept as long as the scene, at an address that stays.
         unsafe {
-            (common.set_user_data)(mesh.raw, (&raw const *filter).cast());
+            (common.set_user_data)(mesh.raw, Arc::as_ptr(&filter).cast());
             (common.set_intersect_filter)(mesh.raw, filter::call);
             (common.set_occluded_filter)(mesh.raw, filter::call);
         }
