@@ -58,6 +58,7 @@ mod load;
 mod probe;
 mod query;
 mod scene;
+mod transform;
 
 pub use device::Device;
 pub use error::Error;

@@ -9,6 +9,7 @@ use crate::device::Device;
 use crate::error::Error;
 use crate::filter::{self, Filter};
 use crate::query::Bounds;
+use crate::transform;
 
 /// The number of a mesh or instance within its scene.
 ///
@@ -42,6 +43,8 @@ pub struct SceneBuilder {
     kinds: HashMap<GeometryId, Kind>,
     has_instances: bool,
     has_filters: bool,
+    /// Largest coordinate a ray may have.
+    reach: f32,
 }
 
 /// What an id stands for.
@@ -154,6 +157,7 @@ impl SceneBuilder {
             kinds: HashMap::new(),
             has_instances: false,
             has_filters: false,
+            reach: MAX_COORDINATE,
         })
     }
 
@@ -222,12 +226,12 @@ impl SceneBuilder {
         if child.shared.has_instances {
             return Err(Error::NestedInstance(id));
         }
-        if !invertible(local_to_world) {
+        let Some(reach) = transform::reach(local_to_world, child.bounds()) else {
             return Err(Error::BadTransform {
                 geometry: id,
                 local_to_world: *local_to_world,
             });
-        }
+        };
         let instance = Geometry::new(self.device(), api::GEOMETRY_TYPE_INSTANCE)?;
         let common = self.device().common();
         // SAFETY: geometry and child are alive (the child is kept with the scene); the matrix is of the format
@@ -239,6 +243,7 @@ impl SceneBuilder {
         }
         self.device().check("make an instance")?;
         self.owned.children.push(child.clone());
+        self.reach = self.reach.min(reach);
         self.has_instances = true;
         self.has_filters |= child.filtered;
         self.kinds.insert(id, Kind::Instance(instance));
@@ -301,6 +306,7 @@ impl SceneBuilder {
             raw: scene,
             trace,
             filtered: self.has_filters,
+            reach: self.reach,
             shared: Arc::new(shared),
         })
     }
@@ -328,6 +334,7 @@ pub struct Scene {
     pub(crate) raw: Handle,
     pub(crate) trace: Trace,
     pub(crate) filtered: bool,
+    pub(crate) reach: f32,
     shared: Arc<Shared>,
 }
 
@@ -362,11 +369,4 @@ impl Scene {
     pub fn device(&self) -> &Device {
         &self.shared.owned.raw.device
     }
-}
-
-/// Whether an affine map (column-major 3x4) is finite and maps onto all of space.
-fn invertible(m: &[f32; 12]) -> bool {
-    let [a, b, c, d, e, f, g, h, i] = std::array::from_fn(|k| f64::from(m[k]));
-    let determinant = a * (e * i - f * h) - d * (b * i - c * h) + g * (b * f - c * e);
-    m.iter().all(|x| x.is_finite()) && determinant.is_finite() && determinant != 0.0
 }

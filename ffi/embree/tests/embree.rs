@@ -170,10 +170,13 @@ fn a_million_triangles_agree_with_brute_force() {
                 let corners =
                     indices[hit.primitive as usize].map(|index| positions[index as usize]);
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-                for k in 0..3 {
-                    let on_triangle: f32 = (0..3).map(|c| weights[c] * corners[c][k]).sum();
-                    let on_ray = ray.origin[k] + hit.t * ray.direction[k];
-                    assert!((on_triangle - on_ray).abs() < 1e-5, "{hit:?}");
+                let [a, b, c] = corners;
+                for (k, (origin, direction)) in ray.origin.iter().zip(ray.direction).enumerate() {
+                    let on_triangle = weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k];
+                    assert!(
+                        (on_triangle - (origin + hit.t * direction)).abs() < 1e-5,
+                        "{hit:?}"
+                    );
                 }
             }
             (found, expected) => panic!("{ray:?}: {found:?}, but by brute force {expected:?}"),
@@ -476,6 +479,58 @@ fn bad_instances_are_refused() {
             .unwrap()
             .instance(ID, &builder.commit().unwrap(), &MAP);
     assert_eq!(nested, Err(Error::NestedInstance(ID)));
+}
+
+/// Debian's Embree 3 is built with assertions, and aborts on rays that the inverse map makes too large.
+#[test]
+fn extreme_instances_are_refused_or_do_no_harm() {
+    let child = one_triangle();
+    let mut random = Random(23);
+    let (mut taken, mut refused) = (0, 0);
+    for _ in 0..2000 {
+        let scale = |random: &mut Random| 10f32.powf(60.0 * random.unit() - 30.0);
+        let (size, distance) = (scale(&mut random), scale(&mut random));
+        let mut map = [0.0; 12];
+        for column in 0..4 {
+            let length = if column == 3 { distance } else { size };
+            map[3 * column..][..3].copy_from_slice(&random.direction().map(|x| length * x));
+        }
+        if random.unit() < 0.3 {
+            // All but flat.
+            let k = (random.unit() * 3.0) as usize;
+            map[6 + k] = map[k];
+        }
+        let mut builder = builder();
+        match builder.instance(ID, &child, &map) {
+            Ok(()) => taken += 1,
+            Err(Error::BadTransform { .. }) => {
+                refused += 1;
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        }
+        let scene = builder.commit().unwrap();
+        for _ in 0..50 {
+            let [origin, direction] = [0; 2].map(|_| {
+                let length = scale(&mut random);
+                random.direction().map(|x| length * x)
+            });
+            scene.intersect(&ray(origin, direction));
+            scene.occluded(&ray(origin, direction));
+        }
+        // At the triangle itself, from an origin not far away in its own measure.
+        let world = |p: [f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|k| {
+                map[k] * p[0] + map[3 + k] * p[1] + map[6 + k] * p[2] + map[9 + k]
+            })
+        };
+        let (from, to) = (world([0.5, 0.5, 3.0]), world([0.5, 0.5, 0.0]));
+        scene.intersect(&ray(from, std::array::from_fn(|k| to[k] - from[k])));
+    }
+    assert!(
+        taken > 200 && refused > 200,
+        "{taken} taken, {refused} refused"
+    );
 }
 
 /// Three sheets, the middle one with a filter.
