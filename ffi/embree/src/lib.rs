@@ -40,7 +40,7 @@
 //! the structures of `embree4-sys` 0.0.10 lack `RTCHit::instPrimID`, which Embree has had since
 //! 4.3: the library writes it 4 bytes past the end of their 80-byte `RTCRayHit`. The structures here
 //! have room for it whatever version is loaded (96 bytes, aligned to 16), and every library is
-//! tried once on a two-ray scene, in front of guard bytes, before it is used
+//! tried once on a small scene, with guard bytes behind the structure, before it is used
 //! (see [`Library::hit_extent`]).
 //!
 //! # What is unsafe

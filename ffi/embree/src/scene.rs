@@ -37,7 +37,7 @@ impl fmt::Display for GeometryId {
 ///
 /// Which of two triangles is hit by a ray through their common edge depends neither on the number of threads nor on
 /// the run. Build quality is medium for that reason: of Embree's builders only the one for high quality is not
-/// deterministic (Embree's issue 20). Robust scenes do without it in any case.
+/// deterministic, by its makers' word. Robust scenes do without it in any case.
 pub struct SceneBuilder {
     owned: Owned,
     kinds: HashMap<GeometryId, Kind>,
