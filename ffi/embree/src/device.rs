@@ -16,8 +16,8 @@ pub struct Device {
 struct Inner {
     raw: Handle,
     library: Library,
-    /// The first error since the last check. Boxed: Embree holds its address.
-    error: Box<ErrorSlot>,
+    /// The first error since the last check. An `Arc`, and so at an address that stays: Embree holds it.
+    error: Arc<ErrorSlot>,
 }
 
 type ErrorSlot = Mutex<Option<String>>;
@@ -51,10 +51,10 @@ impl Device {
         let inner = Inner {
             raw,
             library: library.clone(),
-            error: Box::default(),
+            error: Arc::default(),
         };
-        let slot: *const ErrorSlot = &*inner.error;
-        // SAFETY: the slot is boxed, owned by `inner`, and dropped after the device is released.
+        let slot = Arc::as_ptr(&inner.error);
+        // SAFETY: the slot is owned by `inner`, stays where it is, and is dropped after the device is released.
         unsafe { (common.set_error_function)(raw, record_error, slot as *mut c_void) };
         let device = Device {
             inner: Arc::new(inner),

@@ -51,7 +51,8 @@ pub enum Error {
         /// How many vertices there are.
         vertices: usize,
     },
-    /// An instance's matrix holds NaN or infinity, or cannot be inverted.
+    /// An instance's matrix holds NaN or infinity, cannot be inverted, or is too extreme for single precision: scales
+    /// below about 1e-9, or a scene moved or blown up beyond 1.8e18.
     BadTransform {
         /// The instance.
         geometry: GeometryId,
@@ -137,7 +138,7 @@ impl fmt::Display for Error {
             } => {
                 write!(
                     f,
-                    "{geometry}: the instance's matrix {local_to_world:?} is not finite or not invertible"
+                    "{geometry}: the instance's matrix {local_to_world:?} is not finite, not invertible, or too extreme"
                 )
             }
             Error::DuplicateId(geometry) => write!(f, "{geometry}: the id is already in use"),

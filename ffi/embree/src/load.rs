@@ -118,15 +118,14 @@ impl Library {
         let path = origin(common.new_device as *const _).unwrap_or_else(|| path.to_owned());
 
         let version = probe::version(&common).map_err(|reason| unusable(&path, reason))?;
-        // SAFETY: as for `common`; which form the functions have follows from the version.
         let trace = match version.major {
+            // SAFETY: as for `common`; the version says which form the functions have.
             3 => unsafe { Trace3::load(&library) }.map(Trace::V3),
+            // SAFETY: as above.
             4 => unsafe { Trace4::load(&library) }.map(Trace::V4),
             _ => {
-                return Err(unusable(
-                    &path,
-                    format!("Embree {version} is neither version 3 nor 4"),
-                ));
+                let reason = format!("Embree {version} is neither version 3 nor 4");
+                return Err(unusable(&path, reason));
             }
         }
         .map_err(|error| unusable(&path, shorten(&path, &error)))?;

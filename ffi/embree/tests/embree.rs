@@ -170,10 +170,13 @@ fn a_million_triangles_agree_with_brute_force() {
                 let corners =
                     indices[hit.primitive as usize].map(|index| positions[index as usize]);
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-                for k in 0..3 {
-                    let on_triangle: f32 = (0..3).map(|c| weights[c] * corners[c][k]).sum();
-                    let on_ray = ray.origin[k] + hit.t * ray.direction[k];
-                    assert!((on_triangle - on_ray).abs() < 1e-5, "{hit:?}");
+                let [a, b, c] = corners;
+                for (k, (origin, direction)) in ray.origin.iter().zip(ray.direction).enumerate() {
+                    let on_triangle = weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k];
+                    assert!(
+                        (on_triangle - (origin + hit.t * direction)).abs() < 1e-5,
+                        "{hit:?}"
+                    );
                 }
             }
             (found, expected) => panic!("{ray:?}: {found:?}, but by brute force {expected:?}"),
@@ -216,7 +219,8 @@ fn intersect_and_occluded_agree() {
     assert!((20_000..180_000).contains(&hits), "{hits}");
 }
 
-/// A closed surface of shared edges, from inside: no ray may escape, least of all through an edge.
+/// A closed surface, from inside: no ray may escape through an edge. Aimed exactly at a corner, where six
+/// triangles meet, some do in Embree (see `SceneBuilder`); a change in how many is worth knowing of.
 #[test]
 fn rays_do_not_slip_through_edges() {
     let (positions, indices) = sphere(64);
@@ -224,21 +228,36 @@ fn rays_do_not_slip_through_edges() {
     builder.triangles(ID, &positions, &indices).unwrap();
     let scene = builder.commit().unwrap();
     let mut random = Random(3);
+    let (mut corners, mut slipped) = (0, 0);
     for triangle in &indices {
         let [a, b, c] = triangle.map(|index| positions[index as usize]);
-        let origin = random.direction().map(|x| x * 0.01);
-        for target in [a, b, c, middle(a, b), middle(b, c), middle(c, a)] {
-            let direction = std::array::from_fn(|k| target[k] - origin[k]);
-            assert!(
-                scene.intersect(&ray(origin, direction)).is_some(),
-                "{origin:?} -> {target:?}"
+        let origin = random.direction().map(|x| x * 0.1);
+        let hits = |target: [f32; 3]| {
+            let ray = ray(origin, std::array::from_fn(|k| target[k] - origin[k]));
+            assert_eq!(
+                scene.intersect(&ray).is_some(),
+                scene.occluded(&ray),
+                "{ray:?}"
             );
-            assert!(
-                scene.occluded(&ray(origin, direction)),
-                "{origin:?} -> {target:?}"
-            );
+            scene.occluded(&ray)
+        };
+        for edge in [[a, b], [b, c], [c, a]] {
+            for weight in [0.5, 0.25, 0.01, 0.99] {
+                assert!(
+                    hits(between(edge[0], edge[1], weight)),
+                    "{origin:?} -> {edge:?} at {weight}"
+                );
+            }
+        }
+        for corner in [a, b, c] {
+            corners += 1;
+            slipped += usize::from(!hits(corner));
         }
     }
+    assert!(
+        slipped * 100 < corners * 2,
+        "{slipped} of {corners} rays aimed at corners slipped through"
+    );
 }
 
 #[test]
@@ -462,6 +481,58 @@ fn bad_instances_are_refused() {
     assert_eq!(nested, Err(Error::NestedInstance(ID)));
 }
 
+/// Debian's Embree 3 is built with assertions, and aborts on rays that the inverse map makes too large.
+#[test]
+fn extreme_instances_are_refused_or_do_no_harm() {
+    let child = one_triangle();
+    let mut random = Random(23);
+    let (mut taken, mut refused) = (0, 0);
+    for _ in 0..2000 {
+        let scale = |random: &mut Random| 10f32.powf(60.0 * random.unit() - 30.0);
+        let (size, distance) = (scale(&mut random), scale(&mut random));
+        let mut map = [0.0; 12];
+        for column in 0..4 {
+            let length = if column == 3 { distance } else { size };
+            map[3 * column..][..3].copy_from_slice(&random.direction().map(|x| length * x));
+        }
+        if random.unit() < 0.3 {
+            // All but flat.
+            let k = (random.unit() * 3.0) as usize;
+            map[6 + k] = map[k];
+        }
+        let mut builder = builder();
+        match builder.instance(ID, &child, &map) {
+            Ok(()) => taken += 1,
+            Err(Error::BadTransform { .. }) => {
+                refused += 1;
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        }
+        let scene = builder.commit().unwrap();
+        for _ in 0..50 {
+            let [origin, direction] = [0; 2].map(|_| {
+                let length = scale(&mut random);
+                random.direction().map(|x| length * x)
+            });
+            scene.intersect(&ray(origin, direction));
+            scene.occluded(&ray(origin, direction));
+        }
+        // At the triangle itself, from an origin not far away in its own measure.
+        let world = |p: [f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|k| {
+                map[k] * p[0] + map[3 + k] * p[1] + map[6 + k] * p[2] + map[9 + k]
+            })
+        };
+        let (from, to) = (world([0.5, 0.5, 3.0]), world([0.5, 0.5, 0.0]));
+        scene.intersect(&ray(from, std::array::from_fn(|k| to[k] - from[k])));
+    }
+    assert!(
+        taken > 200 && refused > 200,
+        "{taken} taken, {refused} refused"
+    );
+}
+
 /// Three sheets, the middle one with a filter.
 fn sheets(filter: impl Fn(&Candidate) -> bool + Send + Sync + 'static) -> Scene {
     let mut builder = builder();
@@ -674,36 +745,47 @@ fn threads_may_build_at_once() {
     });
 }
 
-/// Rays through shared corners and edges have several right answers. Which one is given must not depend on the
-/// number of threads that built the scene, nor change from build to build.
+/// Where triangles coincide, and on common corners and edges, a ray has several right answers. Which one is given
+/// must not depend on the number of threads that built the scene, nor change from build to build.
 #[test]
 fn ties_do_not_depend_on_threads() {
-    let (positions, indices) = grid(500);
-    let answers = |threads| {
-        let mut builder = SceneBuilder::new(&device(threads)).unwrap();
-        builder.triangles(ID, &positions, &indices).unwrap();
-        let scene = builder.commit().unwrap();
-        let mut random = Random(5);
-        let onto = |[x, y, _]: [f32; 3]| {
-            scene
-                .intersect(&down(x, y))
-                .map(|hit| (hit.primitive, hit.u, hit.v))
-        };
-        let corner =
-            |random: &mut Random| positions[(random.unit() * positions.len() as f32) as usize];
-        (0..50_000)
-            .map(|_| onto(corner(&mut random)))
-            .collect::<Vec<_>>()
-    };
-    let expected = answers(1);
-    for threads in [1, 2, 2, 2, 3, 8, 8, 0] {
-        let found = answers(threads);
-        let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
-        assert_eq!(
-            differ,
-            0,
-            "of {} ties, with {threads} threads",
-            expected.len()
-        );
+    // Flat, of a power of two and hit aslant, so that the six triangles around a corner are at the same distance to
+    // the last bit and in the ray's way all; and now and then a pile of triangles that are one and the same, higher than a leaf of Embree's tree.
+    let (mut positions, mut indices) = grid(512);
+    positions.iter_mut().for_each(|position| position[2] = 0.0);
+    let targets = positions.clone();
+    for quad in 0..512 {
+        let triangle = indices[quad * 1021];
+        indices.extend([triangle; 40]);
     }
+    let answers = |threads, indices: &[[u32; 3]]| {
+        let mut builder = SceneBuilder::new(&device(threads)).unwrap();
+        builder.triangles(ID, &positions, indices).unwrap();
+        let scene = builder.commit().unwrap();
+        let onto = |&[x, y, _]: &[f32; 3]| {
+            let ray = ray([x + 1.0, y + 2.0, 4.0], [-0.25, -0.5, -1.0]);
+            scene.intersect(&ray).map(|hit| hit.primitive)
+        };
+        targets.iter().map(onto).collect::<Vec<_>>()
+    };
+    let differing =
+        |a: &[Option<u32>], b: &[Option<u32>]| a.iter().zip(b).filter(|(a, b)| a != b).count();
+    let expected = answers(1, &indices);
+    for threads in [1, 2, 2, 3, 8, 8, 0] {
+        let found = answers(threads, &indices);
+        assert_eq!(differing(&found, &expected), 0, "with {threads} threads");
+    }
+    // That these are ties: the same triangles in another order are found to differ.
+    let reversed: Vec<_> = indices.iter().rev().copied().collect();
+    let last = indices.len() as u32 - 1;
+    let found: Vec<_> = answers(1, &reversed)
+        .iter()
+        .map(|hit| hit.map(|primitive| last - primitive))
+        .collect();
+    let ties = differing(&found, &expected);
+    assert!(
+        ties > targets.len() / 10,
+        "{ties} of {} rays: no test of ties",
+        targets.len()
+    );
 }

@@ -116,8 +116,9 @@ pub fn sphere(rings: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, indices)
 }
 
-pub fn middle(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+/// The point a `weight` of the way from `a` to `b`.
+pub fn between(a: [f32; 3], b: [f32; 3], weight: f32) -> [f32; 3] {
+    std::array::from_fn(|k| a[k] + weight * (b[k] - a[k]))
 }
 
 /// The nearest hit by asking every triangle, in double precision: its distance, and all triangles that are hit
