@@ -104,7 +104,10 @@ impl Camera {
         if self.lens_radius > 0.0 {
             origin += (warp::disc_concentric(lens) * self.lens_radius).extend(0.0);
         }
-        CameraRay { origin: self.position + self.rotation * origin, direction: (self.rotation * (focus - origin)).normalize() }
+        CameraRay {
+            origin: self.position + self.rotation * origin,
+            direction: (self.rotation * (focus - origin)).normalize(),
+        }
     }
 
     /// Width that the picture spans per metre of distance (perspective; 0 for an orthographic camera), and at distance 0.

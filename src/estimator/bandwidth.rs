@@ -57,7 +57,8 @@ pub fn initial_bandwidths(
         let cap = SCREEN_CAP * span;
         let r = match rule {
             InitialBandwidth::Nearest(k) => {
-                nearest_radius2(pilot, point.p, k, cap * cap, |photon| same_surface(photon, point.ng)).map_or(cap, f32::sqrt)
+                nearest_radius2(pilot, point.p, k, cap * cap, |photon| same_surface(photon, point.ng))
+                    .map_or(cap, f32::sqrt)
             }
             _ => (FOOTPRINT_PIXELS * span / width as f32).min(cap),
         };

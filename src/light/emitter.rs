@@ -90,9 +90,7 @@ impl Emitter {
                 luminance(*intensity) * TAU * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0)
             }
             Emitter::Sun { irradiance, .. } => luminance(*irradiance) * disc,
-            Emitter::Environment => {
-                sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc
-            }
+            Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc,
         })
     }
 

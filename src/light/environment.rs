@@ -214,7 +214,8 @@ mod tests {
         texels[16 * w + w / 2] = [1.0; 3]; // u just above 1/2: direction +X
         let at = |rotation: f32| {
             let image = ImageEnvironment::new(w, h, texels.clone(), rotation).unwrap();
-            [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Z].map(|d| Environment::Image(image.clone()).radiance(d).x > 0.1)
+            [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Z]
+                .map(|d| Environment::Image(image.clone()).radiance(d).x > 0.1)
         };
         assert_eq!(at(0.0), [true, false, false, false, false]);
         // Seen from +Y with X to the right, counter-clockwise by a quarter turns +X to -Z.

@@ -1,7 +1,7 @@
 //! All lights of a scene: choosing one by power, sampling it from a point, sampling emission, and the densities for MIS.
 
-use super::emitter::{Emitter, Sky, spot_falloff};
 use super::cdf::Cdf;
+use super::emitter::{Emitter, Sky, spot_falloff};
 use crate::geometry::{Shapes, Surface};
 use crate::material::Materials;
 use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
@@ -118,7 +118,14 @@ impl Lights {
 
     /// A light chosen by power, seen from `p`. `None` where the one chosen does not shine on `p`.
     #[inline]
-    pub fn sample_direct(&self, shapes: &Shapes, materials: &Materials, p: Vec3, choice: f32, u: Vec2) -> Option<DirectSample> {
+    pub fn sample_direct(
+        &self,
+        shapes: &Shapes,
+        materials: &Materials,
+        p: Vec3,
+        choice: f32,
+        u: Vec2,
+    ) -> Option<DirectSample> {
         let (index, probability, _) = self.choice.as_ref()?.sample(choice);
         match &self.emitters[index] {
             Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
@@ -165,7 +172,13 @@ impl Lights {
                 let environment = self.sky.environment.as_ref()?;
                 let (wi, pdf) = environment.sample(u);
                 let pdf_w = probability * pdf;
-                (pdf_w > 0.0).then(|| DirectSample { wi, target: None, radiance: environment.radiance(wi), pdf_w, delta: false })
+                (pdf_w > 0.0).then(|| DirectSample {
+                    wi,
+                    target: None,
+                    radiance: environment.radiance(wi),
+                    pdf_w,
+                    delta: false,
+                })
             }
         }
     }
@@ -242,7 +255,8 @@ impl Lights {
                 let inner = 1.0 - cos_inner;
                 let edge = (cos_inner - cos_outer) / 3.0;
                 let x = direction.x * (inner + edge);
-                let cos = if x < inner { 1.0 - x } else { cos_outer + (cos_inner - cos_outer) * ((x - inner) / edge).cbrt() };
+                let cos =
+                    if x < inner { 1.0 - x } else { cos_outer + (cos_inner - cos_outer) * ((x - inner) / edge).cbrt() };
                 let sin = (1.0 - cos * cos).max(0.0).sqrt();
                 let (s, c) = (TAU * direction.y).sin_cos();
                 (*p, frame.to_world(Vec3::new(sin * c, sin * s, cos)), *intensity * (TAU * (inner + edge)))
@@ -264,8 +278,13 @@ impl Lights {
             }
         };
         let flux = flux / probability;
-        (flux.is_finite() && flux.max_element() > 0.0)
-            .then(|| EmissionSample { origin, direction: d, flux, light: index as u32, delta: emitter.is_delta() })
+        (flux.is_finite() && flux.max_element() > 0.0).then(|| EmissionSample {
+            origin,
+            direction: d,
+            flux,
+            light: index as u32,
+            delta: emitter.is_delta(),
+        })
     }
 
     /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.
@@ -280,4 +299,3 @@ impl Lights {
         self.relative[instance as usize].iter().any(|&i| i != u32::MAX)
     }
 }
-

@@ -60,7 +60,8 @@ fn eye_pass(scene: &Scene, camera: &Camera, settings: &Settings, i: u64, photons
                     };
                     if levels.two_paths {
                         let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));
-                        let others = LevelRadii::new((1..levels.count.max(2)).map(|k| radius2(k.min(levels.count - 1))));
+                        let others =
+                            LevelRadii::new((1..levels.count.max(2)).map(|k| radius2(k.min(levels.count - 1))));
                         let correlated = trace(Domain::EyeCorrelated, &others);
                         keep_first_hit(scene, camera, pixel, &independent);
                         pixel.add(&independent, Some(&correlated), levels.count, levels.own());
@@ -129,7 +130,11 @@ pub fn sppm(
         let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
-        let error = if record || settings.target_error.is_some() { relative_error(&pixels, settings.levels.own()) } else { None };
+        let error = if record || settings.target_error.is_some() {
+            relative_error(&pixels, settings.levels.own())
+        } else {
+            None
+        };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
@@ -143,8 +148,15 @@ pub fn sppm(
             (a, b) => a.or(b),
         };
         let error = error.or_else(|| history.last().and_then(|h| h.error));
-        let progress =
-            Progress { iteration: done, iterations: total, seconds, remaining, light_paths, photons: map.photons().len(), error };
+        let progress = Progress {
+            iteration: done,
+            iterations: total,
+            seconds,
+            remaining,
+            light_paths,
+            photons: map.photons().len(),
+            error,
+        };
         if observe(&progress, &pixels) == Control::Stop {
             stop = StopReason::Interrupted;
             break;
@@ -163,5 +175,16 @@ pub fn sppm(
         let error = relative_error(&pixels, settings.levels.own());
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
-    Rendered { width, height, pixels, settings: settings.clone(), iterations: done, light_paths, seconds, phases, history, stop }
+    Rendered {
+        width,
+        height,
+        pixels,
+        settings: settings.clone(),
+        iterations: done,
+        light_paths,
+        seconds,
+        phases,
+        history,
+        stop,
+    }
 }

@@ -22,7 +22,10 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let mut warnings = std::mem::take(&mut description.warnings);
     for light in &description.lights {
         if light.radius > 0.0 && !matches!(light.kind, PunctualKind::Point) {
-            warnings.push(format!("light \"{}\": a radius is simulated for point lights only; it shines from a point", light.name));
+            warnings.push(format!(
+                "light \"{}\": a radius is simulated for point lights only; it shines from a point",
+                light.name
+            ));
         }
     }
     add_lamps(&mut description);
@@ -49,11 +52,14 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let lights = Lights::new(&shapes, &materials, others, sky);
     for (i, instance) in shapes.instances.iter().enumerate() {
         if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
-            warnings.push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
+            warnings
+                .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
         }
     }
     if lights.is_empty() {
-        warnings.push("the scene has no light: the picture will be black (add --env, a lamp or an emissive material)".into());
+        warnings.push(
+            "the scene has no light: the picture will be black (add --env, a lamp or an emissive material)".into(),
+        );
     }
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
@@ -108,7 +114,9 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
             mesh: placed.mesh,
             material: placed.material,
             object: placed.object,
-            to_world: shared.then(|| Placement::new(glam::Affine3A::from_mat4(glam::Mat4::from(glam::DMat4::from(to_world).as_mat4())))),
+            to_world: shared.then(|| {
+                Placement::new(glam::Affine3A::from_mat4(glam::Mat4::from(glam::DMat4::from(to_world).as_mat4())))
+            }),
         });
     }
     shapes
@@ -143,7 +151,8 @@ fn alpha_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> AlphaTest {
             Alpha::Mask(cutoff) => cutoff,
             Alpha::Blend => {
                 // One number per ray and triangle, whatever the order in which Embree asks.
-                let key = u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(primitive);
+                let key =
+                    u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(primitive);
                 (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
             }
         };
@@ -203,10 +212,14 @@ fn add_lamps(description: &mut Description) {
             continue;
         }
         let mesh = icosphere(light.radius, 3);
-        let area: f32 = mesh.triangles.iter().map(|t| {
-            let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
-            0.5 * (b - a).cross(c - a).length()
-        }).sum();
+        let area: f32 = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum();
         // A convex body of surface A shows a mean area of A / 4 (Cauchy): the mean intensity is exact.
         let emission: Rgb = light.intensity * (4.0 / area);
         let material = Material {
@@ -234,14 +247,42 @@ fn add_lamps(description: &mut Description) {
 fn icosphere(radius: f32, subdivisions: u32) -> Mesh {
     let t = (1.0 + 5f32.sqrt()) / 2.0;
     let mut positions: Vec<Vec3> = [
-        [-1.0, t, 0.0], [1.0, t, 0.0], [-1.0, -t, 0.0], [1.0, -t, 0.0], [0.0, -1.0, t], [0.0, 1.0, t],
-        [0.0, -1.0, -t], [0.0, 1.0, -t], [t, 0.0, -1.0], [t, 0.0, 1.0], [-t, 0.0, -1.0], [-t, 0.0, 1.0],
+        [-1.0, t, 0.0],
+        [1.0, t, 0.0],
+        [-1.0, -t, 0.0],
+        [1.0, -t, 0.0],
+        [0.0, -1.0, t],
+        [0.0, 1.0, t],
+        [0.0, -1.0, -t],
+        [0.0, 1.0, -t],
+        [t, 0.0, -1.0],
+        [t, 0.0, 1.0],
+        [-t, 0.0, -1.0],
+        [-t, 0.0, 1.0],
     ]
     .map(|p| Vec3::from_array(p).normalize())
     .to_vec();
     let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6], [7, 1, 8],
-        [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
     ];
     for _ in 0..subdivisions {
         let mut middles = std::collections::HashMap::new();

@@ -34,8 +34,13 @@ impl Scene {
         let described = match &view.camera {
             Some(name) => self.cameras.iter().find(|c| &c.name == name).ok_or_else(|| {
                 let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
-                let error = Error::new(Kind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
-                error.hint(if names.is_empty() { "the scene has no camera".into() } else { format!("it has {}", names.join(", ")) })
+                let error =
+                    Error::new(Kind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
+                error.hint(if names.is_empty() {
+                    "the scene has no camera".into()
+                } else {
+                    format!("it has {}", names.join(", "))
+                })
             })?,
             None => match self.cameras.first() {
                 Some(camera) => camera,
@@ -58,7 +63,9 @@ impl Scene {
         };
         if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
             let cause = format!("a picture of {width} x {height} pixels cannot be made");
-            return Err(Error::new(Kind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}")));
+            return Err(
+                Error::new(Kind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}"))
+            );
         }
         let film_aspect = width as f32 / height as f32;
         let projection = match described.projection {

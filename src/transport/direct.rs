@@ -20,7 +20,13 @@ pub const SECOND_STRATEGY: f32 = 0.25;
 #[inline]
 pub fn balance(pdf: f32, other: f32) -> f32 {
     let sum = pdf + other;
-    if sum > 0.0 && pdf.is_finite() { pdf / sum } else if pdf > 0.0 { 1.0 } else { 0.0 }
+    if sum > 0.0 && pdf.is_finite() {
+        pdf / sum
+    } else if pdf > 0.0 {
+        1.0
+    } else {
+        0.0
+    }
 }
 
 /// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival` is the

@@ -290,7 +290,13 @@ impl Visitor for FindGatherPoint {
 }
 
 /// The first vertex of an eye path whose lobes gather photons.
-pub fn gather_point(scene: &Scene, camera: &Camera, pixel: (u32, u32), stream: Stream, max_depth: u32) -> Option<GatherPoint> {
+pub fn gather_point(
+    scene: &Scene,
+    camera: &Camera,
+    pixel: (u32, u32),
+    stream: Stream,
+    max_depth: u32,
+) -> Option<GatherPoint> {
     let mut find = FindGatherPoint { found: None, length: 0.0 };
     walk(scene, eye_start(camera, pixel, stream), stream, Transport::Radiance, max_depth, &mut find);
     find.found

@@ -5,7 +5,7 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::Vec2;
 use crate::photon::{Photon, PhotonFlags};
-use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
+use crate::random::{Domain, SobolPair, Stream, mix};
 use crate::scene::Scene;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
@@ -37,7 +37,9 @@ pub struct Emitted {
 impl LightPass {
     /// Pass `pass` of `paths` light paths.
     pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPass {
-        let key = mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(0x9e37_79b9_7f4a_7c15)) ^ domain as u64);
+        let key =
+            mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+                ^ domain as u64);
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
         LightPass { seed, pass, domain, paths, max_depth, choice: pair(1), point: pair(2), direction: pair(3) }
     }
@@ -84,7 +86,8 @@ impl Visitor for Deposit<'_> {
         let lobes = vertex.shading.bsdf.lobes();
         let gathers = lobes.has(LobeSet::BROAD) || (self.unreachable && lobes.has(LobeSet::SHARP));
         if scattered.is_some() && gathers {
-            let flags = u8::from(self.caustic) * PhotonFlags::CAUSTIC | u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
+            let flags =
+                u8::from(self.caustic) * PhotonFlags::CAUSTIC | u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
             self.photons.push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,

@@ -8,7 +8,9 @@ mod segment;
 mod walk;
 
 pub use direct::{balance, direct_light};
-pub use eye::{EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, eye_path, gather_point, same_surface};
+pub use eye::{
+    EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, eye_path, gather_point, same_surface,
+};
 pub use interior::{Crossing, Interior};
 pub use light::{Emitted, LightPass, light_path};
 pub use segment::{Arrival, End, next_surface, transmittance};

@@ -98,7 +98,9 @@ pub fn next_surface(scene: &Scene, origin: Vec3, direction: Vec3, interior: Inte
             }
             return End::Escaped(transmittance);
         };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return End::Lost };
+        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
+            return End::Lost;
+        };
         distance += hit.t;
         if scene.survey.media {
             transmittance *= absorb(scene, &interior, hit.t);
@@ -135,7 +137,9 @@ pub fn transmittance(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, in
         let Some(hit) = scene.tracer.intersect(&ray) else {
             return if scene.survey.media { left * absorb(scene, &interior, ray.tmax) } else { left };
         };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return Rgb::ZERO };
+        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
+            return Rgb::ZERO;
+        };
         if scene.survey.media {
             left *= absorb(scene, &interior, hit.t);
         }

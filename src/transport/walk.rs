@@ -153,7 +153,8 @@ pub fn walk<V: Visitor>(
         if draws.one(Purpose::Roulette) >= survival {
             return;
         }
-        let sample = shading.sample(-direction, transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
+        let sample =
+            shading.sample(-direction, transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
         let Some(sample) = sample else { return };
         throughput *= sample.weight / survival;
         scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });

@@ -14,22 +14,14 @@ use support::{Random, library, million, ray};
 const RAYS: usize = 1_000_000;
 
 fn main() {
-    let threads = std::env::args()
-        .nth(1)
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(1);
+    let threads = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(1);
     println!("{:?}, {threads} threads", library());
     let start = Instant::now();
     let scene = million();
-    println!(
-        "build      {:6.2} s, with all processors",
-        start.elapsed().as_secs_f64()
-    );
+    println!("build      {:6.2} s, with all processors", start.elapsed().as_secs_f64());
 
     let mut random = Random(1);
-    let incoherent: Vec<Ray> = (0..RAYS)
-        .map(|_| ray(random.point(), random.direction()))
-        .collect();
+    let incoherent: Vec<Ray> = (0..RAYS).map(|_| ray(random.point(), random.direction())).collect();
     let side = (RAYS as f32).sqrt();
     let camera = |k| {
         let (x, y) = (k as f32 % side / side, (k as f32 / side).floor() / side);
@@ -37,12 +29,8 @@ fn main() {
     };
     let coherent: Vec<Ray> = (0..RAYS).map(camera).collect();
     for (name, rays) in [("random", &incoherent), ("camera", &coherent)] {
-        best(&format!("{name} intersect"), threads, rays, |ray| {
-            scene.intersect(ray).is_some()
-        });
-        best(&format!("{name} occluded"), threads, rays, |ray| {
-            scene.occluded(ray)
-        });
+        best(&format!("{name} intersect"), threads, rays, |ray| scene.intersect(ray).is_some());
+        best(&format!("{name} occluded"), threads, rays, |ray| scene.occluded(ray));
     }
 }
 
@@ -55,17 +43,10 @@ fn best(name: &str, threads: usize, rays: &[Ray], hit: impl Fn(&Ray) -> bool + S
         hits = std::thread::scope(|scope| {
             let work = || rays.iter().filter(|ray| hit(ray)).count();
             let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-            workers
-                .into_iter()
-                .filter_map(|worker| worker.join().ok())
-                .sum::<usize>()
+            workers.into_iter().filter_map(|worker| worker.join().ok()).sum::<usize>()
         });
         seconds = seconds.min(start.elapsed().as_secs_f64());
     }
     let all = (threads * rays.len()) as f64;
-    println!(
-        "{name:17} {:6.2} Mrays/s, {:4.1} % hit",
-        all / seconds * 1e-6,
-        100.0 * hits as f64 / all
-    );
+    println!("{name:17} {:6.2} Mrays/s, {:4.1} % hit", all / seconds * 1e-6, 100.0 * hits as f64 / all);
 }

@@ -86,10 +86,7 @@ impl Scene {
     /// The nearest hit, or none.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let mut raw = RawRayHit {
-            ray: RawRay::new(ray),
-            hit: RawHit::MISS,
-        };
+        let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
         if !raw.ray.is_valid(self.reach) {
             return None;
         }

@@ -103,10 +103,7 @@ impl Geometry {
         // SAFETY: the device is alive and the kind is one of Embree's.
         let raw = unsafe { (device.common().new_geometry)(device.raw(), kind) };
         let raw = device.check_handle(raw, "make a geometry")?;
-        Ok(Geometry {
-            raw,
-            device: device.clone(),
-        })
+        Ok(Geometry { raw, device: device.clone() })
     }
 
     /// Copies triples into a new buffer of the geometry, which Embree pads as its vector loads need.
@@ -114,14 +111,10 @@ impl Geometry {
         const { assert!(size_of::<[T; 3]>() == 12) };
         let during = "make a buffer";
         // SAFETY: the geometry is alive; Embree allocates at least `items.len()` items of 12 bytes.
-        let memory = unsafe {
-            (self.device.common().new_buffer)(self.raw, buffer, 0, format, 12, items.len())
-        };
+        let memory = unsafe { (self.device.common().new_buffer)(self.raw, buffer, 0, format, 12, items.len()) };
         let memory = self.device.check_handle(memory, during)?;
         // SAFETY: `memory` has room for the items, is aligned to 16 and is nobody else's.
-        unsafe {
-            std::ptr::copy_nonoverlapping(items.as_ptr(), memory as *mut [T; 3], items.len())
-        };
+        unsafe { std::ptr::copy_nonoverlapping(items.as_ptr(), memory as *mut [T; 3], items.len()) };
         Ok(())
     }
 }
@@ -137,21 +130,14 @@ impl SceneBuilder {
         let common = device.common();
         // SAFETY: the device is alive.
         let raw = device.check_handle(unsafe { (common.new_scene)(device.raw()) }, during)?;
-        let raw = RawScene {
-            raw,
-            device: device.clone(),
-        };
+        let raw = RawScene { raw, device: device.clone() };
         // SAFETY: the scene was just made.
         unsafe {
             (common.set_scene_flags)(raw.raw, api::SCENE_FLAG_ROBUST);
             (common.set_scene_quality)(raw.raw, api::BUILD_QUALITY_MEDIUM);
         }
         device.check(during)?;
-        let owned = Owned {
-            raw,
-            filters: Vec::new(),
-            children: Vec::new(),
-        };
+        let owned = Owned { raw, filters: Vec::new(), children: Vec::new() };
         Ok(SceneBuilder {
             owned,
             kinds: HashMap::new(),
@@ -168,31 +154,17 @@ impl SceneBuilder {
     ///
     /// [`Error::BadVertex`], [`Error::BadIndex`], [`Error::DuplicateId`], [`Error::IdTooLarge`], or
     /// [`Error::Embree`] when memory is short. The builder may be used on after an error.
-    pub fn triangles(
-        &mut self,
-        id: GeometryId,
-        positions: &[[f32; 3]],
-        indices: &[[u32; 3]],
-    ) -> Result<(), Error> {
+    pub fn triangles(&mut self, id: GeometryId, positions: &[[f32; 3]], indices: &[[u32; 3]]) -> Result<(), Error> {
         self.check_id(id)?;
         // Written so that NaN fails too.
         let fits = |position: &[f32; 3]| position.iter().all(|x| x.abs() <= MAX_COORDINATE);
         if let Some(vertex) = positions.iter().position(|position| !fits(position)) {
-            return Err(Error::BadVertex {
-                geometry: id,
-                vertex,
-                position: positions[vertex],
-            });
+            return Err(Error::BadVertex { geometry: id, vertex, position: positions[vertex] });
         }
         let vertices = positions.len();
         for (triangle, corners) in indices.iter().enumerate() {
             if let Some(&index) = corners.iter().find(|&&index| index as usize >= vertices) {
-                return Err(Error::BadIndex {
-                    geometry: id,
-                    triangle,
-                    index,
-                    vertices,
-                });
+                return Err(Error::BadIndex { geometry: id, triangle, index, vertices });
             }
         }
         if indices.is_empty() {
@@ -213,12 +185,7 @@ impl SceneBuilder {
     ///
     /// [`Error::BadTransform`], [`Error::NestedInstance`], [`Error::OtherDevice`], [`Error::DuplicateId`],
     /// [`Error::IdTooLarge`], or [`Error::Embree`] when memory is short.
-    pub fn instance(
-        &mut self,
-        id: GeometryId,
-        child: &Scene,
-        local_to_world: &[f32; 12],
-    ) -> Result<(), Error> {
+    pub fn instance(&mut self, id: GeometryId, child: &Scene, local_to_world: &[f32; 12]) -> Result<(), Error> {
         self.check_id(id)?;
         if !child.shared.owned.raw.device.is(self.device()) {
             return Err(Error::OtherDevice(id));
@@ -227,10 +194,7 @@ impl SceneBuilder {
             return Err(Error::NestedInstance(id));
         }
         let Some(reach) = transform::reach(local_to_world, child.bounds()) else {
-            return Err(Error::BadTransform {
-                geometry: id,
-                local_to_world: *local_to_world,
-            });
+            return Err(Error::BadTransform { geometry: id, local_to_world: *local_to_world });
         };
         let instance = Geometry::new(self.device(), api::GEOMETRY_TYPE_INSTANCE)?;
         let common = self.device().common();
@@ -297,18 +261,9 @@ impl SceneBuilder {
         // SAFETY: the scene is alive and all its geometries are committed.
         unsafe { (common.commit_scene)(scene) };
         device.check("build a scene")?;
-        let shared = Shared {
-            owned: self.owned,
-            has_instances: self.has_instances,
-        };
+        let shared = Shared { owned: self.owned, has_instances: self.has_instances };
         let trace = device.library().trace();
-        Ok(Scene {
-            raw: scene,
-            trace,
-            filtered: self.has_filters,
-            reach: self.reach,
-            shared: Arc::new(shared),
-        })
+        Ok(Scene { raw: scene, trace, filtered: self.has_filters, reach: self.reach, shared: Arc::new(shared) })
     }
 
     fn device(&self) -> &Device {
@@ -352,17 +307,11 @@ impl Scene {
     /// The smallest axis-aligned box around everything in the scene; none if it is empty.
     pub fn bounds(&self) -> Option<Bounds> {
         let device = &self.shared.owned.raw.device;
-        let mut bounds = RawBounds {
-            lower: [f32::INFINITY; 4],
-            upper: [f32::NEG_INFINITY; 4],
-        };
+        let mut bounds = RawBounds { lower: [f32::INFINITY; 4], upper: [f32::NEG_INFINITY; 4] };
         // SAFETY: the scene is committed, `bounds` has the size and alignment of `RTCBounds`.
         unsafe { (device.common().scene_bounds)(self.raw, &mut bounds) };
         let ([x, y, z, _], [a, b, c, _]) = (bounds.lower, bounds.upper);
-        (x <= a && y <= b && z <= c).then_some(Bounds {
-            min: [x, y, z],
-            max: [a, b, c],
-        })
+        (x <= a && y <= b && z <= c).then_some(Bounds { min: [x, y, z], max: [a, b, c] })
     }
 
     /// The device the scene was built with.

@@ -33,11 +33,7 @@ pub fn reach(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
     let far = child.is_some_and(|Bounds { min, max: top }| {
         let extent: [f64; 3] = std::array::from_fn(|k| f64::from(min[k].abs().max(top[k].abs())));
         (0..3).any(|k| {
-            m[k].abs() * extent[0]
-                + m[3 + k].abs() * extent[1]
-                + m[6 + k].abs() * extent[2]
-                + move_by[k].abs()
-                > max
+            m[k].abs() * extent[0] + m[3 + k].abs() * extent[1] + m[6 + k].abs() * extent[2] + move_by[k].abs() > max
         })
     });
     if far {
@@ -45,9 +41,7 @@ pub fn reach(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
     }
     // Each row of the inverse gives |local| <= sum |row| * |ray| + |moved|; half is left to rounding.
     let rows = [cross(y, z), cross(z, x), cross(x, y)].map(|v| v.map(|a| a / determinant));
-    let bound = |row: [f64; 3]| {
-        (0.5 * max - dot(row, move_by).abs()) / row.iter().map(|a| a.abs()).sum::<f64>()
-    };
+    let bound = |row: [f64; 3]| (0.5 * max - dot(row, move_by).abs()) / row.iter().map(|a| a.abs()).sum::<f64>();
     let reach = rows.into_iter().map(bound).fold(max, f64::min) as f32;
     (reach >= LEAST_REACH).then_some(reach)
 }
@@ -57,9 +51,5 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
