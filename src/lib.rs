@@ -1,1 +1,24 @@
-//! caustique
+//! caustique renders caustics, and caustics seen through glass, water and mirrors.
+//!
+//! Data flows one way: scene file -> [`scene::Description`] -> scene -> plan -> passes -> estimator -> layers -> EXR -> combiner.
+//! Each module uses only modules declared above it ([`error`] may be used anywhere).
+
+pub mod error;
+
+pub mod math;
+
+pub mod random;
+
+pub mod trace;
+
+pub mod geometry;
+
+pub mod texture;
+
+pub mod bsdf;
+
+pub mod material;
+
+pub mod scene;
+
+pub mod photon;

@@ -1,0 +1,237 @@
+//! The C functions and structures we use, per version of Embree, and nothing more.
+//!
+//! Source: `rtcore_*.h` of Embree 3.13.5 and 4.3.3. Where the two agree there is one definition.
+
+use std::ffi::{c_char, c_void};
+
+/// `RTCDevice`, `RTCScene`, `RTCGeometry`: opaque pointers, null on failure.
+pub type Handle = *mut c_void;
+
+pub const INVALID_GEOMETRY_ID: u32 = u32::MAX;
+
+pub const DEVICE_PROPERTY_VERSION_MAJOR: u32 = 1;
+pub const DEVICE_PROPERTY_VERSION_MINOR: u32 = 2;
+pub const DEVICE_PROPERTY_VERSION_PATCH: u32 = 3;
+
+pub const GEOMETRY_TYPE_TRIANGLE: u32 = 0;
+pub const GEOMETRY_TYPE_INSTANCE: u32 = 121;
+
+pub const BUFFER_TYPE_INDEX: u32 = 0;
+pub const BUFFER_TYPE_VERTEX: u32 = 1;
+
+pub const FORMAT_UINT3: u32 = 0x5003;
+pub const FORMAT_FLOAT3: u32 = 0x9003;
+pub const FORMAT_FLOAT3X4_COLUMN_MAJOR: u32 = 0x9234;
+
+pub const BUILD_QUALITY_MEDIUM: u32 = 1;
+pub const SCENE_FLAG_ROBUST: u32 = 1 << 2;
+
+/// `RTCError`, as words.
+pub fn error_name(code: u32) -> &'static str {
+    match code {
+        2 => "invalid argument",
+        3 => "invalid operation",
+        4 => "out of memory",
+        5 => "this processor is not supported",
+        6 => "cancelled",
+        _ => "unknown error",
+    }
+}
+
+/// `RTCRay`.
+#[repr(C, align(16))]
+#[derive(Clone, Copy)]
+pub struct RawRay {
+    pub origin: [f32; 3],
+    pub tnear: f32,
+    pub direction: [f32; 3],
+    pub time: f32,
+    pub tfar: f32,
+    pub mask: u32,
+    pub id: u32,
+    pub flags: u32,
+}
+
+/// `RTCHit` of Embree 4.3 and later. Earlier versions end before `instance_primitive`.
+#[repr(C, align(16))]
+#[derive(Clone, Copy)]
+pub struct RawHit {
+    pub ng: [f32; 3],
+    pub u: f32,
+    pub v: f32,
+    pub primitive: u32,
+    pub geometry: u32,
+    pub instance: u32,
+    pub instance_primitive: u32,
+}
+
+/// `RTCRayHit`.
+#[repr(C, align(16))]
+#[derive(Clone, Copy)]
+pub struct RawRayHit {
+    pub ray: RawRay,
+    pub hit: RawHit,
+}
+
+const _: () = assert!(size_of::<RawRay>() == 48);
+const _: () = assert!(size_of::<RawRayHit>() == 96 && align_of::<RawRayHit>() == 16);
+const _: () = assert!(std::mem::offset_of!(RawRayHit, hit.instance_primitive) == 80);
+
+impl RawHit {
+    pub const MISS: RawHit = RawHit {
+        ng: [0.0; 3],
+        u: 0.0,
+        v: 0.0,
+        primitive: INVALID_GEOMETRY_ID,
+        geometry: INVALID_GEOMETRY_ID,
+        instance: INVALID_GEOMETRY_ID,
+        instance_primitive: INVALID_GEOMETRY_ID,
+    };
+}
+
+/// `RTCIntersectContext` of Embree 3. The last field is there only in builds with `RTC_MIN_WIDTH`, and
+/// padding otherwise.
+#[repr(C)]
+pub struct IntersectContext3 {
+    flags: u32,
+    filter: *const c_void,
+    instance: u32,
+    min_width_distance_factor: f32,
+}
+
+impl IntersectContext3 {
+    const INCOHERENT: IntersectContext3 = IntersectContext3 {
+        flags: 0,
+        filter: std::ptr::null(),
+        instance: INVALID_GEOMETRY_ID,
+        min_width_distance_factor: 0.0,
+    };
+}
+
+/// `RTCFilterFunctionNArguments`. With single rays `count` is 1, and the structures of arrays `RTCRayN` and
+/// `RTCHitN` are laid out as `RTCRay` and `RTCHit`.
+#[repr(C)]
+pub struct FilterArguments {
+    pub valid: *mut i32,
+    pub user: *const c_void,
+    pub context: *const c_void,
+    pub ray: *const RawRay,
+    pub hit: *const RawHit,
+    pub count: u32,
+}
+
+pub type FilterFunction = unsafe extern "C" fn(*const FilterArguments);
+pub type ErrorFunction = unsafe extern "C" fn(*mut c_void, u32, *const c_char);
+
+/// `RTCBounds`.
+#[repr(C, align(16))]
+pub struct RawBounds {
+    pub lower: [f32; 4],
+    pub upper: [f32; 4],
+}
+
+/// Declares a table of function pointers and the function that fills it from a library.
+macro_rules! functions {
+    ($(#[$doc:meta])* $table:ident { $($field:ident = $symbol:literal ($($argument:ty),*) $(-> $result:ty)?;)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        pub struct $table { $(pub $field: unsafe extern "C" fn($($argument),*) $(-> $result)?),* }
+
+        impl $table {
+            /// # Safety
+            /// The library's symbols of these names must be Embree's, and the library must stay loaded.
+            pub unsafe fn load(library: &libloading::Library) -> Result<Self, libloading::Error> {
+                // SAFETY: the caller vouches for the symbols' types and the library's lifetime.
+                Ok(unsafe { Self { $($field: *library.get($symbol)?),* } })
+            }
+        }
+    };
+}
+
+functions! {
+    /// What is alike in Embree 3 and 4.
+    Common {
+        new_device = b"rtcNewDevice\0" (*const c_char) -> Handle;
+        release_device = b"rtcReleaseDevice\0" (Handle);
+        device_property = b"rtcGetDeviceProperty\0" (Handle, u32) -> isize;
+        device_error = b"rtcGetDeviceError\0" (Handle) -> u32;
+        set_error_function = b"rtcSetDeviceErrorFunction\0" (Handle, ErrorFunction, *mut c_void);
+        new_scene = b"rtcNewScene\0" (Handle) -> Handle;
+        release_scene = b"rtcReleaseScene\0" (Handle);
+        set_scene_flags = b"rtcSetSceneFlags\0" (Handle, u32);
+        set_scene_quality = b"rtcSetSceneBuildQuality\0" (Handle, u32);
+        commit_scene = b"rtcCommitScene\0" (Handle);
+        scene_bounds = b"rtcGetSceneBounds\0" (Handle, *mut RawBounds);
+        attach_geometry = b"rtcAttachGeometryByID\0" (Handle, Handle, u32);
+        new_geometry = b"rtcNewGeometry\0" (Handle, u32) -> Handle;
+        release_geometry = b"rtcReleaseGeometry\0" (Handle);
+        commit_geometry = b"rtcCommitGeometry\0" (Handle);
+        new_buffer = b"rtcSetNewGeometryBuffer\0" (Handle, u32, u32, u32, usize, usize) -> *mut c_void;
+        set_instanced_scene = b"rtcSetGeometryInstancedScene\0" (Handle, Handle);
+        set_transform = b"rtcSetGeometryTransform\0" (Handle, u32, u32, *const f32);
+        set_user_data = b"rtcSetGeometryUserData\0" (Handle, *const c_void);
+        set_intersect_filter = b"rtcSetGeometryIntersectFilterFunction\0" (Handle, FilterFunction);
+        set_occluded_filter = b"rtcSetGeometryOccludedFilterFunction\0" (Handle, FilterFunction);
+    }
+}
+
+functions! {
+    /// Tracing in Embree 3.
+    Trace3 {
+        intersect = b"rtcIntersect1\0" (Handle, *mut IntersectContext3, *mut RawRayHit);
+        occluded = b"rtcOccluded1\0" (Handle, *mut IntersectContext3, *mut RawRay);
+    }
+}
+
+functions! {
+    /// Tracing in Embree 4. The last argument may be null, which means incoherent rays and the geometries'
+    /// own filters.
+    Trace4 {
+        intersect = b"rtcIntersect1\0" (Handle, *mut RawRayHit, *mut c_void);
+        occluded = b"rtcOccluded1\0" (Handle, *mut RawRay, *mut c_void);
+    }
+}
+
+/// The functions whose form differs. One branch per ray, always taken the same way.
+#[derive(Clone, Copy)]
+pub enum Trace {
+    V3(Trace3),
+    V4(Trace4),
+}
+
+impl Trace {
+    /// # Safety
+    /// `scene` must be a committed scene of the library this table was loaded from, and `ray` must point to
+    /// an initialised [`RawRayHit`] that may be written.
+    #[inline(always)]
+    pub unsafe fn intersect(&self, scene: Handle, ray: *mut RawRayHit) {
+        match self {
+            Trace::V3(functions) => {
+                let mut context = IntersectContext3::INCOHERENT;
+                // SAFETY: the caller vouches for scene and ray; the context lives through the call.
+                unsafe { (functions.intersect)(scene, &mut context, ray) }
+            }
+            // SAFETY: as above; Embree 4 documents null arguments as the defaults.
+            Trace::V4(functions) => unsafe {
+                (functions.intersect)(scene, ray, std::ptr::null_mut())
+            },
+        }
+    }
+
+    /// # Safety
+    /// As for [`Trace::intersect`].
+    #[inline(always)]
+    pub unsafe fn occluded(&self, scene: Handle, ray: *mut RawRay) {
+        match self {
+            Trace::V3(functions) => {
+                let mut context = IntersectContext3::INCOHERENT;
+                // SAFETY: the caller vouches for scene and ray; the context lives through the call.
+                unsafe { (functions.occluded)(scene, &mut context, ray) }
+            }
+            // SAFETY: as above.
+            Trace::V4(functions) => unsafe {
+                (functions.occluded)(scene, ray, std::ptr::null_mut())
+            },
+        }
+    }
+}

@@ -1,0 +1,368 @@
+//! Scenes: built from triangle meshes and instances, then immutable.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+use crate::api::{self, Handle, RawBounds, Trace};
+use crate::device::Device;
+use crate::error::Error;
+use crate::filter::{self, Filter};
+use crate::query::Bounds;
+
+/// The number of a mesh or instance within its scene.
+///
+/// Give small, dense numbers: Embree keeps a table up to the largest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct GeometryId(pub u32);
+
+/// The largest id a mesh or instance may have.
+pub const MAX_GEOMETRY_ID: GeometryId = GeometryId((1 << 24) - 1);
+
+/// Embree (`FLT_LARGE` in its sources) drops triangles with coordinates beyond this without a word, and takes no
+/// rays with such.
+pub(crate) const MAX_COORDINATE: f32 = 1.844e18;
+
+impl fmt::Display for GeometryId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "geometry {}", self.0)
+    }
+}
+
+/// A scene in the making.
+///
+/// Scenes are robust (rays do not slip between triangles that share an edge) and of medium build quality:
+/// with high quality, Embree's parallel builder splits triangles in an order that varies from run to run, and so
+/// does which of two triangles a ray through their common edge hits.
+pub struct SceneBuilder {
+    owned: Owned,
+    kinds: HashMap<GeometryId, Kind>,
+    has_instances: bool,
+    has_filters: bool,
+}
+
+/// What an id stands for.
+enum Kind {
+    /// A mesh, attached to the scene.
+    Mesh(Geometry),
+    /// A mesh without triangles, which Embree need not know of.
+    Empty,
+    Instance(Geometry),
+}
+
+/// Embree's scene, and what it points to. The fields are dropped in this order.
+struct Owned {
+    raw: RawScene,
+    filters: Vec<Box<Filter>>,
+    children: Vec<Scene>,
+}
+
+struct RawScene {
+    raw: Handle,
+    device: Device,
+}
+
+/// A geometry, of which we hold one reference.
+struct Geometry {
+    raw: Handle,
+    device: Device,
+}
+
+// SAFETY: Embree's objects are reference-counted atomically and tied to no thread; changes go through `&mut`.
+unsafe impl Send for RawScene {}
+// SAFETY: as above; with `&` a committed scene is only read.
+unsafe impl Sync for RawScene {}
+// SAFETY: as for `RawScene`.
+unsafe impl Send for Geometry {}
+// SAFETY: as for `RawScene`.
+unsafe impl Sync for Geometry {}
+
+impl Drop for RawScene {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from `new_scene` and is released once.
+        unsafe { (self.device.common().release_scene)(self.raw) }
+    }
+}
+
+impl Drop for Geometry {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from `new_geometry` and is released once.
+        unsafe { (self.device.common().release_geometry)(self.raw) }
+    }
+}
+
+impl Geometry {
+    fn new(device: &Device, kind: u32) -> Result<Geometry, Error> {
+        // SAFETY: the device is alive and the kind is one of Embree's.
+        let raw = unsafe { (device.common().new_geometry)(device.raw(), kind) };
+        let raw = device.check_handle(raw, "make a geometry")?;
+        Ok(Geometry {
+            raw,
+            device: device.clone(),
+        })
+    }
+
+    /// Copies triples into a new buffer of the geometry, which Embree pads as its vector loads need.
+    fn fill<T: Copy>(&self, buffer: u32, format: u32, items: &[[T; 3]]) -> Result<(), Error> {
+        const { assert!(size_of::<[T; 3]>() == 12) };
+        let during = "make a buffer";
+        // SAFETY: the geometry is alive; Embree allocates at least `items.len()` items of 12 bytes.
+        let memory = unsafe {
+            (self.device.common().new_buffer)(self.raw, buffer, 0, format, 12, items.len())
+        };
+        let memory = self.device.check_handle(memory, during)?;
+        // SAFETY: `memory` has room for the items, is aligned to 16 and is nobody else's.
+        unsafe {
+            std::ptr::copy_nonoverlapping(items.as_ptr(), memory as *mut [T; 3], items.len())
+        };
+        Ok(())
+    }
+}
+
+impl SceneBuilder {
+    /// Begins an empty scene.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Embree`] when memory is short.
+    pub fn new(device: &Device) -> Result<SceneBuilder, Error> {
+        let during = "make a scene";
+        let common = device.common();
+        // SAFETY: the device is alive.
+        let raw = device.check_handle(unsafe { (common.new_scene)(device.raw()) }, during)?;
+        let raw = RawScene {
+            raw,
+            device: device.clone(),
+        };
+        // SAFETY: the scene was just made.
+        unsafe {
+            (common.set_scene_flags)(raw.raw, api::SCENE_FLAG_ROBUST);
+            (common.set_scene_quality)(raw.raw, api::BUILD_QUALITY_MEDIUM);
+        }
+        device.check(during)?;
+        let owned = Owned {
+            raw,
+            filters: Vec::new(),
+            children: Vec::new(),
+        };
+        Ok(SceneBuilder {
+            owned,
+            kinds: HashMap::new(),
+            has_instances: false,
+            has_filters: false,
+        })
+    }
+
+    /// Adds a mesh of triangles `indices` over corners `positions`, both copied. Degenerate triangles are
+    /// allowed and never hit; so are meshes without triangles.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::BadVertex`], [`Error::BadIndex`], [`Error::DuplicateId`], [`Error::IdTooLarge`], or
+    /// [`Error::Embree`] when memory is short. The builder may be used on after an error.
+    pub fn triangles(
+        &mut self,
+        id: GeometryId,
+        positions: &[[f32; 3]],
+        indices: &[[u32; 3]],
+    ) -> Result<(), Error> {
+        self.check_id(id)?;
+        // Written so that NaN fails too.
+        let fits = |position: &[f32; 3]| position.iter().all(|x| x.abs() <= MAX_COORDINATE);
+        if let Some(vertex) = positions.iter().position(|position| !fits(position)) {
+            return Err(Error::BadVertex {
+                geometry: id,
+                vertex,
+                position: positions[vertex],
+            });
+        }
+        let vertices = positions.len();
+        for (triangle, corners) in indices.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|&&index| index as usize >= vertices) {
+                return Err(Error::BadIndex {
+                    geometry: id,
+                    triangle,
+                    index,
+                    vertices,
+                });
+            }
+        }
+        if indices.is_empty() {
+            self.kinds.insert(id, Kind::Empty);
+            return Ok(());
+        }
+        let mesh = Geometry::new(self.device(), api::GEOMETRY_TYPE_TRIANGLE)?;
+        mesh.fill(api::BUFFER_TYPE_VERTEX, api::FORMAT_FLOAT3, positions)?;
+        mesh.fill(api::BUFFER_TYPE_INDEX, api::FORMAT_UINT3, indices)?;
+        self.kinds.insert(id, Kind::Mesh(mesh));
+        Ok(())
+    }
+
+    /// Adds an instance of a committed scene. `local_to_world` is the affine map's 3x4 matrix, column by
+    /// column: the images of the x, y and z axes, then the translation.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::BadTransform`], [`Error::NestedInstance`], [`Error::OtherDevice`], [`Error::DuplicateId`],
+    /// [`Error::IdTooLarge`], or [`Error::Embree`] when memory is short.
+    pub fn instance(
+        &mut self,
+        id: GeometryId,
+        child: &Scene,
+        local_to_world: &[f32; 12],
+    ) -> Result<(), Error> {
+        self.check_id(id)?;
+        if !child.shared.owned.raw.device.is(self.device()) {
+            return Err(Error::OtherDevice(id));
+        }
+        if child.shared.has_instances {
+            return Err(Error::NestedInstance(id));
+        }
+        if !invertible(local_to_world) {
+            return Err(Error::BadTransform {
+                geometry: id,
+                local_to_world: *local_to_world,
+            });
+        }
+        let instance = Geometry::new(self.device(), api::GEOMETRY_TYPE_INSTANCE)?;
+        let common = self.device().common();
+        // SAFETY: geometry and child are alive (the child is kept with the scene); the matrix is of the format
+        // named, and copied.
+        unsafe {
+            (common.set_instanced_scene)(instance.raw, child.raw);
+            let format = api::FORMAT_FLOAT3X4_COLUMN_MAJOR;
+            (common.set_transform)(instance.raw, 0, format, local_to_world.as_ptr());
+        }
+        self.device().check("make an instance")?;
+        self.owned.children.push(child.clone());
+        self.has_instances = true;
+        self.has_filters |= child.filtered;
+        self.kinds.insert(id, Kind::Instance(instance));
+        Ok(())
+    }
+
+    /// Lets `filter` decide on every hit of the mesh `id`, for [`Scene::intersect`] and [`Scene::occluded`]
+    /// alike. A mesh has one filter, the one set last. It must be a pure function of its candidate (see
+    /// [`Filter`]). If it panics, the panic continues from the call that traced the ray.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NoSuchMesh`] unless `id` was given to [`SceneBuilder::triangles`] before.
+    pub fn filter(&mut self, id: GeometryId, filter: Filter) -> Result<(), Error> {
+        let mesh = match self.kinds.get(&id) {
+            Some(Kind::Mesh(mesh)) => mesh,
+            Some(Kind::Empty) => return Ok(()),
+            Some(Kind::Instance(_)) | None => return Err(Error::NoSuchMesh(id)),
+        };
+        let filter = Box::new(filter);
+        let common = self.owned.raw.device.common();
+        // SAFETY: the mesh is alive; the box is kept as long as the scene, and its address does not change.
+        unsafe {
+            (common.set_user_data)(mesh.raw, (&raw const *filter).cast());
+            (common.set_intersect_filter)(mesh.raw, filter::call);
+            (common.set_occluded_filter)(mesh.raw, filter::call);
+        }
+        self.owned.filters.push(filter);
+        self.has_filters = true;
+        self.device().check("set a filter")
+    }
+
+    /// Builds the scene's acceleration structure, with the device's threads.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Embree`] when memory is short.
+    pub fn commit(self) -> Result<Scene, Error> {
+        let device = self.owned.raw.device.clone();
+        let common = device.common();
+        let scene = self.owned.raw.raw;
+        for (id, kind) in &self.kinds {
+            if let Kind::Mesh(geometry) | Kind::Instance(geometry) = kind {
+                // SAFETY: both are alive; the scene takes its own reference to the geometry.
+                unsafe {
+                    (common.commit_geometry)(geometry.raw);
+                    (common.attach_geometry)(scene, geometry.raw, id.0);
+                }
+            }
+        }
+        // SAFETY: the scene is alive and all its geometries are committed.
+        unsafe { (common.commit_scene)(scene) };
+        device.check("build a scene")?;
+        let shared = Shared {
+            owned: self.owned,
+            has_instances: self.has_instances,
+        };
+        let trace = device.library().trace();
+        Ok(Scene {
+            raw: scene,
+            trace,
+            filtered: self.has_filters,
+            shared: Arc::new(shared),
+        })
+    }
+
+    fn device(&self) -> &Device {
+        &self.owned.raw.device
+    }
+
+    fn check_id(&self, id: GeometryId) -> Result<(), Error> {
+        if id > MAX_GEOMETRY_ID {
+            return Err(Error::IdTooLarge(id));
+        }
+        match self.kinds.contains_key(&id) {
+            true => Err(Error::DuplicateId(id)),
+            false => Ok(()),
+        }
+    }
+}
+
+/// A committed scene: immutable, shared by its clones, and free to be traced from many threads at once.
+/// It keeps alive the scenes it instances, its filters, and its device.
+#[derive(Clone)]
+pub struct Scene {
+    // Here rather than behind the `Arc`, so that a ray costs one indirection less.
+    pub(crate) raw: Handle,
+    pub(crate) trace: Trace,
+    pub(crate) filtered: bool,
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    owned: Owned,
+    has_instances: bool,
+}
+
+// SAFETY: `raw` is owned by `shared`, and tracing a committed scene only reads it; see `RawScene`.
+unsafe impl Send for Scene {}
+// SAFETY: as above.
+unsafe impl Sync for Scene {}
+
+impl Scene {
+    /// The smallest axis-aligned box around everything in the scene; none if it is empty.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let device = &self.shared.owned.raw.device;
+        let mut bounds = RawBounds {
+            lower: [f32::INFINITY; 4],
+            upper: [f32::NEG_INFINITY; 4],
+        };
+        // SAFETY: the scene is committed, `bounds` has the size and alignment of `RTCBounds`.
+        unsafe { (device.common().scene_bounds)(self.raw, &mut bounds) };
+        let ([x, y, z, _], [a, b, c, _]) = (bounds.lower, bounds.upper);
+        (x <= a && y <= b && z <= c).then_some(Bounds {
+            min: [x, y, z],
+            max: [a, b, c],
+        })
+    }
+
+    /// The device the scene was built with.
+    pub fn device(&self) -> &Device {
+        &self.shared.owned.raw.device
+    }
+}
+
+/// Whether an affine map (column-major 3x4) is finite and maps onto all of space.
+fn invertible(m: &[f32; 12]) -> bool {
+    let [a, b, c, d, e, f, g, h, i] = std::array::from_fn(|k| f64::from(m[k]));
+    let determinant = a * (e * i - f * h) - d * (b * i - c * h) + g * (b * f - c * e);
+    m.iter().all(|x| x.is_finite()) && determinant.is_finite() && determinant != 0.0
+}

@@ -1,0 +1,91 @@
+//! Triangle meshes and where they stand.
+
+use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
+
+/// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has none.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name for messages.
+    pub name: String,
+    /// Vertex positions: world space when the mesh stands in one place, local space when instances share it.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals; empty: the geometric normal serves (flat shading).
+    pub normals: Vec<Vec3>,
+    /// Unit tangents, w = handedness of the bitangent; empty when nothing needs them.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinate sets 0 and 1.
+    pub uvs: [Vec<Vec2>; 2],
+    /// Linear RGBA vertex colours.
+    pub colors: Vec<Vec4>,
+    /// Vertex indices, counter-clockwise seen from the front; every index is below `positions.len()`.
+    pub triangles: Vec<[u32; 3]>,
+    /// Every edge (vertices welded by position) is shared by exactly two triangles that run along it in opposite directions.
+    pub closed: bool,
+}
+
+/// A mesh standing in the scene.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name of the object (the glTF node), for messages and cryptomatte.
+    pub name: String,
+    /// Index into the scene's meshes.
+    pub mesh: u32,
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// Index of the object: several instances (primitives) of one node share it.
+    pub object: u32,
+    /// Local to world; `None` when the mesh is already in world space.
+    pub to_world: Option<Placement>,
+}
+
+/// A transform of points, and of normals (inverse transpose).
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    /// Of points and directions.
+    pub points: Affine3A,
+    /// Of normals, up to length: inverse transpose, negated if the transform mirrors, so that winding and normal agree.
+    pub normals: Mat3A,
+}
+
+impl Placement {
+    /// From an affine transform that can be inverted.
+    pub fn new(points: Affine3A) -> Placement {
+        let normals = points.matrix3.inverse().transpose();
+        Placement { points, normals }
+    }
+}
+
+impl Instance {
+    /// A point of the mesh in world space.
+    #[inline]
+    pub fn point(&self, p: Vec3) -> Vec3 {
+        match &self.to_world {
+            None => p,
+            Some(placement) => placement.points.transform_point3(p),
+        }
+    }
+
+    /// A normal of the mesh in world space, not normalised.
+    #[inline]
+    pub fn normal(&self, n: Vec3) -> Vec3 {
+        match &self.to_world {
+            None => n,
+            Some(placement) => placement.normals * n,
+        }
+    }
+
+    /// A direction (tangent) of the mesh in world space, not normalised.
+    #[inline]
+    pub fn direction(&self, v: Vec3) -> Vec3 {
+        match &self.to_world {
+            None => v,
+            Some(placement) => placement.points.transform_vector3(v),
+        }
+    }
+
+    /// The three corners of triangle `primitive` in world space.
+    #[inline]
+    pub fn corners(&self, mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
+        mesh.triangles[primitive as usize].map(|i| self.point(mesh.positions[i as usize]))
+    }
+}

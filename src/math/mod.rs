@@ -1,0 +1,15 @@
+//! Vectors (glam), frames, transforms, warps, colour.
+
+mod frame;
+mod rgb;
+pub mod warp;
+
+pub use frame::{Frame, orthonormal_basis};
+pub use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Mat3A, Vec2, Vec3, Vec3A, Vec4};
+pub use rgb::{Rgb, luminance};
+
+/// `x * x`.
+#[inline]
+pub fn sqr(x: f32) -> f32 {
+    x * x
+}

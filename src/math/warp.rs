@@ -1,0 +1,75 @@
+//! Warps from the unit square to what is sampled; each with its density beside it.
+//!
+//! `u` is uniform on `[0, 1)`. Densities are per unit of the measure in the name: `_w` solid angle,
+//! `_a` area.
+
+use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, TAU};
+
+/// Uniform point of the unit disc, area-preserving and continuous
+/// \[Shirley and Chiu 1997, "A Low Distortion Map Between Disk and Square"\]. Density 1/pi.
+#[inline]
+pub fn disc_concentric(u: Vec2) -> Vec2 {
+    let a = 2.0 * u.x - 1.0;
+    let b = 2.0 * u.y - 1.0;
+    if a == 0.0 && b == 0.0 {
+        return Vec2::ZERO;
+    }
+    let (r, phi) = if a.abs() > b.abs() { (a, FRAC_PI_4 * (b / a)) } else { (b, FRAC_PI_2 - FRAC_PI_4 * (a / b)) };
+    Vec2::new(r * phi.cos(), r * phi.sin())
+}
+
+/// Direction of the upper hemisphere (local z up) with density cos / pi.
+#[inline]
+pub fn hemisphere_cosine(u: Vec2) -> Vec3 {
+    let d = disc_concentric(u);
+    Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
+}
+
+/// Density of [`hemisphere_cosine`]: zero below the horizon.
+#[inline]
+pub fn hemisphere_cosine_pdf_w(cos_theta: f32) -> f32 {
+    cos_theta.max(0.0) * FRAC_1_PI
+}
+
+/// Uniform direction of the sphere; density 1 / (4 pi).
+#[inline]
+pub fn sphere_uniform(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.x;
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    let phi = TAU * u.y;
+    Vec3::new(r * phi.cos(), r * phi.sin(), z)
+}
+
+/// Uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around local z.
+/// Taking `1 - cos` keeps narrow cones (the sun) exact in f32.
+#[inline]
+pub fn cone_uniform(u: Vec2, one_minus_cos: f32) -> Vec3 {
+    let h = u.x * one_minus_cos;
+    let r = (h * (2.0 - h)).max(0.0).sqrt();
+    let phi = TAU * u.y;
+    Vec3::new(r * phi.cos(), r * phi.sin(), 1.0 - h)
+}
+
+/// Density of [`cone_uniform`] inside the cone.
+#[inline]
+pub fn cone_uniform_pdf_w(one_minus_cos: f32) -> f32 {
+    1.0 / (TAU * one_minus_cos)
+}
+
+/// Barycentric coordinates `(b1, b2)` of a uniform point of a triangle
+/// \[Heitz 2019, "A Low-Distortion Map Between Triangle and Square"\].
+#[inline]
+pub fn triangle_uniform(u: Vec2) -> Vec2 {
+    let (mut b0, mut b1);
+    if u.x < u.y {
+        b0 = 0.5 * u.x;
+        b1 = u.y - b0;
+    } else {
+        b1 = 0.5 * u.y;
+        b0 = u.x - b1;
+    }
+    b0 = b0.clamp(0.0, 1.0);
+    b1 = b1.clamp(0.0, 1.0 - b0);
+    Vec2::new(b0, b1)
+}

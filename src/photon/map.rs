@@ -1,0 +1,296 @@
+//! Photons sorted along a Morton curve, eight to a leaf, under a complete 8-ary tree of bounding boxes.
+//!
+//! The tree has no pointers: node `i` of a level has the nodes `8 i .. 8 i + 8` of the level below as children. A query tests
+//! the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid it does not
+//! care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
+
+use crate::math::{Rgb, Vec3};
+use rayon::prelude::*;
+use wide::{CmpLt, f32x8};
+
+/// Photons (and children) per node.
+const WIDTH: usize = 8;
+/// Levels of nodes that a map of 2^32 photons needs: log8(2^32 / 8) rounded up.
+const MAX_LEVELS: usize = 10;
+/// Bits per axis of the Morton code.
+const MORTON_BITS: u32 = 21;
+
+/// What kind of light path left a photon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct PhotonFlags(pub u8);
+
+impl PhotonFlags {
+    /// Every bounce since the light was specular (delta or sharp): a caustic.
+    pub const CAUSTIC: u8 = 1;
+    /// The light is a delta light and every bounce was delta: no eye path that continues can find this light.
+    pub const UNREACHABLE: u8 = 2;
+
+    /// Whether all bits of `mask` are set.
+    #[inline]
+    pub fn has(self, mask: u8) -> bool {
+        self.0 & mask == mask
+    }
+}
+
+/// A light-path vertex, as small as gathering allows.
+#[derive(Clone, Copy, Debug)]
+pub struct Photon {
+    /// World position.
+    pub p: Vec3,
+    /// Unit direction towards where the light came from.
+    pub wi: Vec3,
+    /// Unit geometric normal of the surface.
+    pub ng: Vec3,
+    /// Flux (W), already divided by the number of light paths of the pass.
+    pub flux: Rgb,
+    /// Kind of light path.
+    pub flags: PhotonFlags,
+}
+
+/// Eight positions, structure of arrays; absent photons are infinitely far away.
+#[derive(Clone, Copy)]
+struct Leaf {
+    x: f32x8,
+    y: f32x8,
+    z: f32x8,
+}
+
+/// Bounding boxes of eight children; absent children are empty boxes.
+#[derive(Clone, Copy)]
+struct Node {
+    min: [f32x8; 3],
+    max: [f32x8; 3],
+}
+
+/// Photons of one pass, ready for range queries.
+pub struct PhotonMap {
+    photons: Vec<Photon>,
+    leaves: Vec<Leaf>,
+    /// `levels[0]` is the root's level (one node); the last level's children are leaves.
+    levels: Vec<Vec<Node>>,
+}
+
+/// Spreads the low 21 bits of `v`, two zeros between neighbours.
+#[inline]
+fn spread(v: u64) -> u64 {
+    let mut x = v & 0x1f_ffff;
+    x = (x | x << 32) & 0x1f_0000_0000_ffff;
+    x = (x | x << 16) & 0x1f_0000_ff00_00ff;
+    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+#[derive(Clone, Copy)]
+struct Aabb {
+    min: Vec3,
+    max: Vec3,
+}
+
+impl Aabb {
+    const EMPTY: Aabb = Aabb { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    #[inline]
+    fn union(self, other: Aabb) -> Aabb {
+        Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+}
+
+impl PhotonMap {
+    /// Builds a map. `photons` come in a fixed order (by path, then vertex); photons that share a Morton cell keep it, so the
+    /// map and every query's order of visits depend on the photons alone. Photons that are not finite are left out.
+    pub fn build(mut photons: Vec<Photon>) -> PhotonMap {
+        photons.retain(|p| p.p.is_finite() && p.flux.is_finite());
+        let bounds = photons.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb { min: p.p, max: p.p }));
+        let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
+        let scale = ((1u64 << MORTON_BITS) - 1) as f32 / extent;
+        let mut order: Vec<(u64, u32)> = photons
+            .par_iter()
+            .enumerate()
+            .map(|(i, photon)| {
+                let q = (photon.p - bounds.min) * scale;
+                (spread(q.x as u64) | spread(q.y as u64) << 1 | spread(q.z as u64) << 2, i as u32)
+            })
+            .collect();
+        order.par_sort_unstable();
+        let photons: Vec<Photon> = order.par_iter().map(|&(_, i)| photons[i as usize]).collect();
+
+        let far = f32::INFINITY;
+        let (leaves, mut boxes): (Vec<Leaf>, Vec<Aabb>) = photons
+            .par_chunks(WIDTH)
+            .map(|chunk| {
+                let axis = |a: usize| {
+                    f32x8::from(std::array::from_fn::<f32, WIDTH, _>(|i| chunk.get(i).map_or(far, |p| p.p[a])))
+                };
+                let aabb = chunk.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb { min: p.p, max: p.p }));
+                (Leaf { x: axis(0), y: axis(1), z: axis(2) }, aabb)
+            })
+            .unzip();
+        let mut levels = Vec::new();
+        while !boxes.is_empty() {
+            let (nodes, parents): (Vec<Node>, Vec<Aabb>) = boxes
+                .par_chunks(WIDTH)
+                .map(|chunk| {
+                    let side = |a: usize, f: &dyn Fn(&Aabb) -> Vec3, absent: f32| {
+                        f32x8::from(std::array::from_fn::<f32, WIDTH, _>(|i| chunk.get(i).map_or(absent, |b| f(b)[a])))
+                    };
+                    let node = Node {
+                        min: std::array::from_fn(|a| side(a, &|b| b.min, f32::INFINITY)),
+                        max: std::array::from_fn(|a| side(a, &|b| b.max, f32::NEG_INFINITY)),
+                    };
+                    (node, chunk.iter().fold(Aabb::EMPTY, |b, &c| b.union(c)))
+                })
+                .unzip();
+            levels.push(nodes);
+            if parents.len() == 1 {
+                break;
+            }
+            boxes = parents;
+        }
+        levels.reverse();
+        debug_assert!(levels.len() <= MAX_LEVELS);
+        PhotonMap { photons, leaves, levels }
+    }
+
+    /// The photons, in Morton order.
+    pub fn photons(&self) -> &[Photon] {
+        &self.photons
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.photons.len() * size_of::<Photon>()
+            + self.leaves.len() * size_of::<Leaf>()
+            + self.levels.iter().map(|l| l.len() * size_of::<Node>()).sum::<usize>()
+    }
+
+    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p`, in Morton order.
+    #[inline]
+    pub fn within(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(&Photon, f32)) {
+        self.traverse(p, radius2, |photon, distance2, radius2| {
+            visit(photon, distance2);
+            radius2
+        });
+    }
+
+    /// As [`PhotonMap::within`], where `visit` also gets and returns the radius squared, which it may shrink.
+    #[inline]
+    pub(super) fn traverse(&self, p: Vec3, mut radius2: f32, mut visit: impl FnMut(&Photon, f32, f32) -> f32) {
+        if self.levels.is_empty() {
+            return;
+        }
+        let (px, py, pz) = (f32x8::splat(p.x), f32x8::splat(p.y), f32x8::splat(p.z));
+        let leaf_level = self.levels.len();
+        // (index, children still to visit) of the node being visited on each level.
+        let mut stack = [(0u32, 0u32); MAX_LEVELS];
+        let mut level = 0;
+        stack[0] = (0, self.hit_children(0, 0, px, py, pz, radius2));
+        loop {
+            let (node, mask) = stack[level];
+            if mask == 0 {
+                if level == 0 {
+                    return;
+                }
+                level -= 1;
+                continue;
+            }
+            stack[level].1 = mask & (mask - 1);
+            let child = node as usize * WIDTH + mask.trailing_zeros() as usize;
+            if level + 1 < leaf_level {
+                level += 1;
+                stack[level] = (child as u32, self.hit_children(level, child, px, py, pz, radius2));
+                continue;
+            }
+            let leaf = &self.leaves[child];
+            let (dx, dy, dz) = (leaf.x - px, leaf.y - py, leaf.z - pz);
+            let distance2 = dx * dx + dy * dy + dz * dz;
+            let mut inside = distance2.cmp_lt(f32x8::splat(radius2)).move_mask() as u32;
+            let distance2 = distance2.to_array();
+            while inside != 0 {
+                let i = inside.trailing_zeros() as usize;
+                inside &= inside - 1;
+                radius2 = visit(&self.photons[child * WIDTH + i], distance2[i], radius2);
+            }
+        }
+    }
+
+    /// Bits of the children of a node whose boxes come nearer than the radius.
+    #[inline]
+    fn hit_children(&self, level: usize, node: usize, px: f32x8, py: f32x8, pz: f32x8, radius2: f32) -> u32 {
+        let node = &self.levels[level][node];
+        let zero = f32x8::ZERO;
+        let gap = |min: f32x8, max: f32x8, p: f32x8| (min - p).max(p - max).max(zero);
+        let dx = gap(node.min[0], node.max[0], px);
+        let dy = gap(node.min[1], node.max[1], py);
+        let dz = gap(node.min[2], node.max[2], pz);
+        (dx * dx + dy * dy + dz * dz).cmp_lt(f32x8::splat(radius2)).move_mask() as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Domain, Purpose, Stream};
+
+    /// Clustered photons: a sheet, a tight caustic cluster, duplicates.
+    fn photons(n: u64) -> Vec<Photon> {
+        (0..n)
+            .map(|i| {
+                let draws = Stream::new(7, 0, Domain::Test, i).vertex(0);
+                let u = draws.two(Purpose::Pixel);
+                let v = draws.one(Purpose::Lobe);
+                let p = match i % 4 {
+                    0 => Vec3::new(u.x * 10.0, 0.0, u.y * 10.0),
+                    1 => Vec3::new(3.0 + 1e-3 * u.x, 1e-3 * v, 4.0 + 1e-3 * u.y),
+                    2 => Vec3::new(5.0, 5.0, 5.0),
+                    _ => Vec3::new(u.x, u.y, v) * 10.0,
+                };
+                Photon { p, wi: Vec3::Y, ng: Vec3::Y, flux: Vec3::splat(i as f32), flags: PhotonFlags(0) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn queries_find_exactly_what_brute_force_finds() {
+        for n in [0u64, 1, 7, 8, 9, 64, 65, 513, 5000] {
+            let all = photons(n);
+            let map = PhotonMap::build(all.clone());
+            assert_eq!(map.photons().len(), n as usize);
+            for q in 0..200u64 {
+                let draws = Stream::new(8, 0, Domain::Test, q).vertex(0);
+                let u = draws.two(Purpose::Pixel);
+                let p = if q % 3 == 0 {
+                    Vec3::new(5.0, 5.0, 5.0)
+                } else {
+                    Vec3::new(u.x * 10.0, draws.one(Purpose::Lobe), u.y * 10.0)
+                };
+                let radius2 = 10f32.powf(-6.0 + 7.0 * draws.one(Purpose::Roulette));
+                let mut found: Vec<u32> = Vec::new();
+                map.within(p, radius2, |photon, _| found.push(photon.flux.x as u32));
+                found.sort_unstable();
+                let expected: Vec<u32> =
+                    (0..n as u32).filter(|&i| all[i as usize].p.distance_squared(p) < radius2).collect();
+                assert_eq!(found, expected, "{n} photons, query {q}");
+            }
+        }
+    }
+
+    /// Kernel of equation (3) is strict: a photon exactly on the rim is not counted.
+    #[test]
+    fn the_rim_is_outside() {
+        let map = PhotonMap::build(vec![Photon {
+            p: Vec3::X,
+            wi: Vec3::Y,
+            ng: Vec3::Y,
+            flux: Vec3::ONE,
+            flags: PhotonFlags(0),
+        }]);
+        let count = |radius2| {
+            let mut n = 0;
+            map.within(Vec3::ZERO, radius2, |_, _| n += 1);
+            n
+        };
+        assert_eq!(count(1.0), 0);
+        assert_eq!(count(1.0f32.next_up()), 1);
+    }
+}

@@ -1,0 +1,7 @@
+//! The photon map: photons in Morton order under an implicit 8-wide tree of boxes.
+
+mod map;
+mod nearest;
+
+pub use map::{Photon, PhotonFlags, PhotonMap};
+pub use nearest::nearest_radius2;

@@ -1,0 +1,144 @@
+//! What a scene file says, as plain data: what readers (glTF, USD) produce and `Scene::build` takes.
+
+use crate::geometry::Mesh;
+use crate::material::{Material, MediumParameters};
+use crate::math::{DAffine3, Rgb};
+use crate::texture::Texture;
+use std::path::PathBuf;
+
+/// Everything a reader found in a scene file. Indices are valid; numbers are finite; transforms can be inverted.
+#[derive(Clone, Debug, Default)]
+pub struct Description {
+    /// The file it was read from.
+    pub source: PathBuf,
+    /// Meshes in local space, each once however often it stands in the scene.
+    pub meshes: Vec<Mesh>,
+    /// Where they stand.
+    pub instances: Vec<Placed>,
+    /// Names of objects (nodes that carry a mesh).
+    pub objects: Vec<String>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Textures, decoded.
+    pub textures: Vec<Texture>,
+    /// Cameras, in the file's order.
+    pub cameras: Vec<CameraDescription>,
+    /// Point, spot and directional lights.
+    pub lights: Vec<PunctualLight>,
+    /// Light from infinity.
+    pub environment: Option<EnvironmentDescription>,
+    /// The medium that fills the space.
+    pub medium: Option<MediumParameters>,
+    /// Whatever was ignored or approximated, one sentence each: `material "glass": ...`.
+    pub warnings: Vec<String>,
+}
+
+/// A mesh placed in the scene.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// Name of the node.
+    pub name: String,
+    /// Index into [`Description::meshes`].
+    pub mesh: u32,
+    /// Index into [`Description::materials`].
+    pub material: u32,
+    /// Index into [`Description::objects`].
+    pub object: u32,
+    /// Local to world, composed in f64.
+    pub to_world: DAffine3,
+}
+
+/// A camera; it looks along -Z of its node, +Y up.
+#[derive(Clone, Debug)]
+pub struct CameraDescription {
+    /// Name of the node.
+    pub name: String,
+    /// Camera to world; orthonormal up to scale, which is ignored.
+    pub to_world: DAffine3,
+    /// Projection.
+    pub projection: Projection,
+    /// Radius of the lens (m); 0 is a pinhole.
+    pub aperture_radius: f32,
+    /// Distance of the plane in focus (m).
+    pub focus_distance: f32,
+}
+
+/// Projection of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Vertical field of view (radians) and aspect ratio (width / height) if the file gives one.
+    Perspective {
+        /// Vertical field of view, radians.
+        yfov: f32,
+        /// Width over height.
+        aspect: Option<f32>,
+    },
+    /// Half width and half height of the view (m).
+    Orthographic {
+        /// Half width.
+        xmag: f32,
+        /// Half height.
+        ymag: f32,
+    },
+}
+
+/// A light of KHR_lights_punctual in radiometric units; it shines along -Z of its node.
+#[derive(Clone, Debug)]
+pub struct PunctualLight {
+    /// Name of the node.
+    pub name: String,
+    /// Light to world.
+    pub to_world: DAffine3,
+    /// Radiant intensity (W/sr) of points and spots, irradiance (W/m2) of suns, per channel.
+    pub intensity: Rgb,
+    /// Shape of the emission.
+    pub kind: PunctualKind,
+    /// Radius of the lamp (m); 0 is a mathematical point.
+    pub radius: f32,
+}
+
+/// Kind of a punctual light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PunctualKind {
+    /// All directions alike.
+    Point,
+    /// A cone with glTF's smooth edge between two half angles (radians).
+    Spot {
+        /// Half angle of full intensity.
+        inner: f32,
+        /// Half angle of no intensity.
+        outer: f32,
+    },
+    /// From infinity, spread over a cone.
+    Sun {
+        /// Angular diameter (radians); 0 is exactly parallel.
+        angle: f32,
+    },
+}
+
+/// Light from infinity.
+#[derive(Clone, Debug)]
+pub struct EnvironmentDescription {
+    /// Radiance.
+    pub source: EnvironmentSource,
+    /// Counter-clockwise turn about +Y seen from above (degrees).
+    pub rotation_deg: f32,
+    /// Factor on the radiance.
+    pub strength: f32,
+}
+
+/// Radiance of an environment.
+#[derive(Clone, Debug)]
+pub enum EnvironmentSource {
+    /// The same from everywhere.
+    Color(Rgb),
+    /// A latitude-longitude image: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi from the top.
+    Image {
+        /// Width in texels.
+        width: u32,
+        /// Height in texels.
+        height: u32,
+        /// Radiance, top row first; finite and not negative.
+        texels: Vec<[f32; 3]>,
+    },
+}

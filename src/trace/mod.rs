@@ -1,0 +1,1 @@
+//! Rays and what they hit: the scene's geometry committed to Embree.
