@@ -22,3 +22,5 @@ pub mod material;
 pub mod scene;
 
 pub mod photon;
+
+pub mod combine;

@@ -37,7 +37,7 @@ def export(net, path, training):
 def load(path):
     saved = torch.load(path, map_location="cpu", weights_only=True)
     net = model.build(saved["arch"], saved["levels"], saved["window"])
-    net.load_state_dict(saved["best"] or saved["model"])
+    net.load_state_dict(saved["best"])
     return net, saved
 
 

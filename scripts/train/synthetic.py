@@ -78,8 +78,8 @@ def stack(seed, size=128, levels=5):
     exposure = np.float32(10 ** rng.uniform(-3, 3))
     reference = albedo * photons[..., None] * tint * exposure
 
-    density = 10 ** rng.uniform(-1.0, 1.5)  # photons a pixel and batch at irradiance 1
-    largest = rng.uniform(2.5, 12)
+    density = 10 ** rng.uniform(-2.2, 0.8)  # photons a pixel and batch at irradiance 1
+    largest = rng.uniform(1.5, 9)
     counts = [rng.poisson(np.maximum(photons, 0) * density) / density for _ in range(BATCHES)]
     eye = [1 + gloss * rng.standard_normal((2, size, size)).clip(-1, 3).astype(np.float32) for _ in range(BATCHES)]
     means, variances = [], []
@@ -94,3 +94,24 @@ def stack(seed, size=128, levels=5):
         "albedo": albedo, "normal": normal.astype(np.float32), "depth": depth.astype(np.float32),
         "reference": reference.astype(np.float32),
     }
+
+
+def main():
+    """Write stacks for train.py: python synthetic.py -o DIR --count 200."""
+    import argparse
+    import pathlib
+
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("-o", "--output", required=True)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--size", type=int, default=128)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    pathlib.Path(args.output).mkdir(parents=True, exist_ok=True)
+    for k in range(args.count):
+        seed = args.seed * 100_000 + k
+        np.savez(pathlib.Path(args.output) / f"synthetic{seed}--0.npz", **stack(seed, args.size))
+
+
+if __name__ == "__main__":
+    main()

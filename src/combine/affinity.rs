@@ -1,13 +1,14 @@
 //! Equation (6) with pairwise weights, from the network output `features`.
 //!
-//! Per pixel i and pair j of levels the network gives, in this order of channels, a point phi_i^j of a small space and
-//! three scalars; the weight of neighbour i for centre c is, always positive,
+//! Per pixel i and pair j of levels the network gives a point phi_i^j of a small space and three scalars; the weight of
+//! neighbour i for centre c is, always positive,
 //!
 //! ```text
-//! w_i^j = exp(source_i^j + centre_c^j - falloff_c^j |c - i|^2 - |phi_c^j - phi_i^j|^2)
+//! w_i^j = exp(source_i^j + centre_c^j - exp(falloff_c^j) |c - i|^2 - |phi_c^j - phi_i^j|^2)
 //! ```
 //!
-//! with |c - i| in pixels. So a network with tens of outputs commands windows of hundreds of weights: what the
+//! with |c - i| in pixels. Channels, of P pairs and D dimensions: phi (P D, pair by pair), source (P), centre (P),
+//! falloff (P). So a network with tens of outputs commands windows of hundreds of weights: what the
 //! paper's last layer (1444 filters) computes is here two loops, run on eight pixels at a time.
 
 use std::array::from_fn;
@@ -28,8 +29,9 @@ pub const MAX_DIMENSIONS: usize = 8;
 /// Exponents of affinities end here, so that every weight stays positive in f32.
 const MAX_DISTANCE: f32 = 60.0;
 
-/// Bound of the logarithmic weights, for networks that do not keep to it themselves.
-const MAX_LOG_WEIGHT: f32 = 12.0;
+/// Bounds of the logarithms, as in training; what is no number counts as 0.
+const LOG_WEIGHT: (f32, f32) = (-12.0, 12.0);
+const LOG_FALLOFF: (f32, f32) = (-20.0, 4.0);
 
 /// Pixels handled together.
 const LANES: usize = 8;
@@ -58,19 +60,19 @@ pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, 
 
 fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize, sums: &mut [Sums]) {
     let neighbours = Neighbours::<D>::gather(stack, valid, core, features, pair);
-    let first = pair * (D + SCALARS);
+    let (_, centre, falloff) = scalar_channels::<D>(stack.levels.len() - 1, pair);
     sums.par_chunks_mut(core.width()).enumerate().for_each(|(y, sums)| {
         let image_y = core.y0 + y;
         let from = core.x0 - features.rect.x0;
-        let scalar = |index: usize| &features.row(first + D + index, image_y)[from..from + core.width()];
-        let (centre, falloff) = (scalar(1), scalar(2));
+        let scalar = |channel: usize| &features.row(channel, image_y)[from..from + core.width()];
+        let (centre, falloff) = (scalar(centre), scalar(falloff));
         let correlated = &stack.levels[pair + 1][image_y * stack.width + core.x0..][..core.width()];
         for (block, sums) in sums.chunks_mut(LANES).enumerate() {
             let x = block * LANES;
-            let falloff = from_fn(|l| falloff.get(x + l).copied().unwrap_or(0.0).clamp(0.0, MAX_DISTANCE));
+            let falloff = from_fn(|l| falloff.get(x + l).map_or(0.0, |f| exp_bounded(*f, LOG_FALLOFF)));
             let (difference, weight) = neighbours.window_sums(x, y, falloff);
             for (l, sum) in sums.iter_mut().enumerate() {
-                let scale = exp_bounded(centre[x + l]);
+                let scale = exp_bounded(centre[x + l], LOG_WEIGHT);
                 // The centre may be invalid; its sums are replaced later and must only stay free of panics.
                 let z = correlated[x + l];
                 sum.value = from_fn(|c| sum.value[c] + scale * (difference[c][l] + z[c] * weight[l]));
@@ -97,7 +99,7 @@ impl<const D: usize> Neighbours<D> {
         let radius = features.window / 2;
         let pitch = core.width().next_multiple_of(LANES) + 2 * radius;
         let rows = core.height() + 2 * radius;
-        let first = pair * (D + SCALARS);
+        let (source, ..) = scalar_channels::<D>(stack.levels.len() - 1, pair);
         // Image columns that the planes show, and where they begin in a plane's row.
         let (x0, x1) = (core.x0.saturating_sub(radius), (core.x1 + radius).min(stack.width));
         let offset = x0 + radius - core.x0;
@@ -111,12 +113,12 @@ impl<const D: usize> Neighbours<D> {
         };
         let channel = |index: usize, f: fn(f32) -> f32| {
             plane(&move |y, row| {
-                let source = &features.row(first + index, y)[x0 - features.rect.x0..];
-                row.iter_mut().zip(source).for_each(|(out, s)| *out = f(*s));
+                let values = &features.row(index, y)[x0 - features.rect.x0..];
+                row.iter_mut().zip(values).for_each(|(out, value)| *out = f(*value));
             })
         };
         let mask = |y: usize| &valid[y * stack.width + x0..y * stack.width + x1];
-        let mut weight = channel(D, exp_bounded);
+        let mut weight = channel(source, |x| exp_bounded(x, LOG_WEIGHT));
         weight.par_chunks_mut(pitch).enumerate().for_each(|(v, row)| {
             let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.height) else { return };
             row[offset..].iter_mut().zip(mask(y)).filter(|(_, valid)| !**valid).for_each(|(w, _)| *w = 0.0);
@@ -131,7 +133,7 @@ impl<const D: usize> Neighbours<D> {
                 }
             })
         };
-        let phi = from_fn(|d| channel(d, |x| if x.is_finite() { x } else { 0.0 }));
+        let phi = from_fn(|d| channel(pair * D + d, |x| if x.is_finite() { x } else { 0.0 }));
         Neighbours { radius, pitch, phi, weight, difference: from_fn(difference) }
     }
 
@@ -150,19 +152,19 @@ impl<const D: usize> Neighbours<D> {
                 let at = row + u;
                 let squared = (dy2 + u.abs_diff(self.radius).pow(2)) as f32;
                 let mut distance: Lanes = from_fn(|l| falloff[l] * squared);
-                for d in 0..D {
-                    let phi = lanes(&self.phi[d], at);
+                for (centre, plane) in centre.iter().zip(&self.phi) {
+                    let phi = lanes(plane, at);
                     for l in 0..LANES {
-                        let step = centre[d][l] - phi[l];
+                        let step = centre[l] - phi[l];
                         distance[l] = fma(step, step, distance[l]);
                     }
                 }
                 let source = lanes(&self.weight, at);
                 let w: Lanes = from_fn(|l| source[l] * exp_minus(distance[l]));
-                for c in 0..3 {
-                    let difference = lanes(&self.difference[c], at);
+                for (sum, plane) in sums.iter_mut().zip(&self.difference) {
+                    let difference = lanes(plane, at);
                     for l in 0..LANES {
-                        sums[c][l] = fma(w[l], difference[l], sums[c][l]);
+                        sum[l] = fma(w[l], difference[l], sum[l]);
                     }
                 }
                 for l in 0..LANES {
@@ -204,9 +206,15 @@ fn exp_minus(x: f32) -> f32 {
     f32::from_bits(p.to_bits().wrapping_add(n << 23))
 }
 
-/// exp(x), with x that is no number read as 0 and others kept within [`MAX_LOG_WEIGHT`].
-fn exp_bounded(x: f32) -> f32 {
-    if x.is_nan() { 1.0 } else { x.clamp(-MAX_LOG_WEIGHT, MAX_LOG_WEIGHT).exp() }
+/// exp(x) with x kept within bounds, and read as 0 where it is no number.
+fn exp_bounded(x: f32, (least, most): (f32, f32)) -> f32 {
+    if x.is_nan() { 1.0 } else { x.clamp(least, most).exp() }
+}
+
+/// Channels of source, centre and falloff.
+const fn scalar_channels<const D: usize>(pairs: usize, pair: usize) -> (usize, usize, usize) {
+    let first = pairs * D + pair;
+    (first, first + pairs, first + 2 * pairs)
 }
 
 #[cfg(test)]

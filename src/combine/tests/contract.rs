@@ -90,7 +90,7 @@ fn metadata_that_cannot_be_are_refused() {
         ("window", "19"),
         ("features", "4"),
         ("stride", "4"),
-        ("halo", "36"),
+        ("halo", "32"),
         ("normalisation", "1"),
     ];
     let read = |change: &[(&'static str, &'static str)]| {

@@ -70,11 +70,11 @@ fn both_forms_equal_the_equation_word_for_word() {
                     let value =
                         |channel: usize, [x, y]: [isize; 2]| f64::from(map.row(channel, y as usize)[x as usize]);
                     oracle(&stack, 3, |j, c, i| {
-                        let of = |k, p| value(6 * j + k, p);
-                        let phi: f64 = (0..3).map(|d| (of(d, c) - of(d, i)).powi(2)).sum();
+                        let pairs = levels - 1;
+                        let phi: f64 = (3 * j..3 * j + 3).map(|k| (value(k, c) - value(k, i)).powi(2)).sum();
                         let squared = ((c[0] - i[0]).pow(2) + (c[1] - i[1]).pow(2)) as f64;
-                        // A falloff below zero means none.
-                        (of(3, i) + of(4, c) - of(5, c).max(0.0) * squared - phi).exp()
+                        let (source, centre) = (value(3 * pairs + j, i), value(4 * pairs + j, c));
+                        (source + centre - value(5 * pairs + j, c).exp() * squared - phi).exp()
                     })
                 }
                 Weights::Kernel(map) => oracle(&stack, 2, |j, c, i| {
