@@ -7,9 +7,14 @@ sqrt(2), with the noise of the eye paths drawn once for level 1 and once more fo
 kernels cut by edges, no glossy transport: enough to exercise training and to start from, no substitute for renders.
 """
 
+import argparse
+import pathlib
+
 import numpy as np
 import torch
 from torch.nn.functional import conv2d, interpolate, pad
+
+import crops
 
 BATCHES = 8
 
@@ -98,9 +103,6 @@ def stack(seed, size=128, levels=5):
 
 def main():
     """Write stacks for train.py: python synthetic.py -o DIR --count 200."""
-    import argparse
-    import pathlib
-
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("-o", "--output", required=True)
     parser.add_argument("--count", type=int, default=200)
@@ -110,7 +112,7 @@ def main():
     pathlib.Path(args.output).mkdir(parents=True, exist_ok=True)
     for k in range(args.count):
         seed = args.seed * 100_000 + k
-        np.savez(pathlib.Path(args.output) / f"synthetic{seed}--0.npz", **stack(seed, args.size))
+        crops.save(pathlib.Path(args.output) / f"synthetic{seed}--0.npz", stack(seed, args.size))
 
 
 if __name__ == "__main__":

@@ -2,13 +2,14 @@
 
   python train.py --data DIR --out RUN --minutes 60
 
-DIR holds .npz files of data.py; every tenth scene (by name) validates and is never trained on. Stops after --minutes or
+DIR holds crops of data.py; every tenth scene (by name) validates and is never trained on. Stops after --minutes or
 --steps, whichever comes first; run again with the same --out to go on. RUN/last.pt is what export.py takes. On a
 machine without a GPU it trains on the CPU with --threads threads.
 """
 
 import argparse
 import json
+import math
 import pathlib
 import time
 
@@ -16,8 +17,9 @@ import numpy as np
 import torch
 
 import combination
+import crops
 import model
-import normalise
+from evaluate import relmse
 
 DECAY = 0.999  # of the moving average of the weights, which is what is validated and exported
 
@@ -29,40 +31,24 @@ def loss_of(image, reference):
 
 
 class Data:
-    """All crops in memory; normalised by the exposure of the whole image that they come from."""
+    """All crops in memory."""
 
     def __init__(self, folder, levels):
-        self.items, self.names = {"train": [], "valid": []}, set()
-        files = sorted(pathlib.Path(folder).glob("*.npz"))
-        scenes = sorted({scene_of(f) for f in files})
+        scenes = crops.files(folder)
         if len(scenes) < 2:
             raise SystemExit(f"{folder}: {len(scenes)} scenes; training needs two at least, one to validate with")
-        held_out = set(scenes[::10])
-        for file in files:
-            crop = {k: v.astype(np.float32) for k, v in np.load(file).items()}
-            if len(crop["levels"]) != levels:
-                raise SystemExit(f"{file}: {len(crop['levels'])} levels, the network takes {levels}")
-            scale = float(crop.pop("exposure", normalise.exposure(crop["levels"])))
-            middle = float(crop.pop("median_depth", normalise.median_depth(crop["depth"])))
-            if not all(np.isfinite(crop[k]).all() for k in ("levels", "reference")):
-                continue
-            item = (
-                torch.from_numpy(normalise.tensor(crop, scale, middle)),
-                torch.from_numpy(crop["levels"] * scale).permute(0, 3, 1, 2).contiguous(),
-                torch.from_numpy(crop["reference"] * scale).permute(2, 0, 1).contiguous(),
-            )
-            self.items["valid" if scene_of(file) in held_out else "train"].append(item)
-        self.scenes = len(scenes)
+        held_out = crops.held_out(scenes)
+        self.scenes, self.train, self.valid = len(scenes), [], []
+        for name, files in scenes.items():
+            for file in files:
+                item = tuple(torch.from_numpy(np.ascontiguousarray(x)) for x in crops.load(file))
+                if len(item[1]) != levels:
+                    raise SystemExit(f"{file}: {len(item[1])} levels, the network takes {levels}")
+                (self.valid if name in held_out else self.train).append(item)
 
     def batch(self, rng, size, side, device):
-        items = self.items["train"]
-        chosen = [augment(items[i], rng, side) for i in rng.integers(len(items), size=size)]
+        chosen = [augment(self.train[i], rng, side) for i in rng.integers(len(self.train), size=size)]
         return [torch.stack(part).to(device) for part in zip(*chosen)]
-
-
-def scene_of(file):
-    """Files are named SCENE--ANYTHING.npz."""
-    return file.stem.split("--")[0]
 
 
 def augment(item, rng, side):
@@ -83,14 +69,14 @@ def augment(item, rng, side):
     return out
 
 
+def moving_average(average, new, count):
+    """Exponential, over fewer steps at the beginning: it must not remember the random start."""
+    return torch.lerp(average, new, 1 - min(DECAY, (1 + float(count)) / (10 + float(count))))
+
+
 def forward(net, batch):
     image, levels, reference = batch
     return loss_of(combination.combine(net(image), levels, net.kind, net.window, net.features), reference)
-
-
-def relmse(image, reference):
-    """The papers': per pixel mean over RGB of squared error over squared mean RGB + 0.01, then the mean over pixels."""
-    return ((image - reference).square().mean(1) / (reference.mean(1).square() + 0.01)).mean()
 
 
 @torch.no_grad()
@@ -104,7 +90,7 @@ def validate(net, items, device, most=64):
         levels, reference = (x[..., : image.shape[-2], : image.shape[-1]] for x in (levels, reference))
         combined = combination.combine(net(image), levels, net.kind, net.window, net.features)
         images = [combined, *levels.unbind(1)]
-        totals.append([loss_of(x, reference).item() for x in images] + [relmse(x, reference).item() for x in images])
+        totals.append([loss_of(x, reference).item() for x in images] + [relmse(x, reference).mean().item() for x in images])
     net.train()
     mean = np.mean(totals, axis=0)
     half = len(mean) // 2
@@ -138,10 +124,10 @@ def main():
     device = "cuda" if torch.cuda.is_available() else "cpu"
     torch.manual_seed(args.seed)
     net = model.build(args.arch, args.levels, args.window).to(device)
-    average = torch.optim.swa_utils.AveragedModel(net, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(DECAY))
+    average = torch.optim.swa_utils.AveragedModel(net, avg_fn=moving_average)
     optimiser = torch.optim.Adam(net.parameters(), lr=args.rate)
     data = Data(args.data, args.levels)
-    print(f"{device}; {data.scenes} scenes, {len(data.items['train'])} crops to train, {len(data.items['valid'])} to validate")
+    print(f"{device}; {data.scenes} scenes, {len(data.train)} crops to train, {len(data.valid)} to validate")
     step, seconds = 0, 0.0
     if (out / "last.pt").exists():
         saved = torch.load(out / "last.pt", map_location=device, weights_only=True)
@@ -157,12 +143,12 @@ def main():
             "arch": args.arch, "levels": args.levels, "window": args.window, "model": net.state_dict(),
             "average": average.state_dict(), "best": average.module.state_dict(), "optimiser": optimiser.state_dict(),
             "steps": step, "seconds": seconds, "device": device,
-            "data": f"{data.scenes} scenes, {len(data.items['train'])} crops of {pathlib.Path(args.data).name}",
+            "data": f"{data.scenes} scenes, {len(data.train)} crops of {pathlib.Path(args.data).name}",
         }
         torch.save(state, out / "last.tmp")
         (out / "last.tmp").replace(out / "last.pt")
         report = {"step": step, "seconds": round(seconds, 1), "train_loss": round(float(np.mean(recent or [0])), 5)}
-        report |= validate(average.module, data.items["valid"], device)
+        report |= validate(average.module, data.valid, device)
         recent.clear()
         print(json.dumps(report), flush=True)
         with open(out / "log.jsonl", "a") as log:
@@ -172,7 +158,7 @@ def main():
         # Cosine over whichever limit is nearer its end, after a short warm-up. Seeded by step: a resumed run repeats nothing.
         progress = max(step / args.steps, (seconds - before) / (args.minutes * 60))
         for group in optimiser.param_groups:
-            group["lr"] = args.rate * min(1, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * progress)) + 1e-6
+            group["lr"] = args.rate * min(1, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * progress)) + 1e-6
         rng = np.random.default_rng([args.seed, step])
         loss = forward(net, data.batch(rng, args.batch, args.side, device))
         optimiser.zero_grad()
