@@ -24,37 +24,11 @@ finish() {
     printf '\n'
     [ ${#summary[@]} -eq 0 ] || printf '%s\n' "${summary[@]}"
     printf '%d passed, %d failed\n' "$passed" "$failed"
-    [ "$failed" -eq 0 ] || exit 1
+    [ "$status" -ne 0 ] || [ "$failed" -eq 0 ] || status=1
+    exit "$status"
 }
 trap finish EXIT
 trap 'exit 130' INT TERM
-
-# count LOG: prints "PASSED FAILED SKIPPED", summed over the results of cargo test and of unittest in the log.
-# unittest's "Ran N tests" counts failures, errors and skipped ones too.
-count() {
-    awk '
-        function named(name,   text) {
-            return match($0, name "=[0-9]+") ? substr($0, RSTART + length(name) + 1, RLENGTH - length(name) - 1) : 0
-        }
-        /^test result: / {
-            for (i = 1; i < NF; i++) {
-                if ($(i + 1) ~ /^passed/) passed += $i
-                if ($(i + 1) ~ /^failed/) failed += $i
-                if ($(i + 1) ~ /^ignored/) skipped += $i
-            }
-        }
-        /^Ran [0-9]+ tests? in / { ran = $2 }
-        /^(OK|FAILED|NO TESTS RAN)/ && ran != "" {
-            bad = named("[( ]failures") + named("errors") + named("unexpected successes")
-            out = named("skipped")
-            good = ran - bad - out
-            passed += good > 0 ? good : 0
-            failed += bad; skipped += out
-            ran = ""
-        }
-        END { print passed + 0, failed + 0, skipped + 0 }
-    ' "$1"
-}
 
 # part NAME COMMAND...: runs the command, shows and keeps its output, adds its tests to the counts
 part() {
@@ -63,7 +37,7 @@ part() {
     printf '\n== %s\n' "$name"
     LOG=$(mktemp)
     "$@" 2>&1 | tee "$LOG" || status=$?
-    read -r good bad skipped < <(count "$LOG")
+    read -r good bad skipped < <(awk -f "$ROOT/scripts/test_counts.awk" "$LOG")
     rm -f "$LOG"
     LOG=
     # A test that is skipped tests nothing, and everything it could lack is installed.
@@ -95,12 +69,8 @@ without() { summary+=("$(printf '%-8s %-22s %s' 'not run' "$1" "$2")"); }
 
 setup test
 cd "$ROOT"
-export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
 CAUSTIQUE_BIN=$(realpath -m "${CARGO_TARGET_DIR:-target}/release/caustique")
 export CAUSTIQUE_BIN
-# Embree and ONNX Runtime as the program finds them; a test that needs the unpacked one runs in other directories.
-[ -n "${CAUSTIQUE_ONNXRUNTIME:-}" ] || [ ! -e .deps/onnxruntime/libonnxruntime.so ] ||
-    export CAUSTIQUE_ONNXRUNTIME="$ROOT/.deps/onnxruntime/libonnxruntime.so"
 
 if cargo fmt --version >/dev/null 2>&1; then
     part 'cargo fmt' cargo fmt --all --check
