@@ -28,8 +28,9 @@ say() { printf 'bare: %s\n' "$*" >&2; }
 
 # --- inside the namespace: mounts, then the part within the root --------------------------------------------------------
 
-# inside RELEASE PART: DIR, ROOT and SYSROOT come from the environment
+# inside RELEASE PART DIR SYSROOT
 inside() {
+    local DIR=$3 SYSROOT=$4
     local run=$DIR/run-$1 script status=0
     mount -t proc proc "$run/proc"
     mount --rbind /dev "$run/dev"
@@ -58,7 +59,8 @@ inside() {
 }
 
 if [ "${1:-}" = --inside ]; then
-    inside "$2" "$3"
+    shift
+    inside "$@"
     exit
 fi
 
@@ -143,9 +145,8 @@ bare_root() {
 run() {
     local log=$DIR/$2-$1.log start=$SECONDS status=0
     say "Debian $1: $2"
-    DIR=$DIR ROOT=$ROOT SYSROOT=$SYSROOT \
-        unshare --mount --pid --fork --kill-child --propagation private \
-        "$ROOT/scripts/bare.sh" --inside "$1" "$2" 2>&1 | tee "$log" || status=$?
+    unshare --mount --pid --fork --kill-child --propagation private \
+        "$ROOT/scripts/bare.sh" --inside "$1" "$2" "$DIR" "$SYSROOT" 2>&1 | tee "$log" || status=$?
     results+=("$(printf 'Debian %s  %-5s  exit code %d  %4d s  %s' "$1" "$2" "$status" $((SECONDS - start)) "$(tail -n 1 "$log")")")
     [ "$status" -eq 0 ] || worst=1
 }

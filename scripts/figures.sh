@@ -30,7 +30,7 @@ if [ "$1" = all ]; then
 else
     chosen=("$@")
     for name in "${chosen[@]}"; do
-        names | grep -qx -- "$name" || fail "no figure '$name'" "one of: $(names | tr '\n' ' ')"
+        [[ $'\n'$(names)$'\n' == *$'\n'"$name"$'\n'* ]] || fail "no figure '$name'" "one of: $(names | tr '\n' ' ')"
     done
 fi
 

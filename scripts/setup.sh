@@ -64,7 +64,8 @@ apt_install() {
 # apt_has PACKAGE: whether apt could install it
 apt_has() {
     apt_update
-    apt-cache policy "$1" 2>/dev/null | grep -q 'Candidate: [^(]'
+    # No `grep -q` behind a pipe in these scripts: it leaves early, the writer dies of SIGPIPE, and pipefail sees that.
+    [ -n "$(LC_ALL=C apt-cache policy "$1" 2>/dev/null | sed -n '/Candidate: [^(]/p')" ]
 }
 
 need_python() {
@@ -203,17 +204,17 @@ find_bpy_python() {
         "install one of them and set CAUSTIQUE_PYTHON to it"
 }
 
+missing_libraries() { LC_ALL=C ldd "$1" | sed -n 's/^[[:space:]]*\([^ ]*\) => not found.*/\1/p'; }
+
 need_bpy() {
     find_bpy_python
     need_venv .venv-bpy "$BPY_PYTHON" requirements-bpy.txt
     # Loading the module's file names a missing library at once; importing it would start Blender.
     local module
     module=$(echo "$ROOT"/.venv-bpy/lib/python3*/site-packages/bpy/__init__.*.so)
-    if ldd "$module" | grep -q 'not found'; then
-        apt_install "${BPY_LIBRARIES[@]}"
-    fi
-    ! ldd "$module" | grep 'not found' >&2 ||
-        fail "Blender's Python module lacks the libraries above" "install the packages that hold them"
+    [ -z "$(missing_libraries "$module")" ] || apt_install "${BPY_LIBRARIES[@]}"
+    [ -z "$(missing_libraries "$module")" ] ||
+        fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
 # setup render|python|test
