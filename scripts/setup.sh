@@ -209,9 +209,10 @@ missing_libraries() { LC_ALL=C ldd "$1" | sed -n 's/^[[:space:]]*\([^ ]*\) => no
 need_bpy() {
     find_bpy_python
     need_venv .venv-bpy "$BPY_PYTHON" requirements-bpy.txt
-    # Loading the module's file names a missing library at once; importing it would start Blender.
+    # Asking the loader names what is missing; importing the module would start Blender and stop at the first.
     local module
-    module=$(echo "$ROOT"/.venv-bpy/lib/python3*/site-packages/bpy/__init__.*.so)
+    for module in "$ROOT"/.venv-bpy/lib/python3*/site-packages/bpy/__init__*.so; do :; done
+    [ -f "$module" ] || fail "$module is not there" "remove .venv-bpy, then run this script again"
     [ -z "$(missing_libraries "$module")" ] || apt_install "${BPY_LIBRARIES[@]}"
     [ -z "$(missing_libraries "$module")" ] ||
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
