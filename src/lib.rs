@@ -9,9 +9,11 @@ pub mod math;
 
 pub mod random;
 
-pub mod trace;
+pub mod stat;
 
 pub mod geometry;
+
+pub mod trace;
 
 pub mod texture;
 
@@ -19,6 +21,16 @@ pub mod bsdf;
 
 pub mod material;
 
+pub mod light;
+
+pub mod camera;
+
 pub mod scene;
 
 pub mod photon;
+
+pub mod transport;
+
+pub mod estimator;
+
+pub mod render;

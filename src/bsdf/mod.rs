@@ -1,7 +1,9 @@
 //! The scattering model: one closed set of lobes that agrees with the glTF specification and conserves energy.
 
+mod stub;
 use crate::math::{Rgb, Vec3};
 use std::ops::{BitAnd, BitOr};
+pub use stub::*;
 
 /// A set of lobe classes. The classes decide who carries light that arrives at a surface: see [`LobeSet::BROAD`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

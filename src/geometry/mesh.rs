@@ -43,7 +43,7 @@ pub struct Instance {
 pub struct Placement {
     /// Of points and directions.
     pub points: Affine3A,
-    /// Of normals, up to length: inverse transpose, negated if the transform mirrors, so that winding and normal agree.
+    /// Of normals, up to length: the inverse transpose. The front of a mirrored mesh stays its front, as glTF wants.
     pub normals: Mat3A,
 }
 

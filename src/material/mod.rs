@@ -1,5 +1,9 @@
 //! Materials as glTF and its extensions define them: parameters and textures, evaluated at a surface.
 
+mod library;
+
+pub use library::Materials;
+
 use crate::math::Rgb;
 use crate::texture::TextureRef;
 

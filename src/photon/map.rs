@@ -45,6 +45,8 @@ pub struct Photon {
     pub flux: Rgb,
     /// Kind of light path.
     pub flags: PhotonFlags,
+    /// Segments of the light path up to here.
+    pub depth: u16,
 }
 
 /// Eight positions, structure of arrays; absent photons are infinitely far away.
@@ -245,7 +247,7 @@ mod tests {
                     2 => Vec3::new(5.0, 5.0, 5.0),
                     _ => Vec3::new(u.x, u.y, v) * 10.0,
                 };
-                Photon { p, wi: Vec3::Y, ng: Vec3::Y, flux: Vec3::splat(i as f32), flags: PhotonFlags(0) }
+                Photon { p, wi: Vec3::Y, ng: Vec3::Y, flux: Vec3::splat(i as f32), flags: PhotonFlags(0), depth: 2 }
             })
             .collect()
     }
@@ -284,6 +286,7 @@ mod tests {
             ng: Vec3::Y,
             flux: Vec3::ONE,
             flags: PhotonFlags(0),
+            depth: 2,
         }]);
         let count = |radius2| {
             let mut n = 0;

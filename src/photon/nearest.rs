@@ -52,6 +52,7 @@ mod tests {
                     ng: if i % 3 == 0 { Vec3::NEG_Z } else { Vec3::Z },
                     flux: Vec3::ONE,
                     flags: PhotonFlags(0),
+                    depth: 2,
                 }
             })
             .collect();

@@ -1,5 +1,59 @@
 //! The scene: read from a file into a plain [`Description`], then validated and committed into a [`Scene`].
 
+mod build;
 pub mod description;
+mod survey;
+mod view;
 
 pub use description::Description;
+pub use survey::Survey;
+pub use view::{MAX_SIZE, View};
+
+use crate::bsdf::EnergyTables;
+use crate::error::Result;
+use crate::geometry::Shapes;
+use crate::light::Lights;
+use crate::material::{Materials, MediumParameters};
+use crate::math::DVec3;
+use crate::trace::Tracer;
+use description::CameraDescription;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A validated, immutable scene; it owns everything a pass reads.
+pub struct Scene {
+    /// The file it came from.
+    pub source: PathBuf,
+    /// What was subtracted from all world positions: not zero only for scenes far from the origin.
+    pub origin: DVec3,
+    /// Meshes and instances.
+    pub shapes: Arc<Shapes>,
+    /// Materials and textures.
+    pub materials: Arc<Materials>,
+    /// Names of objects.
+    pub objects: Vec<String>,
+    /// Geometry in Embree.
+    pub tracer: Tracer,
+    /// Lights.
+    pub lights: Lights,
+    /// Cameras as described, in the file's order.
+    pub cameras: Vec<CameraDescription>,
+    /// The medium that fills the space.
+    pub medium: Option<MediumParameters>,
+    /// Energy compensation tables of the materials.
+    pub tables: EnergyTables,
+    /// What is present.
+    pub survey: Survey,
+    /// Whatever was ignored or approximated, from the reader and from building.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Builds a scene; Embree builds with `threads` threads (0: all).
+    ///
+    /// # Errors
+    /// Embree is missing, or out of memory.
+    pub fn build(description: Description, threads: usize) -> Result<Scene> {
+        build::build(description, threads)
+    }
+}

@@ -1,1 +1,5 @@
 //! Rays and what they hit: the scene's geometry committed to Embree.
+
+mod tracer;
+
+pub use tracer::{AlphaTest, Hit, Ray, Tracer};

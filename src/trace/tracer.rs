@@ -1,1 +1,137 @@
-//! placeholder
+//! The scene's triangles in Embree, addressed by our own indices.
+
+use crate::error::{Error, Kind, Result};
+use crate::geometry::Shapes;
+use crate::math::{Affine3A, Vec3};
+use caustique_embree as embree;
+use embree::GeometryId;
+use std::sync::Arc;
+
+/// A segment to be traced: points `origin + t direction`, `0 <= t <= tmax`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Where t = 0; already moved off the surface it leaves.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Largest t; may be infinite.
+    pub tmax: f32,
+    /// Random bits that decide about alpha cut-outs along this ray.
+    pub token: u32,
+}
+
+/// The nearest triangle along a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance along the ray.
+    pub t: f32,
+    /// Barycentric coordinates of the second and third corner.
+    pub barycentric: [f32; 2],
+    /// Index of the instance.
+    pub instance: u32,
+    /// Index of the triangle in the instance's mesh.
+    pub primitive: u32,
+}
+
+/// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs. A pure function.
+pub type AlphaTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
+
+/// Geometry committed to Embree.
+pub struct Tracer {
+    scene: embree::Scene,
+}
+
+fn convert(error: embree::Error) -> Error {
+    let hint = error.hint();
+    let mut error = Error::new(Kind::Library, "Embree", error);
+    error.hint = hint;
+    error
+}
+
+fn column_major(m: &Affine3A) -> [f32; 12] {
+    let columns = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation];
+    std::array::from_fn(|i| columns[i / 3][i % 3])
+}
+
+impl Tracer {
+    /// Commits `shapes`; `cutout[i]` tells whether hits of instance `i` are put to the `alpha` test.
+    ///
+    /// # Errors
+    /// Embree is missing or out of memory, or a coordinate is too large for it.
+    pub fn build(shapes: &Shapes, cutout: &[bool], alpha: &AlphaTest, threads: usize) -> Result<Tracer> {
+        let library = embree::Library::load().map_err(convert)?;
+        let device = embree::Device::new(&library, threads).map_err(convert)?;
+        // A mesh is filtered if any instance of it is: the test itself then accepts the opaque ones.
+        let mut filtered = vec![false; shapes.meshes.len()];
+        for (instance, &cut) in shapes.instances.iter().zip(cutout) {
+            filtered[instance.mesh as usize] |= cut;
+        }
+        let add_mesh = |builder: &mut embree::SceneBuilder, id: u32, mesh: u32| -> Result<()> {
+            let data = &shapes.meshes[mesh as usize];
+            let named = |e: embree::Error| convert(e).within(format_args!("mesh \"{}\"", data.name));
+            let positions: Vec<[f32; 3]> = data.positions.iter().map(Vec3::to_array).collect();
+            builder.triangles(GeometryId(id), &positions, &data.triangles).map_err(named)?;
+            if filtered[mesh as usize] {
+                let alpha = Arc::clone(alpha);
+                let filter: embree::Filter = Arc::new(move |c: &embree::Candidate| {
+                    let instance = c.instance.unwrap_or(c.geometry).0;
+                    alpha(instance, c.primitive, [c.u, c.v], c.token)
+                });
+                builder.filter(GeometryId(id), filter).map_err(named)?;
+            }
+            Ok(())
+        };
+        let mut shared: Vec<Option<embree::Scene>> = vec![None; shapes.meshes.len()];
+        let mut root = embree::SceneBuilder::new(&device).map_err(convert)?;
+        for (i, instance) in shapes.instances.iter().enumerate() {
+            let id = i as u32;
+            match &instance.to_world {
+                None => add_mesh(&mut root, id, instance.mesh)?,
+                Some(placement) => {
+                    let child = match &shared[instance.mesh as usize] {
+                        Some(child) => child.clone(),
+                        None => {
+                            let mut builder = embree::SceneBuilder::new(&device).map_err(convert)?;
+                            add_mesh(&mut builder, 0, instance.mesh)?;
+                            let child = builder.commit().map_err(convert)?;
+                            shared[instance.mesh as usize] = Some(child.clone());
+                            child
+                        }
+                    };
+                    root.instance(GeometryId(id), &child, &column_major(&placement.points))
+                        .map_err(|e| convert(e).within(format_args!("object \"{}\"", instance.name)))?;
+                }
+            }
+        }
+        Ok(Tracer { scene: root.commit().map_err(convert)? })
+    }
+
+    #[inline]
+    fn ray(ray: &Ray) -> embree::Ray {
+        embree::Ray {
+            origin: ray.origin.to_array(),
+            direction: ray.direction.to_array(),
+            tmin: 0.0,
+            tmax: ray.tmax,
+            token: ray.token,
+        }
+    }
+
+    /// The nearest hit, or none.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let hit = self.scene.intersect(&Self::ray(ray))?;
+        Some(Hit {
+            t: hit.t,
+            barycentric: [hit.u, hit.v],
+            instance: hit.instance.unwrap_or(hit.geometry).0,
+            primitive: hit.primitive,
+        })
+    }
+
+    /// Whether anything lies on the segment.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.scene.occluded(&Self::ray(ray))
+    }
+}

@@ -212,9 +212,7 @@ impl Trace {
                 unsafe { (functions.intersect)(scene, &mut context, ray) }
             }
             // SAFETY: as above; Embree 4 documents null arguments as the defaults.
-            Trace::V4(functions) => unsafe {
-                (functions.intersect)(scene, ray, std::ptr::null_mut())
-            },
+            Trace::V4(functions) => unsafe { (functions.intersect)(scene, ray, std::ptr::null_mut()) },
         }
     }
 
@@ -229,9 +227,7 @@ impl Trace {
                 unsafe { (functions.occluded)(scene, &mut context, ray) }
             }
             // SAFETY: as above.
-            Trace::V4(functions) => unsafe {
-                (functions.occluded)(scene, ray, std::ptr::null_mut())
-            },
+            Trace::V4(functions) => unsafe { (functions.occluded)(scene, ray, std::ptr::null_mut()) },
         }
     }
 }

@@ -16,8 +16,8 @@ pub struct Device {
 struct Inner {
     raw: Handle,
     library: Library,
-    /// The first error since the last check. Boxed: Embree holds its address.
-    error: Box<ErrorSlot>,
+    /// The first error since the last check. An `Arc`, and so at an address that stays: Embree holds it.
+    error: Arc<ErrorSlot>,
 }
 
 type ErrorSlot = Mutex<Option<String>>;
@@ -43,22 +43,13 @@ impl Device {
         if raw.is_null() {
             // SAFETY: null asks for the error of the last failed creation on this thread.
             let code = unsafe { (common.device_error)(raw) };
-            return Err(Error::Embree {
-                during,
-                message: api::error_name(code).into(),
-            });
+            return Err(Error::Embree { during, message: api::error_name(code).into() });
         }
-        let inner = Inner {
-            raw,
-            library: library.clone(),
-            error: Box::default(),
-        };
-        let slot: *const ErrorSlot = &*inner.error;
-        // SAFETY: the slot is boxed, owned by `inner`, and dropped after the device is released.
+        let inner = Inner { raw, library: library.clone(), error: Arc::default() };
+        let slot = Arc::as_ptr(&inner.error);
+        // SAFETY: the slot is owned by `inner`, stays where it is, and is dropped after the device is released.
         unsafe { (common.set_error_function)(raw, record_error, slot as *mut c_void) };
-        let device = Device {
-            inner: Arc::new(inner),
-        };
+        let device = Device { inner: Arc::new(inner) };
         device.check(during)?;
         Ok(device)
     }
@@ -82,30 +73,17 @@ impl Device {
 
     /// Turns what Embree has reported since the last check into an error.
     pub(crate) fn check(&self, during: &'static str) -> Result<(), Error> {
-        match self
-            .inner
-            .error
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take()
-        {
+        match self.inner.error.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(message) => Err(Error::Embree { during, message }),
             None => Ok(()),
         }
     }
 
     /// A handle that Embree returned, or the error it reported instead.
-    pub(crate) fn check_handle(
-        &self,
-        handle: Handle,
-        during: &'static str,
-    ) -> Result<Handle, Error> {
+    pub(crate) fn check_handle(&self, handle: Handle, during: &'static str) -> Result<Handle, Error> {
         self.check(during)?;
         if handle.is_null() {
-            return Err(Error::Embree {
-                during,
-                message: api::error_name(1).into(),
-            });
+            return Err(Error::Embree { during, message: api::error_name(1).into() });
         }
         Ok(handle)
     }
@@ -131,7 +109,5 @@ unsafe extern "C" fn record_error(slot: *mut c_void, code: u32, text: *const c_c
             message = format!("{message} ({text})");
         }
     }
-    slot.lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .get_or_insert(message);
+    slot.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
 }

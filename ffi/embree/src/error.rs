@@ -51,7 +51,8 @@ pub enum Error {
         /// How many vertices there are.
         vertices: usize,
     },
-    /// An instance's matrix holds NaN or infinity, or cannot be inverted.
+    /// An instance's matrix holds NaN or infinity, cannot be inverted, or is too extreme for single precision: scales
+    /// below about 1e-9, or a scene moved or blown up beyond 1.8e18.
     BadTransform {
         /// The instance.
         geometry: GeometryId,
@@ -81,13 +82,10 @@ impl Error {
                  Ubuntu 24.04: apt install libembree4-4; Fedora, openSUSE, Arch, Homebrew: embree), or set \
                  {LIBRARY_VARIABLE} to the path of the library file"
             )),
-            Error::BadVertex { .. } => {
-                Some("clean the mesh of invalid or far-away vertices".into())
+            Error::BadVertex { .. } => Some("clean the mesh of invalid or far-away vertices".into()),
+            Error::BadTransform { .. } => {
+                Some("give the object a finite scale that is not zero along any axis, or leave it out".into())
             }
-            Error::BadTransform { .. } => Some(
-                "give the object a finite scale that is not zero along any axis, or leave it out"
-                    .into(),
-            ),
             _ => None,
         }
     }
@@ -99,65 +97,33 @@ impl fmt::Display for Error {
             Error::NotFound { tried } => {
                 write!(f, "Embree was not found")?;
                 for (i, (path, reason)) in tried.iter().enumerate() {
-                    write!(
-                        f,
-                        "{} {}: {reason}",
-                        if i == 0 { "; tried" } else { ";" },
-                        path.display()
-                    )?;
+                    write!(f, "{} {}: {reason}", if i == 0 { "; tried" } else { ";" }, path.display())?;
                 }
                 Ok(())
             }
             Error::Unusable { path, reason } => write!(f, "{}: {reason}", path.display()),
             Error::Embree { during, message } => write!(f, "Embree failed to {during}: {message}"),
-            Error::BadVertex {
-                geometry,
-                vertex,
-                position: [x, y, z],
-            } => {
-                write!(
-                    f,
-                    "{geometry}: vertex {vertex} at ({x}, {y}, {z}) is not finite or too far away"
-                )
+            Error::BadVertex { geometry, vertex, position: [x, y, z] } => {
+                write!(f, "{geometry}: vertex {vertex} at ({x}, {y}, {z}) is not finite or too far away")
             }
-            Error::BadIndex {
-                geometry,
-                triangle,
-                index,
-                vertices,
-            } => {
-                write!(
-                    f,
-                    "{geometry}: triangle {triangle}: index {index} is past the {vertices} vertices"
-                )
+            Error::BadIndex { geometry, triangle, index, vertices } => {
+                write!(f, "{geometry}: triangle {triangle}: index {index} is past the {vertices} vertices")
             }
-            Error::BadTransform {
-                geometry,
-                local_to_world,
-            } => {
+            Error::BadTransform { geometry, local_to_world } => {
                 write!(
                     f,
-                    "{geometry}: the instance's matrix {local_to_world:?} is not finite or not invertible"
+                    "{geometry}: the instance's matrix {local_to_world:?} is not finite, not invertible, or too extreme"
                 )
             }
             Error::DuplicateId(geometry) => write!(f, "{geometry}: the id is already in use"),
             Error::IdTooLarge(geometry) => {
                 write!(f, "{geometry}: the id is larger than {}", MAX_GEOMETRY_ID.0)
             }
-            Error::NoSuchMesh(geometry) => write!(
-                f,
-                "{geometry}: there is no triangle mesh of this id to filter"
-            ),
+            Error::NoSuchMesh(geometry) => write!(f, "{geometry}: there is no triangle mesh of this id to filter"),
             Error::NestedInstance(geometry) => {
-                write!(
-                    f,
-                    "{geometry}: the instanced scene itself holds instances, and only one level is followed"
-                )
+                write!(f, "{geometry}: the instanced scene itself holds instances, and only one level is followed")
             }
-            Error::OtherDevice(geometry) => write!(
-                f,
-                "{geometry}: the instanced scene belongs to another device"
-            ),
+            Error::OtherDevice(geometry) => write!(f, "{geometry}: the instanced scene belongs to another device"),
         }
     }
 }

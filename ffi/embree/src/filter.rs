@@ -47,12 +47,7 @@ pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
     let (valid, filter, hit, token) = unsafe {
         let arguments = &*arguments;
         debug_assert_eq!(arguments.count, 1);
-        (
-            &mut *arguments.valid,
-            &*(arguments.user as *const Filter),
-            arguments.hit,
-            (*arguments.ray).id,
-        )
+        (&mut *arguments.valid, &*(arguments.user as *const Filter), arguments.hit, (*arguments.ray).id)
     };
     if *valid == 0 {
         return;

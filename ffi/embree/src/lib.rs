@@ -40,7 +40,7 @@
 //! the structures of `embree4-sys` 0.0.10 lack `RTCHit::instPrimID`, which Embree has had since
 //! 4.3: the library writes it 4 bytes past the end of their 80-byte `RTCRayHit`. The structures here
 //! have room for it whatever version is loaded (96 bytes, aligned to 16), and every library is
-//! tried once on a two-ray scene, in front of guard bytes, before it is used
+//! tried once on a small scene, with guard bytes behind the structure, before it is used
 //! (see [`Library::hit_extent`]).
 //!
 //! # What is unsafe
@@ -49,8 +49,6 @@
 //! prove: that the file found under Embree's name is Embree (loading it runs its initialisers), and
 //! that its C interface is the one its version number promises, of which the trial above checks what
 //! can be checked. A loaded library is never unloaded: Embree's worker threads outlive its devices.
-#![warn(missing_docs)]
-#![deny(unsafe_op_in_unsafe_fn)]
 
 mod api;
 mod device;
@@ -60,6 +58,7 @@ mod load;
 mod probe;
 mod query;
 mod scene;
+mod transform;
 
 pub use device::Device;
 pub use error::Error;

@@ -16,12 +16,7 @@ pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_EMBREE";
 /// Names to try, best first. Those with a version number are what distributions install for programs, the
 /// others come with development packages.
 #[cfg(not(any(target_os = "macos", windows)))]
-const NAMES: &[&str] = &[
-    "libembree4.so.4",
-    "libembree3.so.3",
-    "libembree4.so",
-    "libembree3.so",
-];
+const NAMES: &[&str] = &["libembree4.so.4", "libembree3.so.3", "libembree4.so", "libembree3.so"];
 #[cfg(target_os = "macos")]
 const NAMES: &[&str] = &[
     "libembree4.4.dylib",
@@ -101,32 +96,24 @@ impl Library {
     /// not find the triangle of the trial scene where it is.
     pub fn load_from(path: impl AsRef<Path>) -> Result<Library, Error> {
         let path = path.as_ref();
-        let unusable = |path: &Path, reason: String| Error::Unusable {
-            path: path.to_owned(),
-            reason,
-        };
+        let unusable = |path: &Path, reason: String| Error::Unusable { path: path.to_owned(), reason };
         // SAFETY: initialisers run here; that the file is to be trusted is in the documentation.
         let library = unsafe { libloading::Library::new(OsStr::new(path)) }
             .map_err(|error| unusable(path, shorten(path, &error)))?;
         // SAFETY: the symbols carry Embree's names; the library is never unloaded (see below).
-        let common = unsafe { Common::load(&library) }.map_err(|error| {
-            unusable(
-                path,
-                format!("not Embree 3 or 4 ({})", shorten(path, &error)),
-            )
-        })?;
+        let common = unsafe { Common::load(&library) }
+            .map_err(|error| unusable(path, format!("not Embree 3 or 4 ({})", shorten(path, &error))))?;
         let path = origin(common.new_device as *const _).unwrap_or_else(|| path.to_owned());
 
         let version = probe::version(&common).map_err(|reason| unusable(&path, reason))?;
-        // SAFETY: as for `common`; which form the functions have follows from the version.
         let trace = match version.major {
+            // SAFETY: as for `common`; the version says which form the functions have.
             3 => unsafe { Trace3::load(&library) }.map(Trace::V3),
+            // SAFETY: as above.
             4 => unsafe { Trace4::load(&library) }.map(Trace::V4),
             _ => {
-                return Err(unusable(
-                    &path,
-                    format!("Embree {version} is neither version 3 nor 4"),
-                ));
+                let reason = format!("Embree {version} is neither version 3 nor 4");
+                return Err(unusable(&path, reason));
             }
         }
         .map_err(|error| unusable(&path, shorten(&path, &error)))?;
@@ -134,15 +121,8 @@ impl Library {
         // code must stay mapped.
         std::mem::forget(library);
 
-        let with_extent = |hit_extent| Library {
-            inner: Arc::new(Inner {
-                path: path.clone(),
-                version,
-                hit_extent,
-                common,
-                trace,
-            }),
-        };
+        let with_extent =
+            |hit_extent| Library { inner: Arc::new(Inner { path: path.clone(), version, hit_extent, common, trace }) };
         let extent = probe::try_out(&with_extent(0)).map_err(|reason| unusable(&path, reason))?;
         Ok(with_extent(extent))
     }
@@ -182,9 +162,7 @@ impl fmt::Debug for Library {
 fn shorten(path: &Path, error: &libloading::Error) -> String {
     let text = error.to_string();
     let prefix = format!("{}: ", path.display());
-    text.strip_prefix(&prefix)
-        .map(str::to_owned)
-        .unwrap_or(text)
+    text.strip_prefix(&prefix).map(str::to_owned).unwrap_or(text)
 }
 
 /// The file that an address was loaded from.
@@ -204,12 +182,8 @@ fn origin(address: *const std::ffi::c_void) -> Option<PathBuf> {
         fn dladdr(address: *const c_void, info: *mut DlInfo) -> c_int;
     }
     let null = std::ptr::null_mut();
-    let mut info = DlInfo {
-        file_name: null as *const _,
-        file_base: null,
-        symbol_name: null as *const _,
-        symbol_address: null,
-    };
+    let mut info =
+        DlInfo { file_name: null as *const _, file_base: null, symbol_name: null as *const _, symbol_address: null };
     // SAFETY: `dladdr` only looks the address up, and fills in `info` when it returns non-zero.
     if unsafe { dladdr(address, &mut info) } == 0 || info.file_name.is_null() {
         return None;
@@ -231,23 +205,13 @@ mod tests {
 
     #[test]
     fn nothing_found_lists_what_was_tried_and_names_packages() {
-        let error =
-            Library::first_of(&["libno-such-embree.so.4", "libno-such-embree.so.3"]).unwrap_err();
+        let error = Library::first_of(&["libno-such-embree.so.4", "libno-such-embree.so.3"]).unwrap_err();
         let text = error.to_string();
-        assert!(
-            text.starts_with("Embree was not found; tried libno-such-embree.so.4: "),
-            "{text}"
-        );
+        assert!(text.starts_with("Embree was not found; tried libno-such-embree.so.4: "), "{text}");
         assert!(text.contains("; libno-such-embree.so.3: "), "{text}");
         let hint = error.hint().unwrap();
-        assert!(
-            hint.contains("Debian 12, Ubuntu 22.04: apt install libembree3-3"),
-            "{hint}"
-        );
-        assert!(
-            hint.contains("Debian 13, Ubuntu 24.04: apt install libembree4-4"),
-            "{hint}"
-        );
+        assert!(hint.contains("Debian 12, Ubuntu 22.04: apt install libembree3-3"), "{hint}");
+        assert!(hint.contains("Debian 13, Ubuntu 24.04: apt install libembree4-4"), "{hint}");
         assert!(hint.contains(LIBRARY_VARIABLE), "{hint}");
     }
 }

@@ -37,36 +37,23 @@ pub fn version(common: &Common) -> Result<Version, String> {
 /// Traces two rays and returns the number of bytes of the ray's structure in use, or what was wrong.
 pub fn try_out(library: &Library) -> Result<usize, String> {
     let scene = trial_scene(library).map_err(|error| format!("the trial scene failed: {error}"))?;
-    let ray = Ray {
-        origin: [5.25, 0.25, 2.0],
-        direction: [0.0, 0.0, -1.0],
-        tmin: 0.0,
-        tmax: 9.0,
-        token: 0,
-    };
+    let ray = Ray { origin: [5.25, 0.25, 2.0], direction: [0.0, 0.0, -1.0], tmin: 0.0, tmax: 9.0, token: 0 };
     let (raw, extent) = guarded_intersect(&scene, &ray);
     let (hit, room) = (raw.hit, size_of::<RawRayHit>());
     if extent > room {
-        return Err(format!(
-            "it writes {extent} bytes of a structure that should have at most {room}"
-        ));
+        return Err(format!("it writes {extent} bytes of a structure that should have at most {room}"));
     }
     let ids = (hit.geometry, hit.instance, hit.primitive);
     let numbers = [raw.ray.tfar, hit.u, hit.v];
     // Embree divides by an approximate reciprocal, so equality would be too much to ask.
-    let close = numbers
-        .iter()
-        .zip([2.0, 0.25, 0.25])
-        .all(|(a, b)| (a - b).abs() < 1e-4);
+    let close = numbers.iter().zip([2.0, 0.25, 0.25]).all(|(a, b)| (a - b).abs() < 1e-4);
     if ids != (3, 7, 1) || !close {
         return Err(format!(
             "it does not find the trial triangle where it is, but {ids:?} at {numbers:?}: unknown build options"
         ));
     }
     if !scene.occluded(&ray) || scene.intersect(&Ray { token: 1, ..ray }).is_some() {
-        return Err(
-            "it does not test occlusion or call filters as it should: unknown build options".into(),
-        );
+        return Err("it does not test occlusion or call filters as it should: unknown build options".into());
     }
     Ok(extent)
 }
@@ -75,12 +62,7 @@ pub fn try_out(library: &Library) -> Result<usize, String> {
 fn trial_scene(library: &Library) -> Result<Scene, Error> {
     let device = Device::new(library, 1)?;
     let mut child = SceneBuilder::new(&device)?;
-    let corners = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [-1.0, 0.0, 0.0],
-    ];
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
     child.triangles(GeometryId(3), &corners, &[[0, 2, 3], [0, 1, 2]])?;
     child.filter(GeometryId(3), Arc::new(|candidate| candidate.token != 1))?;
     let child = child.commit()?;
@@ -105,17 +87,10 @@ fn guarded_intersect(scene: &Scene, ray: &Ray) -> (RawRayHit, usize) {
     // The pointer is good for the whole of `buffer`, so what the library writes behind the structure is too.
     unsafe {
         start.cast::<RawRay>().write(RawRay::new(ray));
-        start
-            .add(offset_of!(RawRayHit, hit.geometry))
-            .cast::<u32>()
-            .write(api::INVALID_GEOMETRY_ID);
+        start.add(offset_of!(RawRayHit, hit.geometry)).cast::<u32>().write(api::INVALID_GEOMETRY_ID);
         scene.trace.intersect(scene.raw, start.cast());
     }
-    let end = buffer
-        .0
-        .iter()
-        .rposition(|&byte| byte != GUARD)
-        .map_or(0, |last| last + 1);
+    let end = buffer.0.iter().rposition(|&byte| byte != GUARD).map_or(0, |last| last + 1);
     // SAFETY: `buffer` is large enough, aligned, initialised, and any bits make a `RawRayHit`.
     (unsafe { buffer.0.as_ptr().cast::<RawRayHit>().read() }, end)
 }

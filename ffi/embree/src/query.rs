@@ -2,11 +2,12 @@
 
 use crate::api::{INVALID_GEOMETRY_ID, RawHit, RawRay, RawRayHit};
 use crate::filter;
-use crate::scene::{GeometryId, MAX_COORDINATE, Scene};
+use crate::scene::{GeometryId, Scene};
 
 /// A segment of a ray: the points `origin + t * direction` with `tmin <= t <= tmax`.
 ///
-/// A ray with NaN, or with a coordinate that is infinite or beyond 1.844e18, hits nothing.
+/// A ray with NaN or too large a coordinate hits nothing. Coordinates up to 1e9 are never too large; the limit is
+/// 1.844e18 in scenes without instances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where t = 0.
@@ -72,9 +73,9 @@ impl RawRay {
     /// Asked before Embree is: a library built with assertions, as Debian's 3.13.5 is, aborts the program
     /// on any other ray, and `occluded` tells the answer by the sign of `tfar`.
     #[inline(always)]
-    fn is_valid(&self) -> bool {
+    fn is_valid(&self, reach: f32) -> bool {
         // Written so that NaN is invalid, and without branches.
-        let within = |x: f32| x.abs() <= MAX_COORDINATE;
+        let within = |x: f32| x.abs() <= reach;
         let [a, b, c] = self.origin.map(within);
         let [d, e, f] = self.direction.map(within);
         a & b & c & d & e & f & (self.tnear <= self.tfar)
@@ -85,11 +86,8 @@ impl Scene {
     /// The nearest hit, or none.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let mut raw = RawRayHit {
-            ray: RawRay::new(ray),
-            hit: RawHit::MISS,
-        };
-        if !raw.ray.is_valid() {
+        let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
+        if !raw.ray.is_valid(self.reach) {
             return None;
         }
         // SAFETY: the scene is committed and alive; the structure is initialised and as large as any
@@ -117,7 +115,7 @@ impl Scene {
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut raw = RawRay::new(ray);
-        if !raw.is_valid() {
+        if !raw.is_valid(self.reach) {
             return false;
         }
         // SAFETY: as in `intersect`.

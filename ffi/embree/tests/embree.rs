@@ -4,9 +4,7 @@ mod support;
 
 use std::sync::Arc;
 
-use caustique_embree::{
-    Candidate, Error, GeometryId, Library, MAX_GEOMETRY_ID, Ray, Scene, SceneBuilder,
-};
+use caustique_embree::{Candidate, Error, GeometryId, Library, MAX_GEOMETRY_ID, Ray, Scene, SceneBuilder};
 use support::*;
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
@@ -28,16 +26,9 @@ fn library_says_what_it_is_and_stays_within_the_structure() {
     let library = library();
     let version = library.version();
     assert!(version.major == 3 || version.major == 4, "{version}");
-    assert!(
-        library.path().to_string_lossy().contains("embree"),
-        "{library:?}"
-    );
+    assert!(library.path().to_string_lossy().contains("embree"), "{library:?}");
     // 4.3 brought `instPrimID`.
-    let expected = if (version.major, version.minor) >= (4, 3) {
-        84
-    } else {
-        80
-    };
+    let expected = if (version.major, version.minor) >= (4, 3) { 84 } else { 80 };
     assert_eq!(library.hit_extent(), expected, "{version}");
 }
 
@@ -55,10 +46,7 @@ fn mesh_without_triangles_is_allowed() {
     builder.triangles(GeometryId(0), &[], &[]).unwrap();
     builder.triangles(GeometryId(1), &TRIANGLE, &[]).unwrap();
     builder.filter(GeometryId(1), Arc::new(|_| false)).unwrap();
-    assert_eq!(
-        builder.triangles(GeometryId(1), &TRIANGLE, &[]),
-        Err(Error::DuplicateId(GeometryId(1)))
-    );
+    assert_eq!(builder.triangles(GeometryId(1), &TRIANGLE, &[]), Err(Error::DuplicateId(GeometryId(1))));
     let scene = builder.commit().unwrap();
     assert_eq!(scene.intersect(&down(0.5, 0.5)), None);
     assert_eq!(scene.bounds(), None);
@@ -72,9 +60,7 @@ fn one_triangle_is_hit_with_its_coordinates_and_normal() {
     assert_eq!((hit.primitive, hit.geometry, hit.instance), (0, ID, None));
     // cross(p1 - p0, p2 - p0), of twice the triangle's area, from whichever side it is hit.
     assert_eq!(hit.ng, [0.0, 0.0, 6.0]);
-    let from_below = scene
-        .intersect(&ray([0.5, 1.5, -5.0], [0.0, 0.0, 1.0]))
-        .unwrap();
+    let from_below = scene.intersect(&ray([0.5, 1.5, -5.0], [0.0, 0.0, 1.0])).unwrap();
     assert_eq!(from_below.ng, [0.0, 0.0, 6.0]);
     assert!(scene.occluded(&down(0.5, 1.5)));
     assert_eq!(scene.intersect(&down(1.5, 1.5)), None);
@@ -86,11 +72,7 @@ fn one_triangle_is_hit_with_its_coordinates_and_normal() {
 #[test]
 fn segment_ends_count() {
     let scene = one_triangle();
-    let segment = |tmin, tmax| Ray {
-        tmin,
-        tmax,
-        ..down(0.5, 0.5)
-    };
+    let segment = |tmin, tmax| Ray { tmin, tmax, ..down(0.5, 0.5) };
     for (tmin, tmax, expected) in [
         (0.0, 6.0, true),
         (0.0, f32::INFINITY, true),
@@ -108,10 +90,7 @@ fn segment_ends_count() {
         assert_eq!(scene.occluded(&segment), expected, "{segment:?}");
     }
     // Behind the origin there is nothing, however low tmin is.
-    let behind = Ray {
-        tmin: -9.0,
-        ..ray([0.5, 0.5, -1.0], [0.0, 0.0, -1.0])
-    };
+    let behind = Ray { tmin: -9.0, ..ray([0.5, 0.5, -1.0], [0.0, 0.0, -1.0]) };
     assert_eq!(scene.intersect(&behind), None);
     assert!(!scene.occluded(&behind));
 }
@@ -119,24 +98,13 @@ fn segment_ends_count() {
 #[test]
 fn rays_of_odd_numbers_do_no_harm() {
     let scene = million();
-    let odd = [
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        0.0,
-        -0.0,
-        f32::MIN_POSITIVE / 4.0,
-        f32::MAX,
-        0.3,
-    ];
+    let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, f32::MIN_POSITIVE / 4.0, f32::MAX, 0.3];
     for x in odd {
         for y in odd {
             for z in odd {
-                for ray in [
-                    ray([0.3, 0.2, 1.0], [x, y, z]),
-                    ray([x, y, z], [0.1, 0.2, -1.0]),
-                    ray([x, y, z], [z, x, y]),
-                ] {
+                for ray in
+                    [ray([0.3, 0.2, 1.0], [x, y, z]), ray([x, y, z], [0.1, 0.2, -1.0]), ray([x, y, z], [z, x, y])]
+                {
                     scene.intersect(&ray);
                     scene.occluded(&ray);
                 }
@@ -161,28 +129,21 @@ fn a_million_triangles_agree_with_brute_force() {
             (None, None) => {}
             (Some(hit), Some((t, near))) => {
                 hits += 1;
-                assert!(
-                    (f64::from(hit.t) - t).abs() < 1e-5 * (1.0 + t),
-                    "{hit:?}, {t}"
-                );
+                assert!((f64::from(hit.t) - t).abs() < 1e-5 * (1.0 + t), "{hit:?}, {t}");
                 // On an edge either neighbour will do.
                 assert!(near.contains(&hit.primitive), "{hit:?}, {near:?}");
-                let corners =
-                    indices[hit.primitive as usize].map(|index| positions[index as usize]);
+                let corners = indices[hit.primitive as usize].map(|index| positions[index as usize]);
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-                for k in 0..3 {
-                    let on_triangle: f32 = (0..3).map(|c| weights[c] * corners[c][k]).sum();
-                    let on_ray = ray.origin[k] + hit.t * ray.direction[k];
-                    assert!((on_triangle - on_ray).abs() < 1e-5, "{hit:?}");
+                let [a, b, c] = corners;
+                for (k, (origin, direction)) in ray.origin.iter().zip(ray.direction).enumerate() {
+                    let on_triangle = weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k];
+                    assert!((on_triangle - (origin + hit.t * direction)).abs() < 1e-5, "{hit:?}");
                 }
             }
             (found, expected) => panic!("{ray:?}: {found:?}, but by brute force {expected:?}"),
         }
     }
-    assert!(
-        (10..50).contains(&hits),
-        "{hits} of 60 rays hit: a poor test"
-    );
+    assert!((10..50).contains(&hits), "{hits} of 60 rays hit: a poor test");
 }
 
 #[test]
@@ -196,27 +157,15 @@ fn intersect_and_occluded_agree() {
         assert_eq!(hit.is_some(), scene.occluded(&ray), "{ray:?}");
         if let Some(hit) = hit {
             hits += 1;
-            assert!(
-                !scene.occluded(&Ray {
-                    tmax: hit.t * 0.999,
-                    ..ray
-                }),
-                "{ray:?}"
-            );
-            assert!(
-                scene.occluded(&Ray {
-                    tmin: hit.t * 0.999,
-                    tmax: hit.t * 1.001,
-                    ..ray
-                }),
-                "{ray:?}"
-            );
+            assert!(!scene.occluded(&Ray { tmax: hit.t * 0.999, ..ray }), "{ray:?}");
+            assert!(scene.occluded(&Ray { tmin: hit.t * 0.999, tmax: hit.t * 1.001, ..ray }), "{ray:?}");
         }
     }
     assert!((20_000..180_000).contains(&hits), "{hits}");
 }
 
-/// A closed surface of shared edges, from inside: no ray may escape, least of all through an edge.
+/// A closed surface, from inside: no ray may escape through an edge. Aimed exactly at a corner, where six
+/// triangles meet, some do in Embree (see `SceneBuilder`); a change in how many is worth knowing of.
 #[test]
 fn rays_do_not_slip_through_edges() {
     let (positions, indices) = sphere(64);
@@ -224,57 +173,40 @@ fn rays_do_not_slip_through_edges() {
     builder.triangles(ID, &positions, &indices).unwrap();
     let scene = builder.commit().unwrap();
     let mut random = Random(3);
+    let (mut corners, mut slipped) = (0, 0);
     for triangle in &indices {
         let [a, b, c] = triangle.map(|index| positions[index as usize]);
-        let origin = random.direction().map(|x| x * 0.01);
-        for target in [a, b, c, middle(a, b), middle(b, c), middle(c, a)] {
-            let direction = std::array::from_fn(|k| target[k] - origin[k]);
-            assert!(
-                scene.intersect(&ray(origin, direction)).is_some(),
-                "{origin:?} -> {target:?}"
-            );
-            assert!(
-                scene.occluded(&ray(origin, direction)),
-                "{origin:?} -> {target:?}"
-            );
+        let origin = random.direction().map(|x| x * 0.1);
+        let hits = |target: [f32; 3]| {
+            let ray = ray(origin, std::array::from_fn(|k| target[k] - origin[k]));
+            assert_eq!(scene.intersect(&ray).is_some(), scene.occluded(&ray), "{ray:?}");
+            scene.occluded(&ray)
+        };
+        for edge in [[a, b], [b, c], [c, a]] {
+            for weight in [0.5, 0.25, 0.01, 0.99] {
+                assert!(hits(between(edge[0], edge[1], weight)), "{origin:?} -> {edge:?} at {weight}");
+            }
+        }
+        for corner in [a, b, c] {
+            corners += 1;
+            slipped += usize::from(!hits(corner));
         }
     }
+    assert!(slipped * 100 < corners * 2, "{slipped} of {corners} rays aimed at corners slipped through");
 }
 
 #[test]
 fn degenerate_triangles_are_never_hit() {
-    let positions = [
-        [0.0; 3],
-        [1.0, 0.0, 0.0],
-        [2.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.25, 0.25, -1.0],
-    ];
+    let positions = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.25, 0.25, -1.0]];
     let mut builder = builder();
-    builder
-        .triangles(
-            ID,
-            &positions,
-            &[[0, 0, 0], [0, 1, 2], [1, 1, 3], [4, 4, 4], [0, 1, 3]],
-        )
-        .unwrap();
+    builder.triangles(ID, &positions, &[[0, 0, 0], [0, 1, 2], [1, 1, 3], [4, 4, 4], [0, 1, 3]]).unwrap();
     let scene = builder.commit().unwrap();
     assert_eq!(scene.intersect(&down(0.25, 0.25)).unwrap().primitive, 4);
     let mut builder = support::builder();
-    builder
-        .triangles(
-            ID,
-            &positions,
-            &[[0, 0, 0], [0, 1, 2], [1, 1, 3], [4, 4, 4]],
-        )
-        .unwrap();
+    builder.triangles(ID, &positions, &[[0, 0, 0], [0, 1, 2], [1, 1, 3], [4, 4, 4]]).unwrap();
     let scene = builder.commit().unwrap();
     for target in positions {
-        assert_eq!(
-            scene.intersect(&down(target[0], target[1])),
-            None,
-            "{target:?}"
-        );
+        assert_eq!(scene.intersect(&down(target[0], target[1])), None, "{target:?}");
         assert!(!scene.occluded(&down(target[0], target[1])), "{target:?}");
     }
 }
@@ -287,21 +219,8 @@ fn bad_vertices_are_named() {
             positions[1][axis] = bad;
             let mut builder = builder();
             let error = builder.triangles(ID, &positions, &[[0, 1, 2]]).unwrap_err();
-            assert!(
-                matches!(
-                    error,
-                    Error::BadVertex {
-                        geometry: ID,
-                        vertex: 1,
-                        ..
-                    }
-                ),
-                "{error:?}"
-            );
-            assert!(
-                error.to_string().starts_with("geometry 4: vertex 1 at ("),
-                "{error}"
-            );
+            assert!(matches!(error, Error::BadVertex { geometry: ID, vertex: 1, .. }), "{error:?}");
+            assert!(error.to_string().starts_with("geometry 4: vertex 1 at ("), "{error}");
             // The builder is as it was.
             builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
             assert!(builder.commit().unwrap().occluded(&down(0.5, 0.5)));
@@ -312,99 +231,47 @@ fn bad_vertices_are_named() {
 #[test]
 fn bad_indices_are_named() {
     let mut builder = builder();
-    let error = builder
-        .triangles(ID, &TRIANGLE, &[[0, 1, 2], [0, 3, 1]])
-        .unwrap_err();
-    assert_eq!(
-        error,
-        Error::BadIndex {
-            geometry: ID,
-            triangle: 1,
-            index: 3,
-            vertices: 3
-        }
-    );
-    assert_eq!(
-        error.to_string(),
-        "geometry 4: triangle 1: index 3 is past the 3 vertices"
-    );
-    assert!(matches!(
-        builder.triangles(ID, &[], &[[0, 0, 0]]),
-        Err(Error::BadIndex { vertices: 0, .. })
-    ));
-    assert!(matches!(
-        builder.triangles(ID, &TRIANGLE, &[[u32::MAX; 3]]),
-        Err(Error::BadIndex { .. })
-    ));
+    let error = builder.triangles(ID, &TRIANGLE, &[[0, 1, 2], [0, 3, 1]]).unwrap_err();
+    assert_eq!(error, Error::BadIndex { geometry: ID, triangle: 1, index: 3, vertices: 3 });
+    assert_eq!(error.to_string(), "geometry 4: triangle 1: index 3 is past the 3 vertices");
+    assert!(matches!(builder.triangles(ID, &[], &[[0, 0, 0]]), Err(Error::BadIndex { vertices: 0, .. })));
+    assert!(matches!(builder.triangles(ID, &TRIANGLE, &[[u32::MAX; 3]]), Err(Error::BadIndex { .. })));
 }
 
 #[test]
 fn bad_ids_are_refused() {
     let mut builder = builder();
     builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
-    assert_eq!(
-        builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]),
-        Err(Error::DuplicateId(ID))
-    );
+    assert_eq!(builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]), Err(Error::DuplicateId(ID)));
     for id in [GeometryId(MAX_GEOMETRY_ID.0 + 1), GeometryId(u32::MAX)] {
-        assert_eq!(
-            builder.triangles(id, &TRIANGLE, &[[0, 1, 2]]),
-            Err(Error::IdTooLarge(id))
-        );
+        assert_eq!(builder.triangles(id, &TRIANGLE, &[[0, 1, 2]]), Err(Error::IdTooLarge(id)));
     }
-    builder
-        .triangles(
-            MAX_GEOMETRY_ID,
-            &TRIANGLE.map(|[x, y, z]| [x + 9.0, y, z]),
-            &[[0, 1, 2]],
-        )
-        .unwrap();
+    builder.triangles(MAX_GEOMETRY_ID, &TRIANGLE.map(|[x, y, z]| [x + 9.0, y, z]), &[[0, 1, 2]]).unwrap();
     let scene = builder.commit().unwrap();
-    assert_eq!(
-        scene.intersect(&down(9.5, 0.5)).unwrap().geometry,
-        MAX_GEOMETRY_ID
-    );
+    assert_eq!(scene.intersect(&down(9.5, 0.5)).unwrap().geometry, MAX_GEOMETRY_ID);
 }
 
 /// Turns x to y and y to -x, doubles z, then moves by (10, 20, 30): column by column.
-const MAP: [f32; 12] = [
-    0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 10.0, 20.0, 30.0,
-];
+const MAP: [f32; 12] = [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 10.0, 20.0, 30.0];
 
 #[test]
 fn instance_is_hit_where_its_map_puts_it() {
     let child = one_triangle();
     let mut builder = builder();
-    builder
-        .triangles(
-            GeometryId(0),
-            &[[-9.0, -9.0, 0.0], [-8.0, -9.0, 0.0], [-9.0, -8.0, 0.0]],
-            &[[0, 1, 2]],
-        )
-        .unwrap();
+    builder.triangles(GeometryId(0), &[[-9.0, -9.0, 0.0], [-8.0, -9.0, 0.0], [-9.0, -8.0, 0.0]], &[[0, 1, 2]]).unwrap();
     builder.instance(GeometryId(6), &child, &MAP).unwrap();
     drop(child);
     let scene = builder.commit().unwrap();
     // (0.5, 1.5, 0) goes to (-1.5 + 10, 0.5 + 20, 30).
-    let hit = scene
-        .intersect(&ray([8.5, 20.5, 50.0], [0.0, 0.0, -2.0]))
-        .unwrap();
+    let hit = scene.intersect(&ray([8.5, 20.5, 50.0], [0.0, 0.0, -2.0])).unwrap();
     assert_close([hit.t, hit.u, hit.v], [10.0, 0.25, 0.5]);
-    assert_eq!(
-        (hit.primitive, hit.geometry, hit.instance),
-        (0, ID, Some(GeometryId(6)))
-    );
+    assert_eq!((hit.primitive, hit.geometry, hit.instance), (0, ID, Some(GeometryId(6))));
     // The normal is the mesh's, before the map.
     assert_eq!(hit.ng, [0.0, 0.0, 6.0]);
-    let own = scene
-        .intersect(&ray([-8.9, -8.9, 5.0], [0.0, 0.0, -1.0]))
-        .unwrap();
+    let own = scene.intersect(&ray([-8.9, -8.9, 5.0], [0.0, 0.0, -1.0])).unwrap();
     assert_eq!((own.geometry, own.instance), (GeometryId(0), None));
     let bounds = scene.bounds().unwrap();
-    assert_eq!(
-        (bounds.min, bounds.max),
-        ([-9.0, -9.0, 0.0], [10.0, 22.0, 30.0])
-    );
+    assert_eq!((bounds.min, bounds.max), ([-9.0, -9.0, 0.0], [10.0, 22.0, 30.0]));
 }
 
 /// A tilted triangle under a map that tilts it further: the normal must be told apart from the world's.
@@ -414,13 +281,9 @@ fn instance_normals_are_in_the_space_of_the_mesh() {
     let mut child = builder();
     child.triangles(ID, &positions, &[[0, 1, 2]]).unwrap();
     let mut parent = builder();
-    parent
-        .instance(GeometryId(0), &child.commit().unwrap(), &MAP)
-        .unwrap();
+    parent.instance(GeometryId(0), &child.commit().unwrap(), &MAP).unwrap();
     let scene = parent.commit().unwrap();
-    let hit = scene
-        .intersect(&ray([9.75, 20.25, 90.0], [0.0, 0.0, -1.0]))
-        .unwrap();
+    let hit = scene.intersect(&ray([9.75, 20.25, 90.0], [0.0, 0.0, -1.0])).unwrap();
     assert_eq!(hit.ng, [-0.5, -0.25, 1.0]);
 }
 
@@ -436,30 +299,62 @@ fn bad_instances_are_refused() {
     infinite[0] = f32::INFINITY;
     for map in [flat, not_a_number, infinite] {
         let error = builder.instance(ID, &child, &map).unwrap_err();
-        assert!(
-            matches!(error, Error::BadTransform { geometry: ID, .. }),
-            "{error:?}"
-        );
+        assert!(matches!(error, Error::BadTransform { geometry: ID, .. }), "{error:?}");
     }
     let other = SceneBuilder::new(&device(1)).unwrap().commit().unwrap();
-    assert_eq!(
-        builder.instance(ID, &other, &MAP),
-        Err(Error::OtherDevice(ID))
-    );
+    assert_eq!(builder.instance(ID, &other, &MAP), Err(Error::OtherDevice(ID)));
     builder.instance(ID, &child, &MAP).unwrap();
-    assert_eq!(
-        builder.instance(ID, &child, &MAP),
-        Err(Error::DuplicateId(ID))
-    );
-    assert_eq!(
-        builder.filter(ID, Arc::new(|_| true)),
-        Err(Error::NoSuchMesh(ID))
-    );
-    let nested =
-        SceneBuilder::new(child.device())
-            .unwrap()
-            .instance(ID, &builder.commit().unwrap(), &MAP);
+    assert_eq!(builder.instance(ID, &child, &MAP), Err(Error::DuplicateId(ID)));
+    assert_eq!(builder.filter(ID, Arc::new(|_| true)), Err(Error::NoSuchMesh(ID)));
+    let nested = SceneBuilder::new(child.device()).unwrap().instance(ID, &builder.commit().unwrap(), &MAP);
     assert_eq!(nested, Err(Error::NestedInstance(ID)));
+}
+
+/// Debian's Embree 3 is built with assertions, and aborts on rays that the inverse map makes too large.
+#[test]
+fn extreme_instances_are_refused_or_do_no_harm() {
+    let child = one_triangle();
+    let mut random = Random(23);
+    let (mut taken, mut refused) = (0, 0);
+    for _ in 0..2000 {
+        let scale = |random: &mut Random| 10f32.powf(60.0 * random.unit() - 30.0);
+        let (size, distance) = (scale(&mut random), scale(&mut random));
+        let mut map = [0.0; 12];
+        for column in 0..4 {
+            let length = if column == 3 { distance } else { size };
+            map[3 * column..][..3].copy_from_slice(&random.direction().map(|x| length * x));
+        }
+        if random.unit() < 0.3 {
+            // All but flat.
+            let k = (random.unit() * 3.0) as usize;
+            map[6 + k] = map[k];
+        }
+        let mut builder = builder();
+        match builder.instance(ID, &child, &map) {
+            Ok(()) => taken += 1,
+            Err(Error::BadTransform { .. }) => {
+                refused += 1;
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        }
+        let scene = builder.commit().unwrap();
+        for _ in 0..50 {
+            let [origin, direction] = [0; 2].map(|_| {
+                let length = scale(&mut random);
+                random.direction().map(|x| length * x)
+            });
+            scene.intersect(&ray(origin, direction));
+            scene.occluded(&ray(origin, direction));
+        }
+        // At the triangle itself, from an origin not far away in its own measure.
+        let world = |p: [f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|k| map[k] * p[0] + map[3 + k] * p[1] + map[6 + k] * p[2] + map[9 + k])
+        };
+        let (from, to) = (world([0.5, 0.5, 3.0]), world([0.5, 0.5, 0.0]));
+        scene.intersect(&ray(from, std::array::from_fn(|k| to[k] - from[k])));
+    }
+    assert!(taken > 200 && refused > 200, "{taken} taken, {refused} refused");
 }
 
 /// Three sheets, the middle one with a filter.
@@ -467,9 +362,7 @@ fn sheets(filter: impl Fn(&Candidate) -> bool + Send + Sync + 'static) -> Scene 
     let mut builder = builder();
     for sheet in 0..3u32 {
         let positions = TRIANGLE.map(|[x, y, _]| [x, y, sheet as f32]);
-        builder
-            .triangles(GeometryId(sheet), &positions, &[[0, 1, 2]])
-            .unwrap();
+        builder.triangles(GeometryId(sheet), &positions, &[[0, 1, 2]]).unwrap();
     }
     builder.filter(GeometryId(1), Arc::new(filter)).unwrap();
     builder.commit().unwrap()
@@ -478,30 +371,16 @@ fn sheets(filter: impl Fn(&Candidate) -> bool + Send + Sync + 'static) -> Scene 
 #[test]
 fn filter_rejects_and_the_ray_goes_on() {
     let scene = sheets(|candidate| {
-        assert_eq!(
-            (candidate.geometry, candidate.instance, candidate.primitive),
-            (GeometryId(1), None, 0)
-        );
+        assert_eq!((candidate.geometry, candidate.instance, candidate.primitive), (GeometryId(1), None, 0));
         candidate.u < 0.25 && candidate.token == 77
     });
-    let up = |x, token| Ray {
-        token,
-        tmin: 0.0,
-        tmax: 0.9,
-        ..ray([x, 0.3, 0.5], [0.0, 0.0, 1.0])
-    };
-    assert_eq!(
-        scene.intersect(&up(0.4, 77)).unwrap().geometry,
-        GeometryId(1)
-    );
+    let up = |x, token| Ray { token, tmin: 0.0, tmax: 0.9, ..ray([x, 0.3, 0.5], [0.0, 0.0, 1.0]) };
+    assert_eq!(scene.intersect(&up(0.4, 77)).unwrap().geometry, GeometryId(1));
     assert!(scene.occluded(&up(0.4, 77)));
     for rejected in [up(0.6, 77), up(0.4, 78)] {
         assert_eq!(scene.intersect(&rejected), None);
         assert!(!scene.occluded(&rejected));
-        let longer = Ray {
-            tmax: 9.0,
-            ..rejected
-        };
+        let longer = Ray { tmax: 9.0, ..rejected };
         assert_eq!(scene.intersect(&longer).unwrap().geometry, GeometryId(2));
         assert!(scene.occluded(&longer));
     }
@@ -510,17 +389,12 @@ fn filter_rejects_and_the_ray_goes_on() {
 #[test]
 fn filter_inside_an_instance_is_told_of_it() {
     let mut child = builder();
-    child
-        .triangles(GeometryId(2), &TRIANGLE, &[[0, 1, 2]])
-        .unwrap();
+    child.triangles(GeometryId(2), &TRIANGLE, &[[0, 1, 2]]).unwrap();
     child
         .filter(
             GeometryId(2),
             Arc::new(|candidate| {
-                assert_eq!(
-                    (candidate.geometry, candidate.primitive),
-                    (GeometryId(2), 0)
-                );
+                assert_eq!((candidate.geometry, candidate.primitive), (GeometryId(2), 0));
                 assert_close([candidate.u, candidate.v, 0.0], [0.25, 0.25, 0.0]);
                 candidate.instance == Some(GeometryId(8)) && candidate.token == 5
             }),
@@ -535,10 +409,7 @@ fn filter_inside_an_instance_is_told_of_it() {
     let scene = parent.commit().unwrap();
     drop(child);
     for (x, token, expected) in [(0.5, 5, true), (0.5, 6, false), (10.5, 5, false)] {
-        let ray = Ray {
-            token,
-            ..down(x, 0.75)
-        };
+        let ray = Ray { token, ..down(x, 0.75) };
         assert_eq!(scene.intersect(&ray).is_some(), expected, "{ray:?}");
         assert_eq!(scene.occluded(&ray), expected, "{ray:?}");
     }
@@ -546,38 +417,22 @@ fn filter_inside_an_instance_is_told_of_it() {
 
 #[test]
 fn panic_in_a_filter_reaches_the_caller_and_is_then_over() {
-    let scene = sheets(|candidate| {
-        if candidate.token == 13 {
-            panic!("unlucky")
-        } else {
-            true
-        }
-    });
-    let unlucky = Ray {
-        token: 13,
-        tmax: 1.0,
-        ..ray([0.3, 0.3, 1.5], [0.0, 0.0, -1.0])
-    };
+    let scene = sheets(|candidate| if candidate.token == 13 { panic!("unlucky") } else { true });
+    let unlucky = Ray { token: 13, tmax: 1.0, ..ray([0.3, 0.3, 1.5], [0.0, 0.0, -1.0]) };
     let caught = |call: &dyn Fn()| {
         let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).unwrap_err();
         assert_eq!(panic.downcast_ref::<&str>(), Some(&"unlucky"));
     };
     caught(&|| _ = scene.intersect(&unlucky));
     caught(&|| _ = scene.occluded(&unlucky));
-    let lucky = Ray {
-        token: 0,
-        ..unlucky
-    };
+    let lucky = Ray { token: 0, ..unlucky };
     assert_eq!(scene.intersect(&lucky).unwrap().geometry, GeometryId(1));
 }
 
 #[test]
 fn filter_needs_a_mesh_and_the_last_one_counts() {
     let mut builder = builder();
-    assert_eq!(
-        builder.filter(ID, Arc::new(|_| true)),
-        Err(Error::NoSuchMesh(ID))
-    );
+    assert_eq!(builder.filter(ID, Arc::new(|_| true)), Err(Error::NoSuchMesh(ID)));
     builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
     builder.filter(ID, Arc::new(|_| true)).unwrap();
     builder.filter(ID, Arc::new(|_| false)).unwrap();
@@ -592,9 +447,7 @@ fn scene_outlives_builder_device_and_library_handles() {
     child.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
     let seen = Arc::new(());
     let held = seen.clone();
-    child
-        .filter(ID, Arc::new(move |_| Arc::strong_count(&held) > 0))
-        .unwrap();
+    child.filter(ID, Arc::new(move |_| Arc::strong_count(&held) > 0)).unwrap();
     let child = child.commit().unwrap();
     let mut parent = SceneBuilder::new(&device).unwrap();
     parent.instance(GeometryId(0), &child, &MAP).unwrap();
@@ -603,17 +456,10 @@ fn scene_outlives_builder_device_and_library_handles() {
     let clone = scene.clone();
     drop(scene);
     let through = ray([8.5, 20.5, 50.0], [0.0, 0.0, -1.0]);
-    assert_eq!(
-        clone.intersect(&through).unwrap().instance,
-        Some(GeometryId(0))
-    );
+    assert_eq!(clone.intersect(&through).unwrap().instance, Some(GeometryId(0)));
     assert_eq!(Arc::strong_count(&seen), 2);
     drop(clone);
-    assert_eq!(
-        Arc::strong_count(&seen),
-        1,
-        "the filter was not dropped with the scene"
-    );
+    assert_eq!(Arc::strong_count(&seen), 1, "the filter was not dropped with the scene");
 }
 
 #[test]
@@ -622,9 +468,7 @@ fn abandoned_builder_is_freed() {
     let held = seen.clone();
     let mut builder = builder();
     builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
-    builder
-        .filter(ID, Arc::new(move |_| Arc::strong_count(&held) > 0))
-        .unwrap();
+    builder.filter(ID, Arc::new(move |_| Arc::strong_count(&held) > 0)).unwrap();
     drop(builder);
     assert_eq!(Arc::strong_count(&seen), 1);
 }
@@ -634,15 +478,11 @@ fn threads_see_the_same_hits() {
     let scene = million();
     let trace = |seed| {
         let mut random = Random(seed);
-        (0..20_000)
-            .map(|_| scene.intersect(&ray(random.point(), random.direction())))
-            .collect::<Vec<_>>()
+        (0..20_000).map(|_| scene.intersect(&ray(random.point(), random.direction()))).collect::<Vec<_>>()
     };
     let expected: Vec<_> = (0..4).map(trace).collect();
     std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..8)
-            .map(|k| (k % 4, scope.spawn(move || trace(k % 4))))
-            .collect();
+        let threads: Vec<_> = (0..8).map(|k| (k % 4, scope.spawn(move || trace(k % 4)))).collect();
         for (seed, thread) in threads {
             assert_eq!(thread.join().unwrap(), expected[seed as usize]);
         }
@@ -659,14 +499,8 @@ fn threads_may_build_at_once() {
                 for _ in 0..20 {
                     let mut builder = SceneBuilder::new(device).unwrap();
                     let (positions, indices) = sphere(8 + k as usize);
-                    builder
-                        .triangles(GeometryId(k), &positions, &indices)
-                        .unwrap();
-                    let hit = builder
-                        .commit()
-                        .unwrap()
-                        .intersect(&ray([0.0; 3], [0.1, 0.2, 0.3]))
-                        .unwrap();
+                    builder.triangles(GeometryId(k), &positions, &indices).unwrap();
+                    let hit = builder.commit().unwrap().intersect(&ray([0.0; 3], [0.1, 0.2, 0.3])).unwrap();
                     assert_eq!(hit.geometry, GeometryId(k));
                 }
             });
@@ -674,36 +508,39 @@ fn threads_may_build_at_once() {
     });
 }
 
-/// Rays through shared corners and edges have several right answers. Which one is given must not depend on the
-/// number of threads that built the scene, nor change from build to build.
+/// Where triangles coincide, and on common corners and edges, a ray has several right answers. Which one is given
+/// must not depend on the number of threads that built the scene, nor change from build to build.
 #[test]
 fn ties_do_not_depend_on_threads() {
-    let (positions, indices) = grid(500);
-    let answers = |threads| {
-        let mut builder = SceneBuilder::new(&device(threads)).unwrap();
-        builder.triangles(ID, &positions, &indices).unwrap();
-        let scene = builder.commit().unwrap();
-        let mut random = Random(5);
-        let onto = |[x, y, _]: [f32; 3]| {
-            scene
-                .intersect(&down(x, y))
-                .map(|hit| (hit.primitive, hit.u, hit.v))
-        };
-        let corner =
-            |random: &mut Random| positions[(random.unit() * positions.len() as f32) as usize];
-        (0..50_000)
-            .map(|_| onto(corner(&mut random)))
-            .collect::<Vec<_>>()
-    };
-    let expected = answers(1);
-    for threads in [1, 2, 2, 2, 3, 8, 8, 0] {
-        let found = answers(threads);
-        let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
-        assert_eq!(
-            differ,
-            0,
-            "of {} ties, with {threads} threads",
-            expected.len()
-        );
+    // Flat, of a power of two and hit aslant, so that the six triangles around a corner are at the same distance to
+    // the last bit and in the ray's way all; and now and then a pile of triangles that are one and the same, higher than a leaf of Embree's tree.
+    let (mut positions, mut indices) = grid(512);
+    positions.iter_mut().for_each(|position| position[2] = 0.0);
+    let targets = positions.clone();
+    for quad in 0..512 {
+        let triangle = indices[quad * 1021];
+        indices.extend([triangle; 40]);
     }
+    let answers = |threads, indices: &[[u32; 3]]| {
+        let mut builder = SceneBuilder::new(&device(threads)).unwrap();
+        builder.triangles(ID, &positions, indices).unwrap();
+        let scene = builder.commit().unwrap();
+        let onto = |&[x, y, _]: &[f32; 3]| {
+            let ray = ray([x + 1.0, y + 2.0, 4.0], [-0.25, -0.5, -1.0]);
+            scene.intersect(&ray).map(|hit| hit.primitive)
+        };
+        targets.iter().map(onto).collect::<Vec<_>>()
+    };
+    let differing = |a: &[Option<u32>], b: &[Option<u32>]| a.iter().zip(b).filter(|(a, b)| a != b).count();
+    let expected = answers(1, &indices);
+    for threads in [1, 2, 2, 3, 8, 8, 0] {
+        let found = answers(threads, &indices);
+        assert_eq!(differing(&found, &expected), 0, "with {threads} threads");
+    }
+    // That these are ties: the same triangles in another order are found to differ.
+    let reversed: Vec<_> = indices.iter().rev().copied().collect();
+    let last = indices.len() as u32 - 1;
+    let found: Vec<_> = answers(1, &reversed).iter().map(|hit| hit.map(|primitive| last - primitive)).collect();
+    let ties = differing(&found, &expected);
+    assert!(ties > targets.len() / 10, "{ties} of {} rays: no test of ties", targets.len());
 }

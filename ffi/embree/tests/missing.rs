@@ -10,14 +10,8 @@ fn unusable(path: impl AsRef<Path>) -> (String, String) {
     assert!(matches!(&error, Error::Unusable { .. }), "{error:?}");
     let text = error.to_string();
     let hint = error.hint().unwrap();
-    assert!(
-        hint.contains("Debian 12, Ubuntu 22.04: apt install libembree3-3"),
-        "{hint}"
-    );
-    assert!(
-        hint.contains("Debian 13, Ubuntu 24.04: apt install libembree4-4"),
-        "{hint}"
-    );
+    assert!(hint.contains("Debian 12, Ubuntu 22.04: apt install libembree3-3"), "{hint}");
+    assert!(hint.contains("Debian 13, Ubuntu 24.04: apt install libembree4-4"), "{hint}");
     (text, hint)
 }
 

@@ -7,9 +7,7 @@ use caustique_embree::{Device, GeometryId, Library, Ray, Scene, SceneBuilder};
 /// The library under test, opened once.
 pub fn library() -> &'static Library {
     static LIBRARY: OnceLock<Library> = OnceLock::new();
-    LIBRARY.get_or_init(|| {
-        Library::load().unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint()))
-    })
+    LIBRARY.get_or_init(|| Library::load().unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint())))
 }
 
 pub fn device(threads: usize) -> Device {
@@ -23,13 +21,7 @@ pub fn builder() -> SceneBuilder {
 }
 
 pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
-    Ray {
-        origin,
-        direction,
-        tmin: 0.0,
-        tmax: f32::INFINITY,
-        token: 0,
-    }
+    Ray { origin, direction, tmin: 0.0, tmax: f32::INFINITY, token: 0 }
 }
 
 /// SplitMix64: enough for test rays.
@@ -63,20 +55,13 @@ pub const SIDE: usize = 708;
 pub fn grid(side: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let height = |x: f32, y: f32| 0.1 * (17.0 * x).sin() * (23.0 * y).cos();
     let at = |k| k as f32 / side as f32;
-    let positions = (0..=side)
-        .flat_map(|j| (0..=side).map(move |i| [at(i), at(j), height(at(i), at(j))]))
-        .collect();
+    let positions = (0..=side).flat_map(|j| (0..=side).map(move |i| [at(i), at(j), height(at(i), at(j))])).collect();
     let row = side as u32 + 1;
     let quad = |i: u32, j: u32| {
         let corner = j * row + i;
-        [
-            [corner, corner + 1, corner + row],
-            [corner + 1, corner + row + 1, corner + row],
-        ]
+        [[corner, corner + 1, corner + row], [corner + 1, corner + row + 1, corner + row]]
     };
-    let indices = (0..side as u32)
-        .flat_map(|j| (0..side as u32).flat_map(move |i| quad(i, j)))
-        .collect();
+    let indices = (0..side as u32).flat_map(|j| (0..side as u32).flat_map(move |i| quad(i, j))).collect();
     (positions, indices)
 }
 
@@ -86,9 +71,7 @@ pub fn million() -> &'static Scene {
     SCENE.get_or_init(|| {
         let (positions, indices) = grid(SIDE);
         let mut builder = builder();
-        builder
-            .triangles(GeometryId(0), &positions, &indices)
-            .unwrap();
+        builder.triangles(GeometryId(0), &positions, &indices).unwrap();
         builder.commit().unwrap()
     })
 }
@@ -116,27 +99,19 @@ pub fn sphere(rings: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, indices)
 }
 
-pub fn middle(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+/// The point a `weight` of the way from `a` to `b`.
+pub fn between(a: [f32; 3], b: [f32; 3], weight: f32) -> [f32; 3] {
+    std::array::from_fn(|k| a[k] + weight * (b[k] - a[k]))
 }
 
 /// The nearest hit by asking every triangle, in double precision: its distance, and all triangles that are hit
 /// there within rounding. By Moeller and Trumbore, which shares no code or method with Embree's tree.
-pub fn brute_force(
-    positions: &[[f32; 3]],
-    indices: &[[u32; 3]],
-    ray: &Ray,
-) -> Option<(f64, Vec<u32>)> {
+pub fn brute_force(positions: &[[f32; 3]], indices: &[[u32; 3]], ray: &Ray) -> Option<(f64, Vec<u32>)> {
     let wide = |p: [f32; 3]| p.map(f64::from);
     let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let (origin, direction) = (wide(ray.origin), wide(ray.direction));
     let mut hits = Vec::new();
     for (k, triangle) in indices.iter().enumerate() {
@@ -145,11 +120,7 @@ pub fn brute_force(
         let p = cross(direction, e2);
         let determinant = dot(e1, p);
         let q = cross(s, e1);
-        let (u, v, t) = (
-            dot(s, p) / determinant,
-            dot(direction, q) / determinant,
-            dot(e2, q) / determinant,
-        );
+        let (u, v, t) = (dot(s, p) / determinant, dot(direction, q) / determinant, dot(e2, q) / determinant);
         let slack = -1e-4;
         if u >= slack && v >= slack && 1.0 - u - v >= slack && t >= 0.0 {
             hits.push((t, k as u32));
@@ -157,13 +128,7 @@ pub fn brute_force(
     }
     let nearest = hits.iter().map(|&(t, _)| t).reduce(f64::min)?;
     let near = |t: f64| t - nearest < 1e-5 * (1.0 + nearest);
-    Some((
-        nearest,
-        hits.iter()
-            .filter(|&&(t, _)| near(t))
-            .map(|&(_, k)| k)
-            .collect(),
-    ))
+    Some((nearest, hits.iter().filter(|&&(t, _)| near(t)).map(|&(_, k)| k).collect()))
 }
 
 /// Within a few units in the last place: Embree divides by an approximate reciprocal.

@@ -1,0 +1,52 @@
+//! Millions of rays a second, on a mesh of a million triangles: random segments, and a pinhole camera's rays.
+//!
+//! `cargo run --release -p caustique-embree --example rays [THREADS]`; `CAUSTIQUE_EMBREE` chooses the library.
+
+#[path = "../tests/support/mod.rs"]
+#[allow(dead_code)]
+mod support;
+
+use std::time::Instant;
+
+use caustique_embree::Ray;
+use support::{Random, library, million, ray};
+
+const RAYS: usize = 1_000_000;
+
+fn main() {
+    let threads = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(1);
+    println!("{:?}, {threads} threads", library());
+    let start = Instant::now();
+    let scene = million();
+    println!("build      {:6.2} s, with all processors", start.elapsed().as_secs_f64());
+
+    let mut random = Random(1);
+    let incoherent: Vec<Ray> = (0..RAYS).map(|_| ray(random.point(), random.direction())).collect();
+    let side = (RAYS as f32).sqrt();
+    let camera = |k| {
+        let (x, y) = (k as f32 % side / side, (k as f32 / side).floor() / side);
+        ray([0.5, 0.5, 0.7], [x - 0.5, y - 0.5, -0.7])
+    };
+    let coherent: Vec<Ray> = (0..RAYS).map(camera).collect();
+    for (name, rays) in [("random", &incoherent), ("camera", &coherent)] {
+        best(&format!("{name} intersect"), threads, rays, |ray| scene.intersect(ray).is_some());
+        best(&format!("{name} occluded"), threads, rays, |ray| scene.occluded(ray));
+    }
+}
+
+/// Prints the best of five runs; each thread traces all the rays.
+fn best(name: &str, threads: usize, rays: &[Ray], hit: impl Fn(&Ray) -> bool + Sync) {
+    let mut seconds = f64::INFINITY;
+    let mut hits = 0;
+    for _ in 0..5 {
+        let start = Instant::now();
+        hits = std::thread::scope(|scope| {
+            let work = || rays.iter().filter(|ray| hit(ray)).count();
+            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+            workers.into_iter().filter_map(|worker| worker.join().ok()).sum::<usize>()
+        });
+        seconds = seconds.min(start.elapsed().as_secs_f64());
+    }
+    let all = (threads * rays.len()) as f64;
+    println!("{name:17} {:6.2} Mrays/s, {:4.1} % hit", all / seconds * 1e-6, 100.0 * hits as f64 / all);
+}

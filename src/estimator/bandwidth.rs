@@ -1,0 +1,84 @@
+//! Initial bandwidths: one per pixel, for both eye paths, from a pilot pass whose photons are not accumulated.
+//!
+//! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest bandwidth is
+//! the distance to the k-th nearest photon of its own surface around its pilot path's gathering point, at most [`SCREEN_CAP`] of the
+//! picture's width there. With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
+//! gets the median of the others (or, with no others, the cap at the scene's size).
+
+use crate::camera::Camera;
+use crate::photon::{PhotonMap, nearest_radius2};
+use crate::random::{Domain, Stream};
+use crate::scene::Scene;
+use crate::transport::{GatherPoint, gather_point, same_surface};
+use rayon::prelude::*;
+
+/// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the picture says
+/// nothing about a place.
+pub const SCREEN_CAP: f32 = 0.05;
+/// `--initial-bandwidth footprint`: radius over the width of a pixel at the gathering point.
+pub const FOOTPRINT_PIXELS: f32 = 3.0;
+/// Smallest bandwidth over the scene's radius: where photons fall on one point (a perfect focus) the distance is zero.
+const LEAST: f32 = 1e-7;
+
+/// What sets the largest initial bandwidth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InitialBandwidth {
+    /// Distance to the k-th nearest pilot photon.
+    Nearest(usize),
+    /// [`FOOTPRINT_PIXELS`] pixels.
+    Footprint,
+    /// The same everywhere (scene units).
+    Fixed(f32),
+}
+
+/// Width that the picture spans at the end of a path of some length.
+fn span(camera: &Camera, length: f32) -> f32 {
+    let (slope, at_zero) = camera.span();
+    slope * length + at_zero
+}
+
+/// Largest initial bandwidth of every pixel, row by row.
+pub fn initial_bandwidths(
+    scene: &Scene,
+    camera: &Camera,
+    rule: InitialBandwidth,
+    seed: u64,
+    pilot: &PhotonMap,
+    max_depth: u32,
+) -> Vec<f32> {
+    let (width, height) = camera.size();
+    let pixels = width as usize * height as usize;
+    if let InitialBandwidth::Fixed(r) = rule {
+        return vec![r; pixels];
+    }
+    let least = LEAST * scene.lights.sky().radius;
+    let of_point = |point: &GatherPoint| {
+        let span = span(camera, point.length);
+        let cap = SCREEN_CAP * span;
+        let r = match rule {
+            InitialBandwidth::Nearest(k) => {
+                nearest_radius2(pilot, point.p, k, cap * cap, |photon| same_surface(photon, point.ng))
+                    .map_or(cap, f32::sqrt)
+            }
+            _ => (FOOTPRINT_PIXELS * span / width as f32).min(cap),
+        };
+        r.max(least)
+    };
+    let found: Vec<Option<f32>> = (0..pixels)
+        .into_par_iter()
+        .with_min_len(256)
+        .map(|i| {
+            let pixel = (i as u32 % width, i as u32 / width);
+            let stream = Stream::new(seed, 0, Domain::PilotEye, i as u64);
+            gather_point(scene, camera, pixel, stream, max_depth).map(|point| of_point(&point))
+        })
+        .collect();
+    let mut known: Vec<f32> = found.iter().flatten().copied().collect();
+    let fallback = if known.is_empty() {
+        (SCREEN_CAP * span(camera, scene.lights.sky().radius)).max(least)
+    } else {
+        let middle = known.len() / 2;
+        *known.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
+    found.into_iter().map(|r| r.unwrap_or(fallback)).collect()
+}

@@ -1,0 +1,8 @@
+//! From what eye paths measure to estimates: the state per pixel and level, and the rules for bandwidths.
+
+pub mod bandwidth;
+mod pixel;
+pub mod rule;
+
+pub use bandwidth::InitialBandwidth;
+pub use pixel::{Parts, Pixel};

@@ -1,0 +1,96 @@
+//! The state of a pixel: plain numbers that can be saved and merged.
+
+use crate::math::{DVec3, Rgb, Vec3};
+use crate::stat::Welford;
+use crate::transport::{EyeMeasure, MAX_LEVELS};
+
+/// Sums over iterations of the additive parts of the level that is the method's own image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Emitters seen directly or through perfect mirrors and clear glass.
+    pub emission: DVec3,
+    /// Direct light.
+    pub direct: DVec3,
+    /// Caustics.
+    pub caustic: DVec3,
+    /// Everything else.
+    pub indirect: DVec3,
+}
+
+/// Statistics of one pixel over the iterations so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pixel {
+    /// Estimates, level 1 (the smallest bandwidth) first.
+    pub levels: [Welford; MAX_LEVELS],
+    /// `differences[k]`: level k + 2 minus level k + 1. Neighbours are correlated, so their difference's variance cannot be had
+    /// from theirs.
+    pub differences: [Welford; MAX_LEVELS - 1],
+    /// Sums of the parts.
+    pub parts: Parts,
+    /// Sums of G-buffers over all eye paths.
+    pub albedo: DVec3,
+    /// See `albedo`.
+    pub normal: DVec3,
+    /// See `albedo`.
+    pub depth: f64,
+    /// Eye paths whose measure was finite.
+    pub features: u32,
+    /// Iterations counted.
+    pub iterations: u32,
+    /// Iterations rejected as not finite.
+    pub rejected: u32,
+    /// Largest initial bandwidth (scene units).
+    pub bandwidth: f32,
+    /// Camera depth of the first visible hit of the first iteration; 1e10 where there is none.
+    pub z: f32,
+    /// Its position.
+    pub p: Vec3,
+}
+
+impl Pixel {
+    /// A pixel before its first iteration.
+    pub fn new(bandwidth: f32) -> Pixel {
+        Pixel { bandwidth, z: 1e10, ..Pixel::default() }
+    }
+
+    /// Adds one iteration: level 1 from `independent`, the others from `correlated` (of `count - 1` levels), or all from `independent`
+    /// when there is one level. `own` is the level (from 0) whose parts are kept.
+    pub fn add(&mut self, independent: &EyeMeasure, correlated: Option<&EyeMeasure>, count: usize, own: usize) {
+        let mut values = [Rgb::ZERO; MAX_LEVELS];
+        values[0] = independent.radiance(0);
+        if let Some(correlated) = correlated {
+            for level in 1..count {
+                values[level] = correlated.radiance(level - 1);
+            }
+        }
+        if !values[..count].iter().all(|v| v.is_finite()) {
+            self.rejected += 1;
+            return;
+        }
+        self.iterations += 1;
+        let n = f64::from(self.iterations);
+        for level in 0..count {
+            self.levels[level].add(values[level], n);
+            if level + 1 < count {
+                self.differences[level].add(values[level + 1] - values[level], n);
+            }
+        }
+        let (measure, level) = match correlated {
+            Some(correlated) if own > 0 => (correlated, own - 1),
+            _ => (independent, own),
+        };
+        self.parts.emission += measure.emission.as_dvec3();
+        self.parts.direct += measure.direct.as_dvec3();
+        self.parts.caustic += measure.caustic_photons[level].as_dvec3();
+        self.parts.indirect += (measure.indirect + measure.indirect_photons[level]).as_dvec3();
+        for measure in std::iter::once(independent).chain(correlated) {
+            let features = measure.features;
+            if features.albedo.is_finite() && features.normal.is_finite() && features.depth.is_finite() {
+                self.albedo += features.albedo.as_dvec3();
+                self.normal += features.normal.as_dvec3();
+                self.depth += f64::from(features.depth);
+                self.features += 1;
+            }
+        }
+    }
+}

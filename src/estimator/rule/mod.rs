@@ -1,0 +1,3 @@
+//! Bandwidth rules, one a file: pure functions from a pass to the next bandwidth.
+
+pub mod memoryless;

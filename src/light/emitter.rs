@@ -1,0 +1,112 @@
+//! One light source and the densities that belong to it.
+
+use super::Environment;
+use crate::math::{Frame, Rgb, Vec3, luminance, sqr};
+use std::f32::consts::{PI, TAU};
+
+/// A light source. The set is closed: a scene's lights are one flat list.
+#[derive(Clone, Debug)]
+pub enum Emitter {
+    /// A triangle of an emissive material.
+    Triangle {
+        /// Instance it belongs to.
+        instance: u32,
+        /// Triangle in the instance's mesh.
+        primitive: u32,
+        /// Area (m2).
+        area: f32,
+        /// Emits from both sides.
+        two_sided: bool,
+        /// Mean emitted radiance.
+        radiance: Rgb,
+    },
+    /// A mathematical point.
+    Point {
+        /// Position.
+        p: Vec3,
+        /// Radiant intensity (W/sr).
+        intensity: Rgb,
+    },
+    /// A point that shines into a cone with a smooth edge.
+    Spot {
+        /// Position.
+        p: Vec3,
+        /// Frame whose normal is the axis, in the direction of the light.
+        frame: Frame,
+        /// Radiant intensity on the axis (W/sr).
+        intensity: Rgb,
+        /// Cosine of the half angle of full intensity.
+        cos_inner: f32,
+        /// Cosine of the half angle of no intensity.
+        cos_outer: f32,
+    },
+    /// Light from a small cone of directions at infinity.
+    Sun {
+        /// Frame whose normal points towards the sun.
+        frame: Frame,
+        /// Irradiance on a surface that faces it (W/m2).
+        irradiance: Rgb,
+        /// 1 - cos of the half angle; 0 is exactly parallel light.
+        one_minus_cos: f32,
+    },
+    /// The environment.
+    Environment,
+}
+
+/// The sphere that holds the scene, and what shines on it from infinity.
+#[derive(Clone, Debug)]
+pub struct Sky {
+    /// Centre of the scene's bounding sphere.
+    pub center: Vec3,
+    /// Its radius.
+    pub radius: f32,
+    /// The environment, if any.
+    pub environment: Option<Environment>,
+}
+
+/// glTF's smooth edge of a spot: the square of a linear ramp in the cosine (KHR_lights_punctual's recommendation).
+#[inline]
+pub fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
+    if cos >= cos_inner {
+        1.0
+    } else if cos <= cos_outer {
+        0.0
+    } else {
+        sqr((cos - cos_outer) / (cos_inner - cos_outer))
+    }
+}
+
+impl Emitter {
+    /// Emitted flux (W) as a luminance: what the choice of lights is proportional to. For light from infinity, the flux
+    /// through the scene's bounding sphere.
+    pub fn power(&self, sky: &Sky) -> f64 {
+        let disc = PI * sky.radius * sky.radius;
+        f64::from(match self {
+            Emitter::Triangle { area, two_sided, radiance, .. } => {
+                luminance(*radiance) * area * PI * if *two_sided { 2.0 } else { 1.0 }
+            }
+            Emitter::Point { intensity, .. } => luminance(*intensity) * 2.0 * TAU,
+            Emitter::Spot { intensity, cos_inner, cos_outer, .. } => {
+                luminance(*intensity) * TAU * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0)
+            }
+            Emitter::Sun { irradiance, .. } => luminance(*irradiance) * disc,
+            Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc,
+        })
+    }
+
+    /// No ray that is not aimed at it can find it.
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Emitter::Point { .. } | Emitter::Spot { .. } => true,
+            Emitter::Sun { one_minus_cos, .. } => *one_minus_cos == 0.0,
+            Emitter::Triangle { .. } | Emitter::Environment => false,
+        }
+    }
+
+    /// Radiance of a sun of finite size.
+    #[inline]
+    pub fn sun_radiance(irradiance: Rgb, one_minus_cos: f32) -> Rgb {
+        // E = integral of L cos over the cone = L pi sin^2, and sin^2 = h (2 - h) with h = 1 - cos.
+        irradiance / (PI * one_minus_cos * (2.0 - one_minus_cos))
+    }
+}

@@ -1,0 +1,301 @@
+//! All lights of a scene: choosing one by power, sampling it from a point, sampling emission, and the densities for MIS.
+
+use super::cdf::Cdf;
+use super::emitter::{Emitter, Sky, spot_falloff};
+use crate::geometry::{Shapes, Surface};
+use crate::material::Materials;
+use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
+use std::f32::consts::{PI, TAU};
+
+/// A light seen from a point.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectSample {
+    /// Unit direction towards the light.
+    pub wi: Vec3,
+    /// Where a shadow ray ends (already off the light's surface); `None` for light from infinity.
+    pub target: Option<Vec3>,
+    /// Radiance that arrives, or for a delta light irradiance on a surface that faces it.
+    pub radiance: Rgb,
+    /// Density per solid angle, the choice of the light included; for a delta light the probability of choosing it.
+    pub pdf_w: f32,
+    /// The light cannot be hit by a ray.
+    pub delta: bool,
+}
+
+/// The start of a light path.
+#[derive(Clone, Copy, Debug)]
+pub struct EmissionSample {
+    /// Where the ray starts (already off the light's surface).
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Emitted flux over density (W): what this path carries if it is the only one.
+    pub flux: Rgb,
+    /// Index of the light.
+    pub light: u32,
+    /// The light cannot be hit by a ray.
+    pub delta: bool,
+}
+
+/// The lights of a scene.
+pub struct Lights {
+    emitters: Vec<Emitter>,
+    choice: Option<Cdf>,
+    /// Index of the first emitter of an instance, `u32::MAX` for instances that do not emit; and then the emitter of each
+    /// of its triangles, relative to it (`u32::MAX` for those without area).
+    first: Vec<u32>,
+    relative: Vec<Vec<u32>>,
+    /// Suns of finite size.
+    suns: Vec<u32>,
+    environment: Option<u32>,
+    sky: Sky,
+}
+
+impl Lights {
+    /// The emissive triangles of the shapes, then `others` (points, spots, suns), then the sky's environment.
+    pub fn new(shapes: &Shapes, materials: &Materials, others: Vec<Emitter>, sky: Sky) -> Lights {
+        let mut emitters = Vec::new();
+        let mut first = vec![u32::MAX; shapes.instances.len()];
+        let mut relative = vec![Vec::new(); shapes.instances.len()];
+        for (i, instance) in shapes.instances.iter().enumerate() {
+            let material = &materials.list[instance.material as usize];
+            if !material.emits() {
+                continue;
+            }
+            let mesh = &shapes.meshes[instance.mesh as usize];
+            first[i] = emitters.len() as u32;
+            for primitive in 0..mesh.triangles.len() as u32 {
+                let [a, b, c] = instance.corners(mesh, primitive);
+                let area = 0.5 * (b - a).cross(c - a).length();
+                // Mean emission from a few points, enough to choose by; the radiance of a sample is looked up exactly.
+                let probes = [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2]];
+                let mut radiance = Rgb::ZERO;
+                for barycentric in probes {
+                    if let Some(surface) = shapes.surface(i as u32, primitive, barycentric) {
+                        radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
+                    }
+                }
+                if material.emission_texture.is_some() || material.base_color_texture.is_some() {
+                    // No texel may be impossible to choose: keep a tenth of the brightest.
+                    radiance = radiance.max(material.emission * 0.1);
+                }
+                if !(area > 0.0 && area.is_finite()) || radiance.max_element() <= 0.0 {
+                    relative[i].push(u32::MAX);
+                    continue;
+                }
+                relative[i].push(emitters.len() as u32 - first[i]);
+                let two_sided = material.double_sided;
+                emitters.push(Emitter::Triangle { instance: i as u32, primitive, area, two_sided, radiance });
+            }
+        }
+        emitters.extend(others);
+        let mut environment = None;
+        if sky.environment.is_some() {
+            environment = Some(emitters.len() as u32);
+            emitters.push(Emitter::Environment);
+        }
+        let suns = (0..emitters.len() as u32)
+            .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
+            .collect();
+        let choice = Cdf::new(emitters.iter().map(|e| e.power(&sky)));
+        Lights { emitters, choice, first, relative, suns, environment, sky }
+    }
+
+    /// No light gives any light.
+    pub fn is_empty(&self) -> bool {
+        self.choice.is_none()
+    }
+
+    /// The lights; indices are those of [`EmissionSample::light`].
+    pub fn emitters(&self) -> &[Emitter] {
+        &self.emitters
+    }
+
+    /// The bounding sphere and the environment.
+    pub fn sky(&self) -> &Sky {
+        &self.sky
+    }
+
+    /// A light chosen by power, seen from `p`. `None` where the one chosen does not shine on `p`.
+    #[inline]
+    pub fn sample_direct(
+        &self,
+        shapes: &Shapes,
+        materials: &Materials,
+        p: Vec3,
+        choice: f32,
+        u: Vec2,
+    ) -> Option<DirectSample> {
+        let (index, probability, _) = self.choice.as_ref()?.sample(choice);
+        match &self.emitters[index] {
+            Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
+                let b = warp::triangle_uniform(u);
+                let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
+                let to = light.p - p;
+                let distance2 = to.length_squared();
+                let wi = to.try_normalize()?;
+                let cos = -light.ng.dot(wi);
+                if cos == 0.0 || (cos < 0.0 && !two_sided) {
+                    return None;
+                }
+                let radiance = materials.list[light.material as usize].emitted(&light, &materials.textures);
+                let pdf_w = probability * distance2 / (area * cos.abs());
+                Some(DirectSample { wi, target: Some(light.spawn(-wi)), radiance, pdf_w, delta: false })
+            }
+            Emitter::Point { p: at, intensity } => {
+                let to = *at - p;
+                let wi = to.try_normalize()?;
+                let radiance = *intensity / to.length_squared();
+                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true })
+            }
+            Emitter::Spot { p: at, frame, intensity, cos_inner, cos_outer } => {
+                let to = *at - p;
+                let wi = to.try_normalize()?;
+                let falloff = spot_falloff(-frame.n.dot(wi), *cos_inner, *cos_outer);
+                if falloff == 0.0 {
+                    return None;
+                }
+                let radiance = *intensity * (falloff / to.length_squared());
+                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true })
+            }
+            Emitter::Sun { frame, irradiance, one_minus_cos } => {
+                if *one_minus_cos == 0.0 {
+                    let (wi, radiance) = (frame.n, *irradiance);
+                    return Some(DirectSample { wi, target: None, radiance, pdf_w: probability, delta: true });
+                }
+                let wi = frame.to_world(warp::cone_uniform(u, *one_minus_cos));
+                let radiance = Emitter::sun_radiance(*irradiance, *one_minus_cos);
+                let pdf_w = probability * warp::cone_uniform_pdf_w(*one_minus_cos);
+                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false })
+            }
+            Emitter::Environment => {
+                let environment = self.sky.environment.as_ref()?;
+                let (wi, pdf) = environment.sample(u);
+                let pdf_w = probability * pdf;
+                (pdf_w > 0.0).then(|| DirectSample {
+                    wi,
+                    target: None,
+                    radiance: environment.radiance(wi),
+                    pdf_w,
+                    delta: false,
+                })
+            }
+        }
+    }
+
+    /// Radiance that a surface hit by a ray sends back along it, and the density per solid angle with which
+    /// [`Lights::sample_direct`] from the ray's origin `p` would have found that point.
+    #[inline]
+    pub fn hit(&self, materials: &Materials, p: Vec3, surface: &Surface) -> Option<(Rgb, f32)> {
+        let first = self.first[surface.instance as usize];
+        if first == u32::MAX {
+            return None;
+        }
+        let relative = self.relative[surface.instance as usize][surface.primitive as usize];
+        if relative == u32::MAX {
+            return None;
+        }
+        let index = (first + relative) as usize;
+        let Emitter::Triangle { area, two_sided, .. } = &self.emitters[index] else { return None };
+        let to = surface.p - p;
+        let distance2 = to.length_squared();
+        let cos = -surface.ng.dot(to) / distance2.sqrt();
+        if !(cos > 0.0 || (*two_sided && cos < 0.0)) {
+            return None;
+        }
+        let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures);
+        let probability = self.choice.as_ref()?.pdf(index);
+        Some((radiance, probability * distance2 / (area * cos.abs())))
+    }
+
+    /// Calls `each(radiance, density)` for every light at infinity that a ray leaving the scene along `d` meets.
+    #[inline]
+    pub fn escape(&self, d: Vec3, mut each: impl FnMut(Rgb, f32)) {
+        let Some(choice) = &self.choice else { return };
+        if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment) {
+            each(environment.radiance(d), choice.pdf(index as usize) * environment.pdf_w(d));
+        }
+        for &index in &self.suns {
+            if let Emitter::Sun { frame, irradiance, one_minus_cos } = &self.emitters[index as usize] {
+                // 1 - cos from the chord: exact for narrow cones, where the cosine itself has no digits left.
+                if 0.5 * (d - frame.n).length_squared() < *one_minus_cos {
+                    let pdf = choice.pdf(index as usize) * warp::cone_uniform_pdf_w(*one_minus_cos);
+                    each(Emitter::sun_radiance(*irradiance, *one_minus_cos), pdf);
+                }
+            }
+        }
+    }
+
+    /// The start of a light path, its light chosen by power.
+    #[inline]
+    pub fn sample_emission(
+        &self,
+        shapes: &Shapes,
+        materials: &Materials,
+        choice: f32,
+        point: Vec2,
+        direction: Vec2,
+    ) -> Option<EmissionSample> {
+        let (index, probability, rest) = self.choice.as_ref()?.sample(choice);
+        let emitter = &self.emitters[index];
+        let (origin, d, flux) = match emitter {
+            Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
+                let b = warp::triangle_uniform(point);
+                let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
+                let back = *two_sided && rest < 0.5;
+                let frame = Frame::from_normal(if back { -light.ng } else { light.ng });
+                let d = frame.to_world(warp::hemisphere_cosine(direction));
+                let radiance = materials.list[light.material as usize].emitted(&light, &materials.textures);
+                (light.spawn(d), d, radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 }))
+            }
+            Emitter::Point { p, intensity } => (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU)),
+            Emitter::Spot { p, frame, intensity, cos_inner, cos_outer } => {
+                // Full cone and penumbra are chosen by their flux; inside the penumbra the ramp's square is inverted, so every
+                // path carries the same flux.
+                let inner = 1.0 - cos_inner;
+                let edge = (cos_inner - cos_outer) / 3.0;
+                let x = direction.x * (inner + edge);
+                let cos =
+                    if x < inner { 1.0 - x } else { cos_outer + (cos_inner - cos_outer) * ((x - inner) / edge).cbrt() };
+                let sin = (1.0 - cos * cos).max(0.0).sqrt();
+                let (s, c) = (TAU * direction.y).sin_cos();
+                (*p, frame.to_world(Vec3::new(sin * c, sin * s, cos)), *intensity * (TAU * (inner + edge)))
+            }
+            Emitter::Sun { frame, irradiance, one_minus_cos } => {
+                let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
+                // Irradiance is what a facing surface gets from the whole cone; a path from direction d stands for
+                // L / pdf = E / mean cosine.
+                let flux = *irradiance * (2.0 / (2.0 - one_minus_cos));
+                (self.disc(point, d), d, flux * (PI * self.sky.radius * self.sky.radius))
+            }
+            Emitter::Environment => {
+                let environment = self.sky.environment.as_ref()?;
+                let (wi, pdf) = environment.sample(direction);
+                if pdf <= 0.0 {
+                    return None;
+                }
+                (self.disc(point, -wi), -wi, environment.radiance(wi) * (PI * self.sky.radius * self.sky.radius / pdf))
+            }
+        };
+        let flux = flux / probability;
+        (flux.is_finite() && flux.max_element() > 0.0).then(|| EmissionSample {
+            origin,
+            direction: d,
+            flux,
+            light: index as u32,
+            delta: emitter.is_delta(),
+        })
+    }
+
+    /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.
+    fn disc(&self, u: Vec2, d: Vec3) -> Vec3 {
+        let frame = Frame::from_normal(d);
+        let q = warp::disc_concentric(u) * self.sky.radius;
+        self.sky.center + frame.t * q.x + frame.b * q.y - d * self.sky.radius
+    }
+
+    /// Whether any triangle of the instance gives light.
+    pub fn shines(&self, instance: u32) -> bool {
+        self.relative[instance as usize].iter().any(|&i| i != u32::MAX)
+    }
+}

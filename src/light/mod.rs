@@ -1,0 +1,11 @@
+//! Light sources: emissive triangles, points, spots, suns and the environment, and how they are sampled.
+
+mod cdf;
+mod emitter;
+mod environment;
+mod lights;
+
+pub use cdf::Cdf;
+pub use emitter::{Emitter, Sky};
+pub use environment::{Environment, ImageEnvironment};
+pub use lights::{DirectSample, EmissionSample, Lights};

@@ -1,0 +1,74 @@
+//! What a render leaves behind.
+
+use super::control::{History, StopReason};
+use super::settings::Settings;
+use crate::estimator::Pixel;
+use serde::Serialize;
+
+/// Processor-independent record of where the time went, wall seconds per phase.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Phases {
+    /// Pilot pass and initial bandwidths.
+    pub pilot: f64,
+    /// Tracing light paths.
+    pub light: f64,
+    /// Building photon maps.
+    pub map: f64,
+    /// Tracing eye paths and gathering.
+    pub eye: f64,
+}
+
+/// The state of all pixels and the account of a render.
+pub struct Rendered {
+    /// Width of the picture.
+    pub width: u32,
+    /// Height of the picture.
+    pub height: u32,
+    /// Pixels, row by row from the top.
+    pub pixels: Vec<Pixel>,
+    /// The settings it was made with.
+    pub settings: Settings,
+    /// Iterations done.
+    pub iterations: u64,
+    /// Light paths emitted.
+    pub light_paths: u64,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Seconds per phase.
+    pub phases: Phases,
+    /// Error against time.
+    pub history: Vec<History>,
+    /// Why it stopped.
+    pub stop: StopReason,
+}
+
+impl Rendered {
+    /// Estimated relative error of the method's own image: root of the mean over pixels of the mean over RGB of the variance
+    /// of the mean over (luminance-like mean^2 + 0.01), the papers' relMSE with the variance in place of the squared difference. `None` before
+    /// two iterations.
+    pub fn relative_error(&self) -> Option<f64> {
+        relative_error(&self.pixels, self.settings.levels.own())
+    }
+
+    /// Samples rejected as not finite.
+    pub fn rejected(&self) -> u64 {
+        self.pixels.iter().map(|p| u64::from(p.rejected)).sum()
+    }
+}
+
+/// See [`Rendered::relative_error`].
+pub(super) fn relative_error(pixels: &[Pixel], level: usize) -> Option<f64> {
+    let mut sum = 0.0;
+    let mut count = 0u64;
+    for pixel in pixels {
+        let n = f64::from(pixel.iterations);
+        if n < 2.0 {
+            continue;
+        }
+        let welford = &pixel.levels[level];
+        let mean = welford.mean.element_sum() / 3.0;
+        sum += welford.variance_of_mean(n).element_sum() / 3.0 / (mean * mean + 0.01);
+        count += 1;
+    }
+    (count > 0).then(|| (sum / count as f64).sqrt())
+}

@@ -1,0 +1,85 @@
+//! What a render is asked to do.
+
+use crate::estimator::InitialBandwidth;
+use crate::estimator::rule::memoryless;
+use crate::transport::MAX_LEVELS;
+
+/// Iterations when no stop condition is given.
+pub const DEFAULT_ITERATIONS: u64 = 64;
+/// Light paths per iteration: the papers' setting.
+pub const DEFAULT_PHOTONS: u32 = 100_000;
+/// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with one.
+pub const DEFAULT_KNN: (usize, usize) = (20, 10);
+
+/// Which iterations to render: those with `i mod count = index`, i from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Index of this shard, below `count`.
+    pub index: u64,
+    /// Number of shards.
+    pub count: u64,
+}
+
+/// Bandwidth levels, each 1/sqrt(2) of the next larger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Levels {
+    /// Number of levels, 1 to [`MAX_LEVELS`].
+    pub count: usize,
+    /// Trace the second eye path that decorrelates level 1 from the others; without it all levels share one path.
+    pub two_paths: bool,
+}
+
+impl Levels {
+    /// `count` levels; with more than one, two eye paths.
+    pub fn new(count: usize) -> Levels {
+        Levels { count: count.clamp(1, MAX_LEVELS), two_paths: count > 1 }
+    }
+
+    /// The level (from 0) that is the method's own image: the second largest, whose bandwidth is the usual one (k = 10 where the
+    /// largest is set by k = 20).
+    pub fn own(&self) -> usize {
+        self.count.saturating_sub(2)
+    }
+}
+
+/// Settings of a progressive photon render.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Seed.
+    pub seed: u64,
+    /// Light paths per iteration.
+    pub photons: u32,
+    /// Bandwidth levels.
+    pub levels: Levels,
+    /// What sets the largest initial bandwidth.
+    pub initial: InitialBandwidth,
+    /// Reduction rate of the memoryless rule, in (0, 1].
+    pub alpha: f64,
+    /// Longest path in segments.
+    pub max_depth: u32,
+    /// Stop after this many iterations (of the whole render, not of the shard).
+    pub iterations: Option<u64>,
+    /// Stop after this many seconds.
+    pub time: Option<f64>,
+    /// Stop at this estimated relative error.
+    pub target_error: Option<f64>,
+    /// Part of the iterations to render.
+    pub shard: Shard,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            seed: 0,
+            photons: DEFAULT_PHOTONS,
+            levels: Levels::new(5),
+            initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
+            alpha: memoryless::ALPHA,
+            max_depth: u32::MAX,
+            iterations: Some(DEFAULT_ITERATIONS),
+            time: None,
+            target_error: None,
+            shard: Shard { index: 0, count: 1 },
+        }
+    }
+}

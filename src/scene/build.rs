@@ -1,0 +1,306 @@
+//! From a description to a scene: places and bakes meshes, makes lights, commits to Embree.
+
+use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
+use super::{Scene, Survey};
+use crate::bsdf::EnergyTables;
+use crate::error::Result;
+use crate::geometry::{Instance, Mesh, Placement, Shapes};
+use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
+use crate::material::{Alpha, Material, Materials};
+use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
+use crate::trace::{AlphaTest, Tracer};
+use std::sync::Arc;
+
+/// Farther from the origin than this many scene radii, coordinates are moved to the scene's centre: f32 would lose the digits.
+const FAR_FROM_ORIGIN: f64 = 8.0;
+
+/// Builds the scene.
+///
+/// # Errors
+/// Embree is missing, or out of memory.
+pub(super) fn build(mut description: Description, threads: usize) -> Result<Scene> {
+    let mut warnings = std::mem::take(&mut description.warnings);
+    for light in &description.lights {
+        if light.radius > 0.0 && !matches!(light.kind, PunctualKind::Point) {
+            warnings.push(format!(
+                "light \"{}\": a radius is simulated for point lights only; it shines from a point",
+                light.name
+            ));
+        }
+    }
+    add_lamps(&mut description);
+    let (low, high) = bounds(&description);
+    let (center, radius) =
+        if low.cmple(high).all() { ((low + high) * 0.5, (high - low).length() * 0.5) } else { (DVec3::ZERO, 1.0) };
+    let radius = radius.max(1e-6);
+    let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
+
+    let shapes = Arc::new(place(&mut description, origin));
+    let materials = Arc::new(Materials { list: description.materials, textures: description.textures });
+    let cutout: Vec<bool> =
+        shapes.instances.iter().map(|i| materials.list[i.material as usize].alpha != Alpha::Opaque).collect();
+    let tracer = Tracer::build(&shapes, &cutout, &alpha_test(&shapes, &materials), threads)?;
+
+    let sky = Sky {
+        center: (center - origin).as_vec3(),
+        // A little room, so that no light from infinity starts inside the geometry.
+        radius: radius as f32 * 1.001,
+        environment: environment(description.environment),
+    };
+    let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);
+    let others = others.map(|light| punctual(light, origin)).collect();
+    let lights = Lights::new(&shapes, &materials, others, sky);
+    for (i, instance) in shapes.instances.iter().enumerate() {
+        if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
+            warnings
+                .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
+        }
+    }
+    if lights.is_empty() {
+        warnings.push(
+            "the scene has no light: the picture will be black (add --env, a lamp or an emissive material)".into(),
+        );
+    }
+    if description.cameras.is_empty() {
+        warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
+    }
+    let tables = EnergyTables::for_materials(&materials.list);
+    let survey = Survey::new(&shapes, &materials, &lights, description.medium);
+    Ok(Scene {
+        source: description.source,
+        origin,
+        shapes,
+        materials,
+        objects: description.objects,
+        tracer,
+        lights,
+        cameras: description.cameras,
+        medium: description.medium,
+        tables,
+        survey,
+        warnings,
+    })
+}
+
+/// World bounds of all meshes in f64.
+fn bounds(description: &Description) -> (DVec3, DVec3) {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for placed in &description.instances {
+        for p in &description.meshes[placed.mesh as usize].positions {
+            let p = placed.to_world.transform_point3(p.as_dvec3());
+            low = low.min(p);
+            high = high.max(p);
+        }
+    }
+    (low, high)
+}
+
+/// Bakes meshes that stand in one place into world space; shares the others.
+fn place(description: &mut Description, origin: DVec3) -> Shapes {
+    let mut uses = vec![0u32; description.meshes.len()];
+    for placed in &description.instances {
+        uses[placed.mesh as usize] += 1;
+    }
+    let mut shapes = Shapes { meshes: std::mem::take(&mut description.meshes), instances: Vec::new() };
+    for placed in &description.instances {
+        let mut to_world = placed.to_world;
+        to_world.translation -= origin;
+        let shared = uses[placed.mesh as usize] > 1;
+        if !shared {
+            bake(&mut shapes.meshes[placed.mesh as usize], &to_world);
+        }
+        shapes.instances.push(Instance {
+            name: placed.name.clone(),
+            mesh: placed.mesh,
+            material: placed.material,
+            object: placed.object,
+            to_world: shared.then(|| {
+                Placement::new(glam::Affine3A::from_mat4(glam::Mat4::from(glam::DMat4::from(to_world).as_mat4())))
+            }),
+        });
+    }
+    shapes
+}
+
+/// Moves a mesh to world space. A mirroring transform turns the winding, so that the front stays the front.
+fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
+    let normals = to_world.matrix3.inverse().transpose();
+    for p in &mut mesh.positions {
+        *p = to_world.transform_point3(p.as_dvec3()).as_vec3();
+    }
+    for n in &mut mesh.normals {
+        *n = (normals * n.as_dvec3()).normalize_or_zero().as_vec3();
+    }
+    for t in &mut mesh.tangents {
+        let d = to_world.transform_vector3(t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+        *t = d.extend(t.w);
+    }
+    if to_world.matrix3.determinant() < 0.0 {
+        for triangle in &mut mesh.triangles {
+            triangle.swap(1, 2);
+        }
+    }
+}
+
+fn alpha_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> AlphaTest {
+    let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
+    Arc::new(move |instance, primitive, barycentric, token| {
+        let material = &materials.list[shapes.instances[instance as usize].material as usize];
+        let cutoff = match material.alpha {
+            Alpha::Opaque => return true,
+            Alpha::Mask(cutoff) => cutoff,
+            Alpha::Blend => {
+                // One number per ray and triangle, whatever the order in which Embree asks.
+                let key =
+                    u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(primitive);
+                (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
+            }
+        };
+        let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
+        material.alpha(&surface, &materials.textures) >= cutoff
+    })
+}
+
+fn environment(described: Option<description::EnvironmentDescription>) -> Option<Environment> {
+    let described = described?;
+    match described.source {
+        EnvironmentSource::Color(color) => {
+            let radiance = color * described.strength;
+            (radiance.max_element() > 0.0).then_some(Environment::Uniform(radiance))
+        }
+        EnvironmentSource::Image { width, height, mut texels } => {
+            for texel in &mut texels {
+                *texel = texel.map(|x| x * described.strength);
+            }
+            ImageEnvironment::new(width as usize, height as usize, texels, described.rotation_deg.to_radians())
+                .map(Environment::Image)
+        }
+    }
+}
+
+fn axis(light: &PunctualLight) -> Vec3 {
+    (light.to_world.matrix3 * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y).as_vec3()
+}
+
+fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
+    let p = (light.to_world.translation - origin).as_vec3();
+    match light.kind {
+        PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
+        PunctualKind::Spot { inner, outer } => Emitter::Spot {
+            p,
+            frame: Frame::from_normal(axis(light)),
+            intensity: light.intensity,
+            cos_inner: inner.cos(),
+            // Strictly below the inner cosine, so that the ramp has a width.
+            cos_outer: outer.cos().min(inner.cos() - 1e-6),
+        },
+        PunctualKind::Sun { angle } => {
+            let half = 0.5 * f64::from(angle);
+            Emitter::Sun {
+                frame: Frame::from_normal(-axis(light)),
+                irradiance: light.intensity,
+                one_minus_cos: (2.0 * (0.5 * half).sin().powi(2)) as f32,
+            }
+        }
+    }
+}
+
+/// Point lights with a radius become glowing spheres: they can be seen, reflected, and cast soft shadows.
+fn add_lamps(description: &mut Description) {
+    for light in &description.lights {
+        if light.kind != PunctualKind::Point || light.radius <= 0.0 || light.intensity.max_element() <= 0.0 {
+            continue;
+        }
+        let mesh = icosphere(light.radius, 3);
+        let area: f32 = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum();
+        // A convex body of surface A shows a mean area of A / 4 (Cauchy): the mean intensity is exact.
+        let emission: Rgb = light.intensity * (4.0 / area);
+        let material = Material {
+            name: light.name.clone(),
+            base_color: [0.0, 0.0, 0.0, 1.0],
+            metallic: 0.0,
+            specular: 0.0,
+            emission,
+            ..Material::default()
+        };
+        description.instances.push(description::Placed {
+            name: light.name.clone(),
+            mesh: description.meshes.len() as u32,
+            material: description.materials.len() as u32,
+            object: description.objects.len() as u32,
+            to_world: DAffine3::from_translation(light.to_world.translation),
+        });
+        description.objects.push(light.name.clone());
+        description.meshes.push(mesh);
+        description.materials.push(material);
+    }
+}
+
+/// A sphere of `20 * 4^subdivisions` triangles.
+fn icosphere(radius: f32, subdivisions: u32) -> Mesh {
+    let t = (1.0 + 5f32.sqrt()) / 2.0;
+    let mut positions: Vec<Vec3> = [
+        [-1.0, t, 0.0],
+        [1.0, t, 0.0],
+        [-1.0, -t, 0.0],
+        [1.0, -t, 0.0],
+        [0.0, -1.0, t],
+        [0.0, 1.0, t],
+        [0.0, -1.0, -t],
+        [0.0, 1.0, -t],
+        [t, 0.0, -1.0],
+        [t, 0.0, 1.0],
+        [-t, 0.0, -1.0],
+        [-t, 0.0, 1.0],
+    ]
+    .map(|p| Vec3::from_array(p).normalize())
+    .to_vec();
+    let mut triangles: Vec<[u32; 3]> = vec![
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
+    ];
+    for _ in 0..subdivisions {
+        let mut middles = std::collections::HashMap::new();
+        let mut next = Vec::with_capacity(triangles.len() * 4);
+        for [a, b, c] in triangles {
+            let mut middle = |i: u32, j: u32| {
+                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    positions.push(((positions[i as usize] + positions[j as usize]) * 0.5).normalize());
+                    positions.len() as u32 - 1
+                })
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            next.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        triangles = next;
+    }
+    for p in &mut positions {
+        *p *= radius;
+    }
+    Mesh { name: "lamp".into(), positions, triangles, closed: true, ..Mesh::default() }
+}

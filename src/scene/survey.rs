@@ -1,0 +1,52 @@
+//! What a scene contains, from the scene alone.
+
+use crate::geometry::Shapes;
+use crate::light::{Emitter, Lights};
+use crate::material::{Alpha, Materials, MediumParameters};
+
+/// Kinds of things present in a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Survey {
+    /// Some material has alpha cut-outs or blending.
+    pub alpha: bool,
+    /// Some mesh bounds a solid that light enters.
+    pub solids: bool,
+    /// Rays may cross boundaries that do not scatter: index-matched solids, or solids inside others.
+    pub null_boundaries: bool,
+    /// Something absorbs or scatters between surfaces.
+    pub media: bool,
+    /// Some light cannot be hit by a ray.
+    pub delta_lights: bool,
+    /// Light comes from infinity.
+    pub infinite_lights: bool,
+}
+
+impl Survey {
+    /// Looks through the scene.
+    pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
+        let mut survey = Survey { media: medium.is_some(), ..Survey::default() };
+        let mut worn = vec![0usize; materials.list.len()];
+        for instance in &shapes.instances {
+            worn[instance.material as usize] += 1;
+        }
+        let mut solids = 0;
+        for (material, &worn) in materials.list.iter().zip(&worn) {
+            if worn == 0 {
+                continue;
+            }
+            survey.alpha |= material.alpha != Alpha::Opaque;
+            if material.is_solid_glass() {
+                solids += worn;
+                survey.media |= material.medium.is_some();
+                survey.null_boundaries |= material.ior == 1.0;
+            }
+        }
+        survey.solids = solids > 0;
+        survey.null_boundaries |= solids > 1;
+        for emitter in lights.emitters() {
+            survey.delta_lights |= emitter.is_delta();
+            survey.infinite_lights |= matches!(emitter, Emitter::Sun { .. } | Emitter::Environment);
+        }
+        survey
+    }
+}

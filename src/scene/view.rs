@@ -1,0 +1,116 @@
+//! The camera of a picture: chosen by name, sized, or made when the scene has none.
+
+use super::Scene;
+use super::description::{CameraDescription, Projection};
+use crate::camera::{self, Camera};
+use crate::error::{Error, Kind, Result};
+use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2};
+
+/// Width of a picture when nothing is asked for.
+const DEFAULT_WIDTH: u32 = 1280;
+/// Aspect ratio of a picture when neither the camera nor the user gives one.
+const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
+/// Largest width or height.
+pub const MAX_SIZE: u32 = 32_768;
+
+/// What the user asks of the picture.
+#[derive(Clone, Debug, Default)]
+pub struct View {
+    /// Name of the camera; the first one otherwise.
+    pub camera: Option<String>,
+    /// Width in pixels.
+    pub width: Option<u32>,
+    /// Height in pixels.
+    pub height: Option<u32>,
+}
+
+impl Scene {
+    /// The camera for `view`. One of width and height given keeps the camera's aspect ratio.
+    ///
+    /// # Errors
+    /// No camera has the name, or the size is zero or too large.
+    pub fn camera(&self, view: &View) -> Result<Camera> {
+        let default;
+        let described = match &view.camera {
+            Some(name) => self.cameras.iter().find(|c| &c.name == name).ok_or_else(|| {
+                let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
+                let error =
+                    Error::new(Kind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
+                error.hint(if names.is_empty() {
+                    "the scene has no camera".into()
+                } else {
+                    format!("it has {}", names.join(", "))
+                })
+            })?,
+            None => match self.cameras.first() {
+                Some(camera) => camera,
+                None => {
+                    default = self.default_camera();
+                    &default
+                }
+            },
+        };
+        let aspect = match described.projection {
+            Projection::Perspective { aspect, .. } => aspect.unwrap_or(DEFAULT_ASPECT),
+            Projection::Orthographic { xmag, ymag } => (xmag / ymag).abs(),
+        };
+        let scaled = |x: u32, factor: f32| ((x as f32 * factor).round() as u32).max(1);
+        let (width, height) = match (view.width, view.height) {
+            (Some(w), Some(h)) => (w, h),
+            (Some(w), None) => (w, scaled(w, 1.0 / aspect)),
+            (None, Some(h)) => (scaled(h, aspect), h),
+            (None, None) => (DEFAULT_WIDTH, scaled(DEFAULT_WIDTH, 1.0 / aspect)),
+        };
+        if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
+            let cause = format!("a picture of {width} x {height} pixels cannot be made");
+            return Err(
+                Error::new(Kind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}"))
+            );
+        }
+        let film_aspect = width as f32 / height as f32;
+        let projection = match described.projection {
+            Projection::Perspective { yfov, .. } => {
+                let half = (0.5 * yfov).tan();
+                camera::Projection::Perspective(Vec2::new(half * film_aspect, half))
+            }
+            Projection::Orthographic { xmag, ymag } => {
+                // A picture of another aspect shows all of the camera's view.
+                let ymag = ymag.abs().max(xmag.abs() / film_aspect);
+                camera::Projection::Orthographic(Vec2::new(ymag * film_aspect, ymag))
+            }
+        };
+        let lens = if described.aperture_radius > 0.0 && described.focus_distance > 0.0 {
+            (described.aperture_radius, described.focus_distance)
+        } else {
+            (0.0, 1.0)
+        };
+        let position = described.to_world.translation - self.origin;
+        Ok(Camera::new(position, rotation(&described.to_world), projection, lens, (width, height)))
+    }
+
+    /// A view of the whole scene from the front, a little from above.
+    fn default_camera(&self) -> CameraDescription {
+        let yfov = 40f32.to_radians();
+        let sky = self.lights.sky();
+        let distance = f64::from(sky.radius) / f64::from(0.5 * yfov).sin();
+        let back = DVec3::new(0.0, 0.35, 1.0).normalize();
+        let right = DVec3::Y.cross(back).normalize();
+        let matrix = DMat3::from_cols(right, back.cross(right), back);
+        let position = sky.center.as_dvec3() + self.origin + back * distance;
+        CameraDescription {
+            name: "default".into(),
+            to_world: DAffine3 { matrix3: matrix, translation: position },
+            projection: Projection::Perspective { yfov, aspect: None },
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+}
+
+/// Orthonormal axes of a node's transform.
+fn rotation(to_world: &DAffine3) -> Mat3 {
+    let back = to_world.matrix3.z_axis.normalize_or(DVec3::Z);
+    let up = to_world.matrix3.y_axis;
+    let right = up.cross(back).normalize_or(DVec3::X);
+    DMat3::from_cols(right, back.cross(right), back).as_mat3()
+}

@@ -1,0 +1,5 @@
+//! Running statistics.
+
+mod welford;
+
+pub use welford::Welford;

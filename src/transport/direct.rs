@@ -1,0 +1,106 @@
+//! Direct light at a vertex: next-event estimation, and its second strategy, weighted by the balance heuristic \[Veach 1997, 9.2\].
+//!
+//! At a vertex the lobes fall into two sets that never share light: those that gather photons (`gather`), whose path ends
+//! here, and those the path goes on with (`onward`). Both are lit by one light sample. The second strategy of the gathering lobes is
+//! a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the path itself, which
+//! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
+
+use super::segment::{End, next_surface, transmittance};
+use super::walk::Vertex;
+use crate::bsdf::{LobeSet, Transport};
+use crate::math::Rgb;
+use crate::random::Purpose;
+use crate::scene::Scene;
+
+/// Probability of tracing the gathering lobes' own ray. They are wide, so the light sample is nearly always the better one; the ray
+/// bounds what remains near large lights.
+pub const SECOND_STRATEGY: f32 = 0.25;
+
+/// Balance heuristic of a density against another.
+#[inline]
+pub fn balance(pdf: f32, other: f32) -> f32 {
+    let sum = pdf + other;
+    if sum > 0.0 && pdf.is_finite() {
+        pdf / sum
+    } else if pdf > 0.0 {
+        1.0
+    } else {
+        0.0
+    }
+}
+
+/// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival` is the
+/// probability of going on with `onward`.
+#[inline]
+pub fn direct_light(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+    if scene.lights.is_empty() {
+        return Rgb::ZERO;
+    }
+    let mut light = next_event(scene, vertex, gather, onward, survival);
+    if !gather.is_empty() && vertex.draws.one(Purpose::SecondStrategy) < SECOND_STRATEGY {
+        light += second_strategy(scene, vertex, gather);
+    }
+    light
+}
+
+#[inline]
+fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+    let Vertex { surface, shading, wo, draws, .. } = vertex;
+    let choice = draws.one(Purpose::LightChoice);
+    let point = draws.two(Purpose::LightPoint);
+    let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
+        return Rgb::ZERO;
+    };
+    let mut scattered = Rgb::ZERO;
+    for (set, tries) in [(gather, SECOND_STRATEGY), (onward, survival)] {
+        // Delta lobes scatter nothing towards a light sample, but they take their share of the directions drawn from the set.
+        if !set.has(LobeSet::SMOOTH) {
+            continue;
+        }
+        let f = shading.eval_cos(*wo, sample.wi, Transport::Radiance, set);
+        if f.max_element() <= 0.0 {
+            continue;
+        }
+        let other = if sample.delta { 0.0 } else { tries * shading.pdf(*wo, sample.wi, Transport::Radiance, set) };
+        scattered += f * balance(sample.pdf_w, other);
+    }
+    let arriving = scattered * sample.radiance / sample.pdf_w;
+    // Written so that NaN is dropped here, before it costs a ray.
+    if !(arriving.max_element() > 0.0) {
+        return Rgb::ZERO;
+    }
+    let origin = surface.spawn(sample.wi);
+    let (direction, tmax) = match sample.target {
+        None => (sample.wi, f32::INFINITY),
+        Some(target) => {
+            let to = target - origin;
+            let distance = to.length();
+            // Both ends are off their surfaces already.
+            (to / distance, distance)
+        }
+    };
+    let crosses = sample.wi.dot(surface.ng) * wo.dot(surface.ng) < 0.0;
+    let interior = if crosses { vertex.interior_behind } else { vertex.interior };
+    arriving * transmittance(scene, origin, direction, tmax, interior, draws.token(Purpose::ShadowAlpha))
+}
+
+#[inline]
+fn second_strategy(scene: &Scene, vertex: &Vertex<'_>, set: LobeSet) -> Rgb {
+    let Vertex { surface, shading, wo, draws, .. } = vertex;
+    let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
+    let Some(sample) = shading.sample(*wo, Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
+    let interior = if sample.transmitted { vertex.interior_behind } else { vertex.interior };
+    let origin = surface.spawn(sample.wi);
+    let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
+    let mut light = Rgb::ZERO;
+    match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha)) {
+        End::Surface(arrival) => {
+            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, surface.p, &arrival.surface) {
+                light = radiance * arrival.transmittance * weight(pdf);
+            }
+        }
+        End::Escaped(left) => scene.lights.escape(sample.wi, |radiance, pdf| light += radiance * left * weight(pdf)),
+        End::Lost => {}
+    }
+    sample.weight * light
+}

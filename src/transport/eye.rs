@@ -1,0 +1,303 @@
+//! Eye paths that gather photons: what one path of a pixel measures at every bandwidth level.
+//!
+//! Who carries which light, so that every path is counted once (X is the vertex where photons may be gathered, seen from the light):
+//! - a light, then X: next-event estimation at X and its second strategy ([`direct_light`]), whatever the lobes of X;
+//! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself, which goes on;
+//! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light.
+
+use super::direct::{balance, direct_light};
+use super::interior::Interior;
+use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use crate::bsdf::{LobeSet, Transport};
+use crate::camera::Camera;
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::photon::{Photon, PhotonFlags, PhotonMap};
+use crate::random::{Purpose, Stream};
+use crate::scene::Scene;
+use std::f32::consts::FRAC_1_PI;
+
+/// Most bandwidth levels of one eye path.
+pub const MAX_LEVELS: usize = 8;
+
+/// Photons of a surface whose normal turns further than this (cosine) from the gathering point's are not its own.
+const NORMAL_COSINE: f32 = 0.7;
+
+/// Whether a photon lies on the surface around a point with geometric normal `ng`.
+#[inline]
+pub fn same_surface(photon: &Photon, ng: Vec3) -> bool {
+    photon.ng.dot(ng) > NORMAL_COSINE
+}
+
+/// Bandwidths of the levels of one eye path: radii squared in ascending order.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelRadii {
+    radius2: [f32; MAX_LEVELS],
+    count: usize,
+}
+
+impl LevelRadii {
+    /// From radii squared in ascending order; at most [`MAX_LEVELS`].
+    #[inline]
+    pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
+        let mut radii = LevelRadii { radius2: [0.0; MAX_LEVELS], count: 0 };
+        for r in radius2.take(MAX_LEVELS) {
+            radii.radius2[radii.count] = r;
+            radii.count += 1;
+        }
+        radii
+    }
+
+    /// Number of levels.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+}
+
+/// What denoisers want to know about a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Features {
+    /// Directional albedo at the first hit that is not a perfect mirror or clear glass.
+    pub albedo: Rgb,
+    /// World-space shading normal there, towards the eye.
+    pub normal: Vec3,
+    /// Distance along the path.
+    pub depth: f32,
+}
+
+/// The first hit of an eye path.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstHit {
+    /// World position.
+    pub p: Vec3,
+    /// Index of the instance.
+    pub instance: u32,
+}
+
+/// Everything one eye path measures. Radiance per channel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EyeMeasure {
+    /// Emitters seen directly or through perfect mirrors and clear glass.
+    pub emission: Rgb,
+    /// Light from lights at the first vertex that scatters otherwise.
+    pub direct: Rgb,
+    /// All other light that this path found without photons.
+    pub indirect: Rgb,
+    /// Photons of caustics, per level.
+    pub caustic_photons: [Rgb; MAX_LEVELS],
+    /// All other photons, per level.
+    pub indirect_photons: [Rgb; MAX_LEVELS],
+    /// G-buffer.
+    pub features: Features,
+    /// First visible hit.
+    pub first: Option<FirstHit>,
+}
+
+impl EyeMeasure {
+    /// The radiance estimate of a level.
+    #[inline]
+    pub fn radiance(&self, level: usize) -> Rgb {
+        self.emission + self.direct + self.indirect + self.caustic_photons[level] + self.indirect_photons[level]
+    }
+}
+
+/// Where on its way an eye path is: decides to which layer light belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Nothing so far but perfect mirrors and clear glass.
+    Clear,
+    /// The last vertex was the first that scatters otherwise.
+    First,
+    /// Beyond.
+    Later,
+}
+
+struct Gather<'a> {
+    scene: &'a Scene,
+    photons: &'a PhotonMap,
+    radii: &'a LevelRadii,
+    max_depth: u32,
+    measure: EyeMeasure,
+    /// Length of the path so far.
+    length: f32,
+    stage: Stage,
+    /// The last vertex.
+    last: Vec3,
+}
+
+impl Gather<'_> {
+    /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with
+    /// which next-event estimation at the last vertex would have found it.
+    #[inline]
+    fn run_into(&mut self, radiance: Rgb, throughput: Rgb, pdf_light: f32, scattered: Option<Scattered>) {
+        let arriving = throughput * radiance;
+        match (self.stage, scattered) {
+            (Stage::Clear, _) => self.measure.emission += arriving,
+            (stage, Some(s)) if !s.lobe.has(LobeSet::DELTA) => {
+                let weighted = arriving * balance(s.pdf_w, pdf_light);
+                if stage == Stage::First {
+                    self.measure.direct += weighted;
+                } else {
+                    self.measure.indirect += weighted;
+                }
+            }
+            // Behind a perfect mirror or clear glass next-event estimation cannot see it.
+            _ => self.measure.indirect += arriving,
+        }
+    }
+
+    /// Photons around the vertex: kernel density estimation with the box kernel, all levels from one query [post-reconstruction
+    /// 2021, (2) and (3)].
+    #[inline]
+    fn gather(&mut self, vertex: &Vertex<'_>, broad: LobeSet, sharp: LobeSet) {
+        let radii = &self.radii.radius2[..self.radii.count];
+        let Some(&largest) = radii.last() else { return };
+        let longest = self.max_depth - vertex.depth;
+        let ng = vertex.surface.ng;
+        // Bin by the smallest level that holds the photon; a level is the sum of the bins up to its own.
+        let mut bins = [[Rgb::ZERO; MAX_LEVELS]; 2];
+        self.photons.within(vertex.surface.p, largest, |photon, distance2| {
+            let set = if photon.flags.has(PhotonFlags::UNREACHABLE) { broad | sharp } else { broad };
+            if set.is_empty() || !same_surface(photon, ng) || u32::from(photon.depth) > longest {
+                return;
+            }
+            let f = vertex.shading.gather(vertex.wo, photon.wi, set);
+            let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
+            let mut level = radii.len() - 1;
+            while level > 0 && distance2 < radii[level - 1] {
+                level -= 1;
+            }
+            bins[caustic][level] += f * photon.flux;
+        });
+        let mut sums = [Rgb::ZERO; 2];
+        for (level, radius2) in radii.iter().enumerate() {
+            let kernel = vertex.throughput * (FRAC_1_PI / radius2);
+            sums[0] += bins[0][level];
+            sums[1] += bins[1][level];
+            self.measure.indirect_photons[level] += kernel * sums[0];
+            self.measure.caustic_photons[level] += kernel * sums[1];
+        }
+    }
+}
+
+impl Visitor for Gather<'_> {
+    #[inline]
+    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+        let (surface, shading) = (vertex.surface, vertex.shading);
+        if scattered.is_none() {
+            self.measure.first = Some(FirstHit { p: surface.p, instance: surface.instance });
+            self.last = vertex.from;
+        }
+        self.length += vertex.distance;
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, self.last, surface) {
+            self.run_into(radiance, vertex.throughput, pdf, scattered);
+        }
+        self.last = surface.p;
+        let lobes = shading.bsdf.lobes();
+        let smooth = lobes & LobeSet::SMOOTH;
+        if self.stage == Stage::Clear && !smooth.is_empty() {
+            self.measure.features = Features {
+                albedo: shading.albedo(vertex.wo, LobeSet::ALL),
+                normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },
+                depth: self.length,
+            };
+        }
+        if smooth.is_empty() {
+            return Next::Continue(lobes);
+        }
+        let (broad, sharp) = (lobes & LobeSet::BROAD, lobes & LobeSet::SHARP);
+        let onward = lobes & (LobeSet::SHARP | LobeSet::DELTA);
+        if vertex.depth < self.max_depth {
+            let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
+            let direct = vertex.throughput * direct_light(self.scene, vertex, broad, onward, survival);
+            if self.stage == Stage::Clear {
+                self.measure.direct += direct;
+            } else {
+                self.measure.indirect += direct;
+            }
+            self.gather(vertex, broad, sharp);
+        }
+        self.stage = if self.stage == Stage::Clear { Stage::First } else { Stage::Later };
+        Next::Continue(onward)
+    }
+
+    #[inline]
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+        let scene = self.scene;
+        scene.lights.escape(direction, |radiance, pdf| self.run_into(radiance, throughput, pdf, scattered));
+    }
+}
+
+/// Traces one eye path through pixel `(x, y)` and measures all levels of `radii`.
+#[inline]
+pub fn eye_path(
+    scene: &Scene,
+    camera: &Camera,
+    pixel: (u32, u32),
+    stream: Stream,
+    photons: &PhotonMap,
+    radii: &LevelRadii,
+    max_depth: u32,
+) -> EyeMeasure {
+    let mut gather = Gather {
+        scene,
+        photons,
+        radii,
+        max_depth,
+        measure: EyeMeasure::default(),
+        length: 0.0,
+        stage: Stage::Clear,
+        last: Vec3::ZERO,
+    };
+    walk(scene, eye_start(camera, pixel, stream), stream, Transport::Radiance, max_depth, &mut gather);
+    gather.measure
+}
+
+/// The first ray of an eye path through a uniform point of the pixel.
+#[inline]
+fn eye_start(camera: &Camera, pixel: (u32, u32), stream: Stream) -> PathStart {
+    let draws = stream.vertex(0);
+    let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
+    let ray = camera.ray(film, draws.two(Purpose::Lens));
+    PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: Interior::default() }
+}
+
+/// Where an eye path would gather photons first.
+#[derive(Clone, Copy, Debug)]
+pub struct GatherPoint {
+    /// World position.
+    pub p: Vec3,
+    /// Unit geometric normal.
+    pub ng: Vec3,
+    /// Length of the eye path.
+    pub length: f32,
+}
+
+struct FindGatherPoint {
+    found: Option<GatherPoint>,
+    length: f32,
+}
+
+impl Visitor for FindGatherPoint {
+    fn surface(&mut self, vertex: &Vertex<'_>, _: Option<Scattered>) -> Next {
+        self.length += vertex.distance;
+        let lobes = vertex.shading.bsdf.lobes();
+        if lobes.has(LobeSet::BROAD) {
+            self.found = Some(GatherPoint { p: vertex.surface.p, ng: vertex.surface.ng, length: self.length });
+            return Next::Stop;
+        }
+        Next::Continue(lobes)
+    }
+}
+
+/// The first vertex of an eye path whose lobes gather photons.
+pub fn gather_point(
+    scene: &Scene,
+    camera: &Camera,
+    pixel: (u32, u32),
+    stream: Stream,
+    max_depth: u32,
+) -> Option<GatherPoint> {
+    let mut find = FindGatherPoint { found: None, length: 0.0 };
+    walk(scene, eye_start(camera, pixel, stream), stream, Transport::Radiance, max_depth, &mut find);
+    find.found
+}

@@ -1,0 +1,96 @@
+//! Nested dielectrics: which solids a path is inside of.
+//!
+//! The rule: a path keeps the solids it has entered and not left. Where several overlap, the one of highest priority
+//! (`extras.caustique.priority`, 0 by default) fills the space, and among equals the one entered last. A surface is a boundary
+//! only if what fills the space differs on its two sides; otherwise, and where both sides are of one material, it is no bounce at all
+//! \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path that leaves a solid it never entered
+//! (the eye or a lamp was inside) is taken to have been in it.
+
+use crate::material::{Material, MediumParameters};
+use crate::scene::Scene;
+
+/// Most solids a path can be inside of at once; further ones are entered as if they replaced the innermost.
+const MAX_NESTED: usize = 6;
+
+/// The solids a path is inside of: (object, material), in order of entry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Interior {
+    inside: [(u32, u32); MAX_NESTED],
+    len: u8,
+}
+
+/// What is on the two sides of a solid's surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    /// Material that fills the space on the side the path comes from; `None` is the open space.
+    pub before: Option<u32>,
+    /// Material that fills the space behind the surface.
+    pub after: Option<u32>,
+    /// The solids a path is in once it has crossed.
+    pub interior: Interior,
+}
+
+impl Interior {
+    fn entries(&self) -> &[(u32, u32)] {
+        &self.inside[..usize::from(self.len)]
+    }
+
+    /// Material that fills the space here; `None` is the open space.
+    #[inline]
+    pub fn material(&self, scene: &Scene) -> Option<u32> {
+        let priority = |&(_, m): &(u32, u32)| scene.materials.list[m as usize].priority;
+        // `max_by_key` keeps the last of equals: the one entered last.
+        self.entries().iter().max_by_key(|e| priority(e)).map(|&(_, m)| m)
+    }
+
+    /// Absorption and scattering here.
+    #[inline]
+    pub fn medium(&self, scene: &Scene) -> Option<MediumParameters> {
+        match self.material(scene) {
+            Some(m) => scene.materials.list[m as usize].medium,
+            None => scene.medium,
+        }
+    }
+
+    /// Index of refraction of what fills the space here.
+    #[inline]
+    pub fn ior(&self, scene: &Scene) -> f32 {
+        ior(scene, self.material(scene))
+    }
+
+    /// What crossing the surface of `object`, made of `material`, means; `entering`: from its front to its back.
+    #[inline]
+    pub fn crossing(&self, scene: &Scene, object: u32, material: u32, entering: bool) -> Crossing {
+        let mut interior = *self;
+        let mut before = self.material(scene);
+        if entering {
+            let at = usize::from(interior.len).min(MAX_NESTED - 1);
+            interior.inside[at] = (object, material);
+            interior.len = at as u8 + 1;
+        } else if let Some(at) = self.entries().iter().rposition(|e| e.0 == object) {
+            interior.inside.copy_within(at + 1.., at);
+            interior.len -= 1;
+        } else {
+            before = Some(material);
+        }
+        Crossing { before, after: interior.material(scene), interior }
+    }
+}
+
+/// Index of refraction of a material that fills space; 1 in the open.
+#[inline]
+pub fn ior(scene: &Scene, material: Option<u32>) -> f32 {
+    material.map_or(1.0, |m| refractive(&scene.materials.list[m as usize]))
+}
+
+fn refractive(material: &Material) -> f32 {
+    if material.ior.is_finite() { material.ior } else { 1.0 }
+}
+
+impl Crossing {
+    /// The surface is none: the same material on both sides.
+    #[inline]
+    pub fn is_nothing(&self) -> bool {
+        self.before == self.after
+    }
+}

@@ -1,0 +1,110 @@
+//! Light paths that leave photons.
+
+use super::interior::Interior;
+use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use crate::bsdf::{LobeSet, Transport};
+use crate::math::Vec2;
+use crate::photon::{Photon, PhotonFlags};
+use crate::random::{Domain, SobolPair, Stream, mix};
+use crate::scene::Scene;
+
+/// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPass {
+    seed: u64,
+    pass: u64,
+    domain: Domain,
+    paths: u32,
+    max_depth: u32,
+    choice: SobolPair,
+    point: SobolPair,
+    direction: SobolPair,
+}
+
+/// How a light path begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Emitted {
+    /// Its start.
+    pub start: PathStart,
+    /// Random numbers of the path.
+    pub stream: Stream,
+    /// The light cannot be hit by a ray.
+    pub delta: bool,
+    /// Index of the light.
+    pub light: u32,
+}
+
+impl LightPass {
+    /// Pass `pass` of `paths` light paths.
+    pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPass {
+        let key =
+            mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+                ^ domain as u64);
+        let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
+        LightPass { seed, pass, domain, paths, max_depth, choice: pair(1), point: pair(2), direction: pair(3) }
+    }
+
+    /// Number of light paths.
+    pub fn paths(&self) -> u32 {
+        self.paths
+    }
+
+    /// The beginning of path `index`, its flux divided by the number of paths.
+    #[inline]
+    pub fn emit(&self, scene: &Scene, index: u32) -> Option<Emitted> {
+        let choice = self.choice.point(index).x;
+        let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
+        let emission = scene.lights.sample_emission(&scene.shapes, &scene.materials, choice, point, direction)?;
+        Some(Emitted {
+            start: PathStart {
+                origin: emission.origin,
+                direction: emission.direction,
+                throughput: emission.flux / self.paths as f32,
+                interior: Interior::default(),
+            },
+            stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
+            delta: emission.delta,
+            light: emission.light,
+        })
+    }
+}
+
+/// Leaves a photon at every vertex after the first (direct light is not the photons') whose lobes gather it.
+struct Deposit<'a> {
+    photons: &'a mut Vec<Photon>,
+    caustic: bool,
+    unreachable: bool,
+}
+
+impl Visitor for Deposit<'_> {
+    #[inline]
+    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+        if let Some(scattered) = scattered {
+            self.caustic &= !scattered.lobe.has(LobeSet::BROAD);
+            self.unreachable &= scattered.lobe == LobeSet::DELTA;
+        }
+        let lobes = vertex.shading.bsdf.lobes();
+        let gathers = lobes.has(LobeSet::BROAD) || (self.unreachable && lobes.has(LobeSet::SHARP));
+        if scattered.is_some() && gathers {
+            let flags =
+                u8::from(self.caustic) * PhotonFlags::CAUSTIC | u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
+            self.photons.push(Photon {
+                p: vertex.surface.p,
+                wi: vertex.wo,
+                ng: vertex.surface.ng,
+                flux: vertex.throughput,
+                flags: PhotonFlags(flags),
+                depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+            });
+        }
+        Next::Continue(LobeSet::ALL)
+    }
+}
+
+/// Traces light path `index` of the pass and appends its photons.
+#[inline]
+pub fn light_path(scene: &Scene, pass: &LightPass, index: u32, photons: &mut Vec<Photon>) {
+    let Some(emitted) = pass.emit(scene, index) else { return };
+    let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
+    walk(scene, emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
+}

@@ -1,0 +1,17 @@
+//! Light transport: the one bounce loop, and the visitors that make algorithms of it.
+
+mod direct;
+mod eye;
+mod interior;
+mod light;
+mod segment;
+mod walk;
+
+pub use direct::{balance, direct_light};
+pub use eye::{
+    EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, eye_path, gather_point, same_surface,
+};
+pub use interior::{Crossing, Interior};
+pub use light::{Emitted, LightPass, light_path};
+pub use segment::{Arrival, End, next_surface, transmittance};
+pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

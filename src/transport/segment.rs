@@ -1,0 +1,161 @@
+//! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
+
+use super::interior::{Crossing, Interior, ior};
+use crate::bsdf::Parameters;
+use crate::geometry::Surface;
+use crate::math::{Rgb, Vec3};
+use crate::scene::Scene;
+use crate::trace::Ray;
+
+/// Boundaries without scattering that a segment may cross; more are taken for a numerical trap and end the path.
+const MAX_NULL_CROSSINGS: u32 = 256;
+
+/// The next scattering surface along a ray.
+pub struct Arrival {
+    /// The surface.
+    pub surface: Surface,
+    /// Its material's parameters there.
+    pub parameters: Parameters,
+    /// For the surface of a solid: what is on its sides.
+    pub crossing: Option<Crossing>,
+    /// The solids the ray was in when it arrived.
+    pub interior: Interior,
+    /// What absorption and tinted boundaries on the way have left.
+    pub transmittance: Rgb,
+    /// Length of the way.
+    pub distance: f32,
+}
+
+/// How a ray ended.
+// Boxing the large variant would allocate once per ray.
+#[allow(clippy::large_enum_variant)]
+pub enum End {
+    /// At a surface.
+    Surface(Arrival),
+    /// It left the scene, with this transmittance.
+    Escaped(Rgb),
+    /// In a numerical trap.
+    Lost,
+}
+
+/// Beer-Lambert over `distance`; an infinite way through anything that absorbs leaves nothing.
+#[inline]
+fn absorb(scene: &Scene, interior: &Interior, distance: f32) -> Rgb {
+    match interior.medium(scene) {
+        None => Rgb::ONE,
+        Some(medium) => {
+            let through = |sigma: f32| if sigma > 0.0 { (-sigma * distance).exp() } else { 1.0 };
+            let sigma = medium.sigma_a;
+            Rgb::new(through(sigma.x), through(sigma.y), through(sigma.z))
+        }
+    }
+}
+
+/// What a surface hit by a ray is.
+#[allow(clippy::large_enum_variant)]
+enum Boundary {
+    /// Nothing: go on behind it with this tint and interior.
+    None(Rgb, Interior),
+    /// A scattering surface.
+    Scattering(Parameters, Option<Crossing>),
+}
+
+#[inline]
+fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3) -> Boundary {
+    let material = &scene.materials.list[surface.material as usize];
+    let textures = &scene.materials.textures;
+    if !material.is_solid_glass() {
+        // What covers an opaque body meets the medium around it, air or water.
+        let around = if scene.survey.solids { interior.ior(scene) } else { 1.0 };
+        return Boundary::Scattering(material.parameters(surface, textures, material.ior / around), None);
+    }
+    let entering = direction.dot(surface.ng) < 0.0;
+    let object = scene.shapes.instances[surface.instance as usize].object;
+    let crossing = interior.crossing(scene, object, surface.material, entering);
+    if crossing.is_nothing() {
+        return Boundary::None(Rgb::ONE, crossing.interior);
+    }
+    let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
+    let eta = if entering { after / before } else { before / after };
+    let parameters = material.parameters(surface, textures, eta);
+    if eta == 1.0 && parameters.is_pure_transmission() {
+        return Boundary::None(parameters.base_color, crossing.interior);
+    }
+    Boundary::Scattering(parameters, Some(crossing))
+}
+
+/// Follows a ray from inside `interior` to the next surface that scatters.
+#[inline]
+pub fn next_surface(scene: &Scene, origin: Vec3, direction: Vec3, interior: Interior, token: u32) -> End {
+    let mut ray = Ray { origin, direction, tmax: f32::INFINITY, token };
+    let mut interior = interior;
+    let mut transmittance = Rgb::ONE;
+    let mut distance = 0.0;
+    for _ in 0..MAX_NULL_CROSSINGS {
+        let Some(hit) = scene.tracer.intersect(&ray) else {
+            if scene.survey.media {
+                transmittance *= absorb(scene, &interior, f32::INFINITY);
+            }
+            return End::Escaped(transmittance);
+        };
+        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
+            return End::Lost;
+        };
+        distance += hit.t;
+        if scene.survey.media {
+            transmittance *= absorb(scene, &interior, hit.t);
+        }
+        match boundary(scene, &surface, &interior, direction) {
+            Boundary::Scattering(parameters, crossing) => {
+                let arrival = Arrival { surface, parameters, crossing, interior, transmittance, distance };
+                return End::Surface(arrival);
+            }
+            Boundary::None(tint, behind) => {
+                transmittance *= tint;
+                interior = behind;
+                ray.origin = surface.spawn(direction);
+            }
+        }
+    }
+    End::Lost
+}
+
+/// What is left of light between `origin` and the point `tmax` away along the unit `direction`: zero if anything scatters
+/// there, else absorption and tints.
+#[inline]
+pub fn transmittance(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, interior: Interior, token: u32) -> Rgb {
+    let mut ray = Ray { origin, direction, tmax, token };
+    if !scene.survey.null_boundaries {
+        if scene.tracer.occluded(&ray) {
+            return Rgb::ZERO;
+        }
+        return if scene.survey.media { absorb(scene, &interior, tmax) } else { Rgb::ONE };
+    }
+    let mut interior = interior;
+    let mut left = Rgb::ONE;
+    for _ in 0..MAX_NULL_CROSSINGS {
+        let Some(hit) = scene.tracer.intersect(&ray) else {
+            return if scene.survey.media { left * absorb(scene, &interior, ray.tmax) } else { left };
+        };
+        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
+            return Rgb::ZERO;
+        };
+        if scene.survey.media {
+            left *= absorb(scene, &interior, hit.t);
+        }
+        match boundary(scene, &surface, &interior, direction) {
+            Boundary::Scattering(..) => return Rgb::ZERO,
+            Boundary::None(tint, behind) => {
+                left *= tint;
+                interior = behind;
+                let next = surface.spawn(direction);
+                ray.tmax -= (next - ray.origin).dot(direction);
+                ray.origin = next;
+                if ray.tmax <= 0.0 {
+                    return left;
+                }
+            }
+        }
+    }
+    Rgb::ZERO
+}

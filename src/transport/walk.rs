@@ -1,0 +1,165 @@
+//! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm is a
+//! [`Visitor`].
+
+use super::interior::Interior;
+use super::segment::{Arrival, End, next_surface};
+use crate::bsdf::{Bsdf, LobeSet, Shading, Transport};
+use crate::geometry::Surface;
+use crate::math::{Rgb, Vec3};
+use crate::random::{Draws, Purpose, Stream};
+use crate::scene::Scene;
+
+/// After this many bounces even a path that loses nothing may end: it goes on with probability [`LATE_SURVIVAL`] at most, so that light
+/// trapped between perfect mirrors ends without a limit on depth.
+const LATE: u32 = 64;
+const LATE_SURVIVAL: f32 = 0.95;
+
+/// Least probability of going on: keeps the weight of what survives bounded.
+const LEAST_SURVIVAL: f32 = 0.02;
+
+/// Where a path starts.
+#[derive(Clone, Copy, Debug)]
+pub struct PathStart {
+    /// Origin of the first ray, off any surface.
+    pub origin: Vec3,
+    /// Unit direction of the first ray.
+    pub direction: Vec3,
+    /// Weight of the path: flux or importance.
+    pub throughput: Rgb,
+    /// The solids the origin is in.
+    pub interior: Interior,
+}
+
+/// A vertex of a path on a surface.
+pub struct Vertex<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// How it scatters.
+    pub shading: &'a Shading,
+    /// Unit direction back along the path.
+    pub wo: Vec3,
+    /// Weight of the path up to here, before this vertex scatters.
+    pub throughput: Rgb,
+    /// Number of segments up to here: 1 at the first surface.
+    pub depth: u32,
+    /// Length of the last segment.
+    pub distance: f32,
+    /// Origin of the last segment.
+    pub from: Vec3,
+    /// The solids the path is in on the side of `wo`.
+    pub interior: Interior,
+    /// The solids behind the surface.
+    pub interior_behind: Interior,
+    /// Random numbers of this vertex.
+    pub draws: Draws,
+    survival_scale: f32,
+}
+
+/// How the last vertex sent the path here.
+#[derive(Clone, Copy, Debug)]
+pub struct Scattered {
+    /// Class of the lobe.
+    pub lobe: LobeSet,
+    /// Density per solid angle of the direction, times the probability that the path went on; for a delta lobe meaningless.
+    pub pdf_w: f32,
+}
+
+/// What a visitor wants next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// End the path.
+    Stop,
+    /// Go on with a direction from these lobes.
+    Continue(LobeSet),
+}
+
+/// Receives the vertices of a walk.
+pub trait Visitor {
+    /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
+    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next;
+    /// The path leaves the scene along `direction` with weight `throughput`; `from` is its last vertex.
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+        let _ = (direction, throughput, scattered);
+    }
+}
+
+impl Vertex<'_> {
+    /// Probability that the walk goes on from here if the visitor asks for the lobes of `set`. Known before a direction
+    /// is drawn, so that MIS weights can use it.
+    #[inline]
+    pub fn survival(&self, set: LobeSet) -> f32 {
+        let albedo = self.shading.albedo(self.wo, set);
+        let expected = (self.throughput * albedo).max_element() * self.survival_scale;
+        // Written so that NaN ends the path.
+        let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
+        if self.depth > LATE { survival.min(LATE_SURVIVAL) } else { survival }
+    }
+}
+
+/// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments.
+#[inline]
+pub fn walk<V: Visitor>(
+    scene: &Scene,
+    start: PathStart,
+    stream: Stream,
+    transport: Transport,
+    max_depth: u32,
+    visitor: &mut V,
+) {
+    let PathStart { mut origin, mut direction, mut throughput, mut interior } = start;
+    let survival_scale = 1.0 / throughput.max_element();
+    if !survival_scale.is_finite() {
+        return;
+    }
+    let mut scattered = None;
+    for depth in 1..=max_depth {
+        let token = stream.vertex(depth - 1).token(Purpose::Alpha);
+        let arrival = match next_surface(scene, origin, direction, interior, token) {
+            End::Surface(arrival) => arrival,
+            End::Escaped(left) => {
+                visitor.escape(direction, throughput * left, scattered);
+                return;
+            }
+            End::Lost => return,
+        };
+        let Arrival { surface, parameters, crossing, interior: here, transmittance, distance } = arrival;
+        throughput *= transmittance;
+        let material = &scene.materials.list[surface.material as usize];
+        let frame = material.shading_frame(&surface, &scene.materials.textures);
+        let shading = Shading { frame, ng: surface.ng, bsdf: Bsdf::new(&parameters, &scene.tables) };
+        let behind = crossing.map_or(here, |c| c.interior);
+        let draws = stream.vertex(depth);
+        let vertex = Vertex {
+            surface: &surface,
+            shading: &shading,
+            wo: -direction,
+            throughput,
+            depth,
+            distance,
+            from: origin,
+            interior: here,
+            interior_behind: behind,
+            draws,
+            survival_scale,
+        };
+        let set = match visitor.surface(&vertex, scattered) {
+            Next::Stop => return,
+            Next::Continue(set) => set & shading.bsdf.lobes(),
+        };
+        if set.is_empty() || depth == max_depth {
+            return;
+        }
+        let survival = vertex.survival(set);
+        if draws.one(Purpose::Roulette) >= survival {
+            return;
+        }
+        let sample =
+            shading.sample(-direction, transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
+        let Some(sample) = sample else { return };
+        throughput *= sample.weight / survival;
+        scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
+        direction = sample.wi;
+        origin = surface.spawn(direction);
+        interior = if sample.transmitted { behind } else { here };
+    }
+}

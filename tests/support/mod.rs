@@ -1,0 +1,5 @@
+//! What integration tests share.
+#![allow(dead_code)]
+
+pub mod scenes;
+pub mod stats;

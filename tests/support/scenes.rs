@@ -1,0 +1,139 @@
+//! Scenes made in code, for closed-form tests.
+
+use caustique::geometry::Mesh;
+use caustique::material::Material;
+use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec3};
+use caustique::scene::description::{CameraDescription, Description, Placed, Projection, PunctualKind, PunctualLight};
+use caustique::scene::{Scene, View};
+
+/// A diffuse material of some reflectance that gives some radiance, without any Fresnel layer.
+pub fn matte(reflectance: f32, emission: f32) -> Material {
+    Material {
+        base_color: [reflectance, reflectance, reflectance, 1.0],
+        metallic: 0.0,
+        specular: 0.0,
+        emission: Rgb::splat(emission),
+        ..Material::default()
+    }
+}
+
+/// Perfectly smooth solid glass.
+pub fn glass(ior: f32) -> Material {
+    Material { metallic: 0.0, roughness: 0.0, transmission: 1.0, thin: false, ior, ..Material::default() }
+}
+
+/// A perfect mirror.
+pub fn mirror() -> Material {
+    Material { metallic: 1.0, roughness: 0.0, ..Material::default() }
+}
+
+/// Adds a mesh with its own material.
+pub fn add(description: &mut Description, name: &str, mesh: Mesh, material: Material) {
+    add_at(description, name, mesh, material, DAffine3::IDENTITY);
+}
+
+/// Adds a mesh with its own material, placed.
+pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: Material, to_world: DAffine3) {
+    description.instances.push(Placed {
+        name: name.into(),
+        mesh: description.meshes.len() as u32,
+        material: description.materials.len() as u32,
+        object: description.objects.len() as u32,
+        to_world,
+    });
+    description.objects.push(name.into());
+    description.meshes.push(Mesh { name: name.into(), ..mesh });
+    description.materials.push(Material { name: name.into(), ..material });
+}
+
+/// A parallelogram from a corner and two edges; its front is the side from which the edges turn counter-clockwise.
+pub fn quad(corner: Vec3, a: Vec3, b: Vec3) -> Mesh {
+    Mesh {
+        positions: vec![corner, corner + a, corner + a + b, corner + b],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
+}
+
+/// A closed axis-aligned box, its front inside (`inward`) or outside.
+pub fn cuboid(low: Vec3, high: Vec3, inward: bool) -> Mesh {
+    let corner = |i: u32| Vec3::select(glam_mask(i), high, low);
+    let positions = (0..8).map(corner).collect();
+    let mut triangles = vec![];
+    for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+        for t in [[a, b, c], [a, c, d]] {
+            triangles.push(if inward { [t[0], t[2], t[1]] } else { t });
+        }
+    }
+    Mesh { positions, triangles, closed: true, ..Mesh::default() }
+}
+
+fn glam_mask(i: u32) -> glam::BVec3 {
+    glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0)
+}
+
+/// A sphere of latitude-longitude triangles with smooth normals, its front outside.
+pub fn sphere(center: Vec3, radius: f32, segments: u32) -> Mesh {
+    let rings = segments / 2;
+    let mut mesh = Mesh { closed: true, ..Mesh::default() };
+    for i in 0..=rings {
+        for j in 0..segments {
+            let theta = std::f64::consts::PI * f64::from(i) / f64::from(rings);
+            let phi = std::f64::consts::TAU * f64::from(j) / f64::from(segments);
+            let n = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()).as_vec3();
+            mesh.positions.push(center + n * radius);
+            mesh.normals.push(n);
+        }
+    }
+    for i in 0..rings {
+        for j in 0..segments {
+            let k = (j + 1) % segments;
+            let (a, b, c, d) = (i * segments + j, i * segments + k, (i + 1) * segments + j, (i + 1) * segments + k);
+            if i > 0 {
+                mesh.triangles.push([a, b, c]);
+            }
+            if i + 1 < rings {
+                mesh.triangles.push([b, d, c]);
+            }
+        }
+    }
+    mesh
+}
+
+/// A pinhole camera at `eye` that looks at `target`.
+pub fn look_at(eye: DVec3, target: DVec3, yfov_deg: f32) -> CameraDescription {
+    let back = (eye - target).normalize();
+    let up = if back.y.abs() > 0.99 { DVec3::Z } else { DVec3::Y };
+    let right = up.cross(back).normalize();
+    CameraDescription {
+        name: "camera".into(),
+        to_world: DAffine3 { matrix3: DMat3::from_cols(right, back.cross(right), back), translation: eye },
+        projection: Projection::Perspective { yfov: yfov_deg.to_radians(), aspect: Some(1.0) },
+        aperture_radius: 0.0,
+        focus_distance: 1.0,
+    }
+}
+
+/// A point light.
+pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
+    PunctualLight {
+        name: "point".into(),
+        to_world: DAffine3::from_translation(p),
+        intensity: Rgb::splat(intensity),
+        kind: PunctualKind::Point,
+        radius: 0.0,
+    }
+}
+
+/// Builds a scene, panicking with the error: tests know their scenes are good.
+pub fn build(description: Description) -> Scene {
+    match Scene::build(description, 1) {
+        Ok(scene) => scene,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// A view of `size x size` pixels.
+pub fn square(size: u32) -> View {
+    View { camera: None, width: Some(size), height: Some(size) }
+}
