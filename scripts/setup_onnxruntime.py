@@ -70,11 +70,11 @@ def find():
 
 def unpack(wheel):
     """Copies libonnxruntime.so.X.Y.Z from the wheel and links libonnxruntime.so to it."""
-    UNPACKED.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(wheel) as archive:
         inside = [n for n in archive.namelist() if re.fullmatch(r".*/libonnxruntime\.so\.[0-9.]+", n)]
         if len(inside) != 1:
             sys.exit(f"{wheel}: one libonnxruntime.so expected, found {inside}")
+        UNPACKED.mkdir(parents=True, exist_ok=True)
         target = UNPACKED / Path(inside[0]).name
         partial = target.with_name(".partial")
         with archive.open(inside[0]) as source, open(partial, "wb") as sink:
