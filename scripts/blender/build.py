@@ -245,6 +245,20 @@ def rounded(points, radius, steps=6):
     return result + [points[-1]]
 
 
+def polyhedron(name, planes, reach=4.0):
+    """The flat-faced convex body of all points x with normal . x <= offset for every (normal, offset)."""
+    shape = bmesh.new()
+    bmesh.ops.create_cube(shape, size=reach)
+    for normal, offset in planes:
+        axis = Vector(normal).normalized()
+        cut = bmesh.ops.bisect_plane(shape, geom=shape.verts[:] + shape.edges[:] + shape.faces[:], dist=1e-6,
+                                     plane_co=axis * (offset / Vector(normal).length), plane_no=axis, clear_outer=True)
+        rim = [e for e in cut["geom_cut"] if isinstance(e, bmesh.types.BMEdge) and e.is_valid]
+        if rim:
+            bmesh.ops.contextual_create(shape, geom=rim)
+    return finish_mesh(name, shape, smooth=False)
+
+
 def torus(name, major, minor, around=192, about=96):
     """A ring about Z: `major` to the middle of the tube, `minor` the tube's radius."""
     shape = bmesh.new()
@@ -256,6 +270,75 @@ def torus(name, major, minor, around=192, about=96):
             k, m = (i + 1) % around, (j + 1) % about
             shape.faces.new((rings[i][j], rings[k][j], rings[k][m], rings[i][m]))
     return finish_mesh(name, shape)
+
+
+def tube(name, path, radius, sides=24, closed=False):
+    """A round tube along a path of points, its ends capped unless `closed`."""
+    points = [Vector(p) for p in path]
+    shape, rings, across = bmesh.new(), [], None
+    for i, here in enumerate(points):
+        before = points[i - 1] if i or closed else here
+        after = points[(i + 1) % len(points)] if i + 1 < len(points) or closed else here
+        along = (after - before).normalized()
+        across = along.orthogonal() if across is None else across - along * across.dot(along)
+        across.normalize()
+        other = along.cross(across)
+        turns = [2 * math.pi * k / sides for k in range(sides)]
+        rings.append([shape.verts.new(here + (across * math.cos(t) + other * math.sin(t)) * radius) for t in turns])
+    for lower, upper in zip(rings, rings[1:] + (rings[:1] if closed else [])):
+        for i in range(sides):
+            j = (i + 1) % sides
+            shape.faces.new((lower[i], lower[j], upper[j], upper[i]))
+    if not closed:
+        shape.faces.new(rings[0])
+        shape.faces.new(rings[-1])
+    mesh = finish_mesh(name, shape)
+    mesh.set_sharp_from_angle(angle=math.radians(50))
+    return mesh
+
+
+def arc(points, radius, steps=10):
+    """A path of points in space with its inner corners rounded."""
+    result = [Vector(points[0])]
+    for a, b, c in zip(*(map(Vector, points[i:]) for i in range(3))):
+        reach = min(radius, (a - b).length * 0.49, (c - b).length * 0.49)
+        start, end = b + (a - b).normalized() * reach, b + (c - b).normalized() * reach
+        result += [start * (1 - t) ** 2 + b * 2 * t * (1 - t) + end * t ** 2 for t in (k / steps for k in range(steps + 1))]
+    return result + [Vector(points[-1])]
+
+
+def sheet(name, columns, rows, position, bottom=None, uv=False):
+    """A smooth grid of `position(u, v)` -> (x, y, z), u and v in [0, 1]; `bottom` closes it down to that height."""
+    shape = bmesh.new()
+    grid = [[shape.verts.new(position(i / columns, j / rows)) for i in range(columns + 1)] for j in range(rows + 1)]
+    for j in range(rows):
+        for i in range(columns):
+            shape.faces.new((grid[j][i], grid[j][i + 1], grid[j + 1][i + 1], grid[j + 1][i]))
+    if uv:
+        layer, index = shape.loops.layers.uv.verify(), {v: k for k, v in enumerate(v for row in grid for v in row)}
+        for face in shape.faces:
+            for loop in face.loops:
+                k = index[loop.vert]
+                loop[layer].uv = (k % (columns + 1) / columns, k // (columns + 1) / rows)
+    if bottom is not None:
+        rim = (grid[0][:-1] + [row[-1] for row in grid[:-1]] + grid[-1][:0:-1] + [row[0] for row in grid[:0:-1]])
+        foot = [shape.verts.new((v.co.x, v.co.y, bottom)) for v in rim]
+        for k in range(len(rim)):
+            m = (k + 1) % len(rim)
+            shape.faces.new((rim[m], rim[k], foot[k], foot[m]))
+        shape.faces.new(foot[::-1])
+    mesh = finish_mesh(name, shape) if bottom is not None else _raw(name, shape)
+    if bottom is not None:
+        mesh.set_sharp_from_angle(angle=math.radians(50))
+    return mesh
+
+
+def _raw(name, shape):
+    mesh = bpy.data.meshes.new(name)
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.shade_smooth()
+    return mesh
 
 
 # Light and eye
@@ -349,6 +432,9 @@ def _preview(path, samples, percentage):
     scene.cycles.transmission_bounces = scene.cycles.glossy_bounces = scene.cycles.diffuse_bounces = 16
     scene.cycles.sample_clamp_indirect = 0
     scene.cycles.blur_glossy = 0
+    for body in scene.objects:  # a path tracer finds few of these caustics: let clear things pass the light unbent
+        if body.type == "MESH" and any(export.may_transmit(m) for m in body.data.materials):
+            body.visible_shadow = body.visible_diffuse = False
     scene.render.resolution_percentage = int(percentage)
     scene.view_settings.view_transform = "AgX"
     scene.render.filepath = path

@@ -122,7 +122,7 @@ def _bodies():
         if thing.type not in {"MESH", "CURVE", "SURFACE", "FONT", "META"}:
             continue
         materials = [slot.material.original for slot in thing.material_slots if slot.material is not None]
-        if not any(_may_transmit(m) for m in materials):
+        if not any(may_transmit(m) for m in materials):
             continue
         key = thing.original.name
         if key not in shapes:
@@ -136,7 +136,8 @@ def _bodies():
     return bodies
 
 
-def _may_transmit(material):
+def may_transmit(material):
+    """Whether light may pass into what wears this material."""
     output = shading.output_of(material.node_tree) if material.use_nodes else None
     if output is None:
         return False
