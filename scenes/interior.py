@@ -38,11 +38,11 @@ def kilim(width=512, height=352):
     y, x = np.mgrid[0:height, 0:width]
     x, y = np.floor(x / 4) * 4, np.floor(y / 4) * 4
     edge = np.minimum(np.minimum(x, width - 4 - x), np.minimum(y, height - 4 - y))
-    step = (np.abs((x - width / 2) % 128 - 64) + np.abs((y - height / 2) % 128 - 64))
+    step = (np.abs((x - width / 2) % 96 - 48) + np.abs((y - height / 2 + 48) % 96 - 48))
     cream, madder, indigo, ochre = (0.80, 0.73, 0.60), (0.58, 0.20, 0.14), (0.14, 0.20, 0.34), (0.76, 0.54, 0.24)
     color = np.empty((height, width, 3))
     color[:] = madder
-    for reach, tint in ((92, cream), (84, indigo), (56, cream), (48, ochre), (24, madder)):
+    for reach, tint in ((66, cream), (60, indigo), (42, cream), (36, ochre), (18, madder)):
         color[step < reach] = tint
     color[edge < 44] = cream
     color[(edge < 38) & ((np.floor((x + y) / 16) % 2) == 0)] = indigo
@@ -67,7 +67,7 @@ def canvas(width=640, height=448):
 oak = b.principled("oak floor", roughness=0.16, texture=b.image("oak floor", parquet()))
 wood = b.principled("walnut", roughness=0.18, texture=b.image("walnut", walnut()))
 wall = b.principled("wall paint", (0.66, 0.63, 0.57), 0.9, Specular_IOR_Level=0.2)
-accent = b.principled("accent paint", (0.28, 0.37, 0.37), 0.85, Specular_IOR_Level=0.2)
+accent = b.principled("accent paint", (0.36, 0.46, 0.45), 0.85, Specular_IOR_Level=0.2)
 white = b.principled("ceiling", (0.84, 0.83, 0.80), 0.9, Specular_IOR_Level=0.0)
 trim = b.principled("trim", (0.80, 0.79, 0.76), 0.35)
 brass = b.metal("brass", (0.87, 0.67, 0.36), 0.18)
@@ -112,7 +112,7 @@ def pillow(name, size, power=0.42, columns=64, rows=32):
 
 
 # Sofa before the back wall.
-SOFA = (-0.35, 1.93)
+SOFA = (-0.25, 1.93)
 for name, size, at in (("sofa base", (2.30, 0.90, 0.20), (0, 0, 0.25)), ("sofa back", (2.30, 0.20, 0.55), (0, 0.36, 0.56)),
                        ("sofa arm", (0.18, 0.92, 0.46), (-1.16, 0, 0.39)), ("sofa arm", (0.18, 0.92, 0.46), (1.16, 0, 0.39))):
     b.thing(name, b.box(name, size, 0.05, 6), linen, (SOFA[0] + at[0], SOFA[1] + at[1], at[2]))
@@ -130,7 +130,7 @@ for material, x, lean, turn in ((teal, -0.90, 62, 14), (ochre, -0.60, 58, -8), (
     b.thing("cushion", mesh, material, (SOFA[0] + x, SOFA[1] + 0.0, 0.72), (lean, 0, turn))
 
 # A velvet armchair on the right, turned to the table.
-CHAIR = b.Matrix.Translation((1.72, 0.55, 0)) @ b.Matrix.Rotation(math.radians(-68), 4, "Z")
+CHAIR = b.Matrix.Translation((1.58, 0.40, 0)) @ b.Matrix.Rotation(math.radians(-68), 4, "Z")
 for name, size, at, lean in (("chair seat", (0.66, 0.66, 0.20), (0, 0, 0.36), 0), ("chair back", (0.66, 0.17, 0.58), (0, 0.31, 0.62), -12),
                              ("chair arm", (0.13, 0.66, 0.36), (-0.37, 0.02, 0.43), 0), ("chair arm", (0.13, 0.66, 0.36), (0.37, 0.02, 0.43), 0)):
     body = b.thing(name, b.box(name, size, 0.06, 8), velvet)
@@ -151,10 +151,10 @@ def pile(u, v):
     return (u - 0.5) * 2.9, (v - 0.5) * 2.0, 0.004 + min(border * 60, 1) * (0.008 + 0.007 * height)
 
 
-b.thing("rug", b.sheet("rug", 232, 160, pile, uv=True), b.principled("rug", roughness=1.0, texture=b.image("rug", kilim()), Specular_IOR_Level=0.0), (-0.15, 0.55, 0), (0, 0, 3))
+b.thing("rug", b.sheet("rug", 232, 160, pile, uv=True), b.principled("rug", roughness=1.0, texture=b.image("rug", kilim()), Specular_IOR_Level=0.0), (-0.10, 0.45, 0), (0, 0, 3))
 
 # A round table of black lacquer on brass legs: the glossy heart of the room.
-TABLE = (-0.20, 0.72)
+TABLE = (-0.20, 0.52)
 b.thing("table top", b.lathe("table top", b.rounded([(0, 0), (0.49, 0), (0.50, 0.03), (0, 0.03)], 0.010), 160), black, (*TABLE, 0.40))
 for k in range(3):
     turn = math.radians(120 * k + 40)
@@ -178,10 +178,10 @@ b.thing("saucer", b.lathe("saucer", b.rounded([(0, 0), (0.03, 0), (0.07, 0.011),
 b.thing("coffee", b.lathe("coffee", [(0, 0), (0.0335, 0)], 64), b.principled("coffee", (0.05, 0.022, 0.01), 0.05), (TABLE[0] + 0.08, TABLE[1] - 0.27, 0.4765))
 
 # The painting, in a thin brass frame.
-b.thing("painting", b.sheet("painting", 1, 1, lambda u, v: ((u - 0.5) * 1.30, 0, (v - 0.5) * 0.91), uv=True), b.principled("painting", roughness=0.55, texture=b.image("painting", canvas())), (-0.35, 2.465, 1.66))
+b.thing("painting", b.sheet("painting", 1, 1, lambda u, v: ((u - 0.5) * 1.30, 0, (v - 0.5) * 0.91), uv=True), b.principled("painting", roughness=0.55, texture=b.image("painting", canvas())), (SOFA[0], 2.465, 1.62))
 for name, size, at in (("frame side", (0.03, 0.045, 0.97), (-0.665, 0, 0)), ("frame side", (0.03, 0.045, 0.97), (0.665, 0, 0)),
                        ("frame edge", (1.36, 0.045, 0.03), (0, 0, 0.47)), ("frame edge", (1.36, 0.045, 0.03), (0, 0, -0.47))):
-    b.thing(name, b.box(name, size, 0.005), brass, (-0.35 + at[0], 2.475, 1.66 + at[2]))
+    b.thing(name, b.box(name, size, 0.005), brass, (SOFA[0] + at[0], 2.475, 1.62 + at[2]))
 
 # Bookcase against the right wall, full of books.
 CASE_X, CASE_Y, CASE_W, CASE_H = WIDE / 2 - 0.17, 1.35, 1.7, 2.05
@@ -225,7 +225,7 @@ for y in (0.05, 1.42):
 b.thing("curtain rod", b.tube("curtain rod", [(-WIDE / 2 + 0.13, -0.85, 2.54), (-WIDE / 2 + 0.13, 2.25, 2.54)], 0.014), brass)
 
 # A fig in a glazed pot, in the corner behind the sofa's left end.
-POT = (-2.25, 1.45)
+POT = (-1.93, 2.02)
 b.thing("pot", b.lathe("pot", b.rounded([(0, 0), (0.14, 0), (0.19, 0.34), (0.175, 0.34), (0.16, 0.30), (0, 0.30)], 0.03, 6), 128), porcelain, (*POT, 0))
 b.thing("soil", b.lathe("soil", [(0, 0.305), (0.165, 0.305)], 64), soil, (*POT, 0))
 
@@ -251,7 +251,7 @@ for k in range(4):
 shade = b.lathe("torchiere bowl", b.rounded([(0, 0), (0.03, 0), (0.16, 0.10), (0.165, 0.15), (0.16, 0.15), (0.153, 0.105), (0.025, 0.01), (0, 0.01)], 0.02, 8), 128)
 disc = b.lathe("torchiere disc", [(0, 0), (0.10, 0)], 64, sharp=0)
 disc.flip_normals() if disc.polygons[0].normal.z < 0 else None
-glow = b.emission("torchiere disc", (680, 520, 350))
+glow = b.emission("torchiere disc", (1650, 1270, 860))
 stand = b.lathe("torchiere stand", b.rounded([(0, 0), (0.15, 0), (0.15, 0.02), (0.011, 0.035), (0.011, 1.80), (0, 1.80)], 0.008, 4), 64)
 for x, y in ((2.35, 2.20), (-2.55, 2.10)):
     b.thing("torchiere stand", stand, brass, (x, y, 0))
@@ -260,7 +260,7 @@ for x, y in ((2.35, 2.20), (-2.55, 2.10)):
 sconce = b.lathe("sconce", b.rounded([(0, 0), (0.05, 0), (0.09, 0.14), (0.085, 0.14), (0.045, 0.008), (0, 0.008)], 0.01, 6), 96)
 for y in (-1.3, 0.1):
     b.thing("sconce", sconce, brass, (WIDE / 2 - 0.11, y, 1.75))
-    b.point("sconce lamp", (WIDE / 2 - 0.11, y, 1.835), 26, (1.0, 0.80, 0.56), 0.02)
+    b.point("sconce lamp", (WIDE / 2 - 0.11, y, 1.835), 55, (1.0, 0.80, 0.56), 0.02)
 
-b.camera((-1.55, -2.36, 1.40), (0.22, 1.35, 0.93), lens=26)
+b.camera((-1.55, -2.36, 1.35), (0.05, 1.35, 0.86), lens=29)
 b.finish(__file__)
