@@ -65,6 +65,7 @@ def write(path, scene=None):
     document, buffer = glb.read(path)
     _finish_materials(document, bodies, warn)
     _finish_nodes(document, scene, warn)
+    _finish_lamps(document)
     said = lighting.world_extras(scene, path, warn)
     if said:
         document["scenes"][document.get("scene", 0)].setdefault("extras", {}).setdefault("caustique", {}).update(said)
@@ -108,7 +109,7 @@ def _worn(things):
     found = {}
     for thing in [*things, *inside]:
         for slot in thing.material_slots:
-            if slot.material is not None and slot.material.node_tree is not None and slot.material.use_nodes:
+            if slot.material is not None and shading.nodes_of(slot.material) is not None:
                 found[slot.material.name] = slot.material
     return list(found.values())
 
@@ -138,7 +139,7 @@ def _bodies():
 
 def may_transmit(material):
     """Whether light may pass into what wears this material."""
-    output = shading.output_of(material.node_tree) if material.use_nodes else None
+    output = shading.output_of(shading.nodes_of(material))
     if output is None:
         return False
     if output.inputs["Volume"].is_linked:
@@ -166,7 +167,7 @@ def _closed(mesh):
 def _finish_materials(document, bodies, warn):
     for entry in document.get("materials", []):
         material = bpy.data.materials.get(entry.get("name", ""))
-        if material is not None and material.node_tree is not None:
+        if material is not None and shading.nodes_of(material) is not None:
             closed, least = bodies.get(material.name, (False, 0.0))
             shading.finish(entry, material, closed, least, warn)
 
@@ -186,6 +187,14 @@ def _finish_nodes(document, scene, warn):
         if said:
             holder.setdefault("extras", {}).setdefault("caustique", {}).update(said)
     _active_camera_first(document, scene)
+
+
+def _finish_lamps(document):
+    """A lamp's Emission node multiplies its power and colour; the exporter takes them one for the other."""
+    for entry in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
+        light = bpy.data.lights.get(entry.get("name", ""))
+        if light is not None and lighting.emission_node(light) is not None:
+            entry.update(lighting.punctual(light))
 
 
 def _active_camera_first(document, scene):

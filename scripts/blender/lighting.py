@@ -6,22 +6,48 @@ import os
 import bpy
 from mathutils import Matrix
 
-from shading import constant, leaves, medium, output_of, source
+from shading import constant, medium, nodes_of, output_of, source
 
 _DISC_SIDES = 64
 
 
-def area_radiance(light):
-    """Radiance (W/sr/m2) of an area light of `light.energy` W: a Lambertian emitter gives off pi L A."""
+def emission_node(light):
+    """The Emission node that shades a lamp, or None."""
+    output = output_of(nodes_of(light))
+    shader = source(output.inputs["Surface"]) if output is not None else None
+    return shader if shader is not None and shader.type == "EMISSION" else None
+
+
+def _power(light):
+    """What a lamp gives off, per channel: W, or W/m2 of the sun."""
     power = light.energy * 2 ** getattr(light, "exposure", 0)
     tint = list(light.color)
     if getattr(light, "use_temperature", False):
         tint = [a * b for a, b in zip(tint, light.temperature_color)]
+    node = emission_node(light)
+    if node is not None:
+        power *= constant(node.inputs["Strength"], 1.0)
+        tint = [a * b for a, b in zip(tint, constant(node.inputs["Color"], [1.0] * 3))]
+    return [c * power for c in tint]
+
+
+def area_radiance(light):
+    """Radiance (W/sr/m2) of an area light: a Lambertian emitter of area A gives off pi L A."""
     size_x, size_y = _size(light)
     area = size_x * size_y * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1)
     if not getattr(light, "normalize", True):
         area = 1  # the energy is then per square metre
-    return [c * power / (math.pi * area) for c in tint]
+    return [p / (math.pi * area) for p in _power(light)]
+
+
+def punctual(light):
+    """`color` and `intensity` (cd, or lx of the sun, 683 lm/W) of a point, spot or sun lamp, nodes counted."""
+    power = _power(light)
+    if light.type != "SUN" and not getattr(light, "normalize", True):
+        power = [p * light.area() for p in power]
+    strongest = max(max(power), 1e-30)
+    lumens = 683 * (1 if light.type == "SUN" else 1 / (4 * math.pi))
+    return {"color": [p / strongest for p in power], "intensity": strongest * lumens}
 
 
 def _size(light):
@@ -74,13 +100,12 @@ def light_extras(thing, warn):
 
 
 def _warn_of_nodes(light, where, warn):
-    output = output_of(light.node_tree) if getattr(light, "use_nodes", False) else None
-    if output is None:
+    output = output_of(nodes_of(light))
+    if output is None or source(output.inputs["Surface"]) is None:
         return
-    for shader in leaves(source(output.inputs["Surface"])):
-        plain = all(constant(s) is not None for s in shader.inputs if s.name in {"Color", "Strength"})
-        if shader.type != "EMISSION" or not plain:
-            warn(where, "its shader nodes are not carried beyond a constant Emission")
+    node = emission_node(light)
+    if node is None or any(constant(node.inputs[name]) is None for name in ("Color", "Strength")):
+        warn(where, "its shader nodes are not carried beyond a constant Emission")
 
 
 def camera_extras(thing, warn):
@@ -109,9 +134,9 @@ def world_extras(scene, path, warn):
     if world is None:
         return {}
     where, said = f'world "{world.name}"', {}
-    output = output_of(world.node_tree) if world.node_tree and getattr(world, "use_nodes", True) else None
+    output = output_of(nodes_of(world))
     if output is None:
-        colour = list(world.color) if not getattr(world, "use_nodes", True) else []
+        colour = list(world.color) if nodes_of(world) is None else []
         return {"environment": {"color": colour}} if any(colour) else {}
     inside = medium(source(output.inputs["Volume"]), where, warn)
     if inside is not None:
@@ -185,6 +210,7 @@ def _beside(image, path):
         pixels = list(image.pixels)
         if image.colorspace_settings.name == "sRGB" and not image.is_float:
             pixels = [v if i % 4 == 3 else _linear(v) for i, v in enumerate(pixels)]
+        flat.colorspace_settings.name = "Non-Color"  # save the numbers as they are
         flat.pixels = pixels
         flat.file_format = "OPEN_EXR"
         flat.filepath_raw = os.path.join(os.path.dirname(path), name)
@@ -213,7 +239,7 @@ def _baked(scene, path, width=1024):
         camera.type = "PANO"
         (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
         stage.render.engine = "CYCLES"
-        stage.cycles.samples = 64
+        stage.cycles.samples = 16
         stage.cycles.use_denoising = False
         stage.render.resolution_x, stage.render.resolution_y = width, width // 2
         stage.render.resolution_percentage = 100

@@ -7,9 +7,16 @@ place of the common others while the export runs. `finish` then completes the wr
 
 import math
 
+import bpy
+
 _GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_METALLIC"}
 _GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
 _IMAGE_ONLY = ("Base Color", "Roughness", "Metallic", "Transmission Weight", "Alpha", "Emission Color")
+
+
+def nodes_of(block):
+    """The node tree that shades a material, light or world, or None. Since Blender 5 `use_nodes` says nothing."""
+    return block.node_tree if bpy.app.version >= (5, 0, 0) or block.use_nodes else None
 
 
 def output_of(tree, target="CYCLES"):
@@ -67,7 +74,7 @@ def _copy(tree, socket_from, socket_to):
 
 def principled(material, undo, warn):
     """Until `undo` (a contextlib.ExitStack) closes, let `material` end in a Principled or Emission shader."""
-    tree, output = material.node_tree, output_of(material.node_tree)
+    tree, output = nodes_of(material), output_of(nodes_of(material))
     where = f'material "{material.name}"'
     if output is None:
         return
@@ -207,7 +214,7 @@ def finish(entry, material, closed, thickness, warn):
     `closed` says whether every mesh that wears it is watertight, `thickness` is a length inside it in metres.
     """
     where = f'material "{material.name}"'
-    output = output_of(material.node_tree)
+    output = output_of(nodes_of(material))
     extensions = entry.setdefault("extensions", {})
     inside = medium(source(output.inputs["Volume"]), where, warn) if output is not None else None
     clear = extensions.get("KHR_materials_transmission")
@@ -238,7 +245,7 @@ def finish(entry, material, closed, thickness, warn):
 
 def _square_root_tint(entry, material):
     """Principled tints light once on its way through the body, glTF at each of the two surfaces."""
-    parts = leaves(source(output_of(material.node_tree).inputs["Surface"]))
+    parts = leaves(source(output_of(nodes_of(material)).inputs["Surface"]))
     pbr = entry.get("pbrMetallicRoughness", {})
     if [p.type for p in parts] == ["BSDF_PRINCIPLED"] and "baseColorFactor" in pbr and "baseColorTexture" not in pbr:
         *rgb, alpha = pbr["baseColorFactor"]
