@@ -15,7 +15,7 @@ use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, sppm};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::transport::path_radiance;
+use caustique::transport::{Eye, Interior, path_radiance};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -72,6 +72,8 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
 /// The same by path tracing with `paths` paths per pixel.
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
+    let interior = Interior::at(scene, camera.position());
+    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX };
     (0..seeds)
         .map(|seed| {
             let mut sum = 0.0;
@@ -79,7 +81,7 @@ fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
                 for pass in 0..paths {
                     let stream = Stream::new(seed, pass, Domain::EyeIndependent, index);
                     let pixel = ((index % u64::from(size)) as u32, (index / u64::from(size)) as u32);
-                    sum += f64::from(path_radiance(scene, &camera, pixel, stream, u32::MAX).x);
+                    sum += f64::from(path_radiance(&eye, pixel, stream).x);
                 }
             }
             sum / (f64::from(size * size) * paths as f64)
