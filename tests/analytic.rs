@@ -210,7 +210,8 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         let scene = build(description);
         let slabs = if through { 3 } else { 1 };
         let expected = f64::from(rho * e) / std::f64::consts::PI * slab(f64::from(n)).powi(slabs);
-        let check = Check { expected, bias: 4e-3, detects: 0.03 };
+        // A slab forgotten would be 8 %.
+        let check = Check { expected, bias: 4e-3, detects: if through { 0.06 } else { 0.03 } };
         check.run(what, &by_photons(&scene, &settings(4, 100_000, 0.25), 16, 20)[4]);
     }
 }

@@ -112,7 +112,9 @@ fn white_furnace() {
             if error > worst.0 {
                 worst = (error, format!("{name}, cosine {mu}: {albedo}"));
             }
-            if !(error < 0.005) { println!("FURNACE {name}, cosine {mu}: {albedo}"); }
+            if !(error < 0.005) {
+                println!("FURNACE {name}, cosine {mu}: {albedo}");
+            }
         }
     }
     println!("worst: {worst:?}");
