@@ -33,4 +33,8 @@ pub mod transport;
 
 pub mod estimator;
 
+pub mod film;
+
+pub mod image;
+
 pub mod render;
