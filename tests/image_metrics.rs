@@ -1,7 +1,7 @@
 //! Error metrics against closed forms and against the reference implementation of FLIP; tone curves against published values.
 
 use caustique::film::{Layer, LayerSet};
-use caustique::image::tonemap::srgb_decode;
+use caustique::image::tonemap::{ToneMap, srgb_decode};
 use caustique::image::{compare, flip, heat, metrics};
 use caustique::math::Rgb;
 
@@ -162,4 +162,62 @@ fn heat_grows_lighter() {
     }
     assert_eq!(heat::magma(f32::NAN), heat::magma(1.0));
     assert_eq!(heat::magma(-3.0), heat::magma(0.0));
+}
+
+/// What Blender 4.5 makes of scene-linear colours: view transform AgX, no look, display sRGB.
+const BLENDER_AGX: [([f32; 3], [f32; 3]); 8] = [
+    ([0.18, 0.18, 0.18], [0.4614, 0.4613, 0.4613]),
+    ([1.0, 1.0, 1.0], [0.771, 0.771, 0.771]),
+    ([0.5, 0.1, 0.05], [0.6973, 0.3518, 0.2416]),
+    ([4.0, 0.2, 0.1], [0.9908, 0.6461, 0.594]),
+    ([0.02, 0.3, 2.0], [0.4532, 0.6269, 0.8934]),
+    ([10.0, 10.0, 10.0], [0.9746, 0.9746, 0.9746]),
+    ([0.001, 0.002, 0.004], [0.0025, 0.0114, 0.0255]),
+    ([0.0, 1.0, 0.0], [0.4325, 0.7726, 0.3184]),
+];
+
+#[test]
+fn agx_looks_like_blenders() {
+    for (scene, display) in BLENDER_AGX {
+        let found = ToneMap::Agx.display(Rgb::from_array(scene), 0.0);
+        for c in 0..3 {
+            assert!((found[c] - display[c]).abs() < 0.006, "{scene:?}: {found}, expected {display:?}");
+        }
+    }
+}
+
+#[test]
+fn every_curve_keeps_order_and_bounds() {
+    for curve in [ToneMap::Agx, ToneMap::Filmic, ToneMap::Srgb] {
+        assert!(curve.display(Rgb::ZERO, 0.0).max_element() < 0.003, "{curve:?}");
+        let mut last = -1.0;
+        for i in -40..=40 {
+            let shown = curve.display(Rgb::splat((i as f32 / 2.0).exp2()), 0.0);
+            assert!(shown.min_element() >= 0.0 && shown.max_element() <= 1.0);
+            assert!(shown.x >= last, "{curve:?} at {i}");
+            last = shown.x;
+        }
+        assert!(last > 0.99, "{curve:?}: {last}");
+        // A stop of exposure doubles the light.
+        let (a, b) = (curve.display(Rgb::new(0.2, 0.1, 0.4), 1.0), curve.display(Rgb::new(0.4, 0.2, 0.8), 0.0));
+        assert!((a - b).abs().max_element() < 1e-6);
+        for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0] {
+            for ev in [-200.0, 0.0, 200.0] {
+                let shown = curve.display(Rgb::new(wild, 0.5, wild), ev);
+                assert!(
+                    shown.is_finite() && shown.min_element() >= 0.0 && shown.max_element() <= 1.0,
+                    "{curve:?} {wild}"
+                );
+            }
+        }
+        assert!(curve.display(Rgb::NAN, 0.0).max_element() < 0.003);
+    }
+}
+
+#[test]
+fn filmic_is_the_published_curve() {
+    // Narkowicz's fit at 0.6: (0.6 (2.51 0.6 + 0.03)) / (0.6 (2.43 0.6 + 0.59) + 0.14), sRGB-encoded.
+    let linear = 0.6 * (2.51 * 0.6 + 0.03) / (0.6 * (2.43 * 0.6 + 0.59) + 0.14);
+    let shown = ToneMap::Filmic.display(Rgb::ONE, 0.0).x;
+    assert!((srgb_decode(shown) - linear).abs() < 1e-5);
 }
