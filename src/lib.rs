@@ -37,4 +37,6 @@ pub mod film;
 
 pub mod image;
 
+pub mod combine;
+
 pub mod render;
