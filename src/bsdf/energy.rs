@@ -1,36 +1,40 @@
 //! Directional albedos of the microfacet lobes, tabulated, so that what single scattering loses can be given back
 //! \[Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"\].
 //!
-//! A table is a grid over the square roots of the cosine and of alpha, which puts nodes where the albedos bend: at grazing angles of
-//! nearly smooth surfaces. Interpolation is linear, and averages integrate the interpolant exactly, so that compensation
+//! A table is a grid over the fourth roots of the cosine and of alpha, which puts nodes where the albedos bend: at cosines
+//! near alpha, down to nearly smooth surfaces. Interpolation is linear, and averages integrate the interpolant exactly, so that compensation
 //! gives back what the tables say is missing, no more and no less.
 
 use super::fresnel::{grazing_weight, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
 use crate::math::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// Nodes along each axis.
 const NODES: usize = 32;
 
-/// Points of the quadrature over visible normals: along the azimuth (a half of it: the rest is its mirror image) and across.
-const QUADRATURE: (usize, usize) = (8, 24);
+/// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands have
+/// kinks along curves, at the horizon and the critical angle, where product rules converge slowly).
+const LATTICE: (usize, usize) = (987, 610);
 
 /// A function of the cosine in `[0, 1]`: values at the nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Row(pub [f32; NODES]);
 
-/// Weights of the nodes in `2 integral f(mu) mu dmu` for `f` linear in `sqrt(mu)` between them.
+/// Weights of the nodes in `2 integral f(mu) mu dmu` for `f` linear in the fourth root of mu, t, between them:
+/// `2 mu dmu = 8 t^7 dt`.
 const AVERAGE: [f32; NODES] = {
     let mut weights = [0.0f64; NODES];
     let h = 1.0 / (NODES - 1) as f64;
     let mut i = 0;
     while i + 1 < NODES {
         let (a, b) = (i as f64 * h, (i + 1) as f64 * h);
-        let fourth = b * b * b * b - a * a * a * a;
-        let fifth = 0.8 * (b * b * b * b * b - a * a * a * a * a);
-        weights[i] += (b * fourth - fifth) / h;
-        weights[i + 1] += (fifth - a * fourth) / h;
+        let (a8, b8) = (eighth(a), eighth(b));
+        let zeroth = b8 - a8;
+        let first = (b * b8 - a * a8) * 8.0 / 9.0;
+        weights[i] += (b * zeroth - first) / h;
+        weights[i + 1] += (first - a * zeroth) / h;
         i += 1;
     }
     let mut result = [0.0f32; NODES];
@@ -41,6 +45,25 @@ const AVERAGE: [f32; NODES] = {
     }
     result
 };
+
+const fn eighth(x: f64) -> f64 {
+    let x2 = x * x;
+    x2 * x2 * x2 * x2
+}
+
+/// Position of a cosine or an alpha on its axis: index of the node below, and the fraction to the next.
+#[inline]
+fn position(x: f32) -> (usize, f32) {
+    let x = x.clamp(0.0, 1.0).sqrt().sqrt() * (NODES - 1) as f32;
+    let i = (x as usize).min(NODES - 2);
+    (i, x - i as f32)
+}
+
+/// Cosine or alpha of a node, kept off zero: the limit is approached, not reached.
+fn node(i: usize) -> f32 {
+    let t = i as f32 / (NODES - 1) as f32;
+    (t * t * t * t).max(1e-6)
+}
 
 impl Row {
     /// Zero everywhere.
@@ -57,9 +80,7 @@ impl Row {
     /// The value at cosine `mu`.
     #[inline]
     pub fn at(&self, mu: f32) -> f32 {
-        let x = mu.clamp(0.0, 1.0).sqrt() * (NODES - 1) as f32;
-        let i = (x as usize).min(NODES - 2);
-        let t = x - i as f32;
+        let (i, t) = position(mu);
         self.0[i] + (self.0[i + 1] - self.0[i]) * t
     }
 
@@ -70,7 +91,79 @@ impl Row {
     }
 }
 
-/// A function of the cosine and of alpha: rows at the nodes of `sqrt(alpha)`.
+/// Squared cosines of the nodes: `t^8`. Uniform numbers between two of them are cosines with density 2 mu.
+const SQUARES: [f32; NODES] = {
+    let mut squares = [0.0f32; NODES];
+    let mut i = 0;
+    while i < NODES {
+        squares[i] = eighth(i as f64 / (NODES - 1) as f64) as f32;
+        i += 1;
+    }
+    squares
+};
+
+/// A row as the profile of a lobe that is to be sampled: directions are drawn as if it were constant between nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Profile {
+    row: Row,
+    /// Cosine-weighted average of the row.
+    pub average: f32,
+    /// Integral of what directions are drawn from.
+    mass: f32,
+}
+
+impl Profile {
+    /// Zero everywhere: never to be sampled.
+    pub const ZERO: Profile = Profile { row: Row::ZERO, average: 0.0, mass: 0.0 };
+
+    /// A profile that is nowhere negative.
+    #[inline]
+    pub fn new(row: Row) -> Profile {
+        let mass = (0..NODES - 1).map(|i| (row.0[i] + row.0[i + 1]) * (SQUARES[i + 1] - SQUARES[i])).sum();
+        Profile { row, average: row.average(), mass }
+    }
+
+    /// The value at cosine `mu`.
+    #[inline]
+    pub fn at(&self, mu: f32) -> f32 {
+        self.row.at(mu)
+    }
+
+    /// The values at the nodes.
+    #[inline]
+    pub fn nodes(&self) -> &[f32; NODES] {
+        &self.row.0
+    }
+
+    /// The value at cosine `mu`, and the density per solid angle with which [`Profile::sample`] draws it.
+    #[inline]
+    pub fn at_with_pdf_w(&self, mu: f32) -> (f32, f32) {
+        let (i, t) = position(mu);
+        let (a, b) = (self.row.0[i], self.row.0[i + 1]);
+        (a + (b - a) * t, (a + b) / self.mass.max(f32::MIN_POSITIVE) * mu * FRAC_1_PI)
+    }
+
+    /// A direction of the upper hemisphere.
+    #[inline]
+    pub fn sample(&self, u: Vec2) -> Vec3 {
+        let mut left = u.x * self.mass;
+        let mut square = 0.0;
+        for i in 0..NODES - 1 {
+            let value = self.row.0[i] + self.row.0[i + 1];
+            let mass = value * (SQUARES[i + 1] - SQUARES[i]);
+            if left < mass {
+                square = SQUARES[i] + left / value;
+                break;
+            }
+            left -= mass;
+        }
+        let r = (1.0 - square).max(0.0).sqrt();
+        let phi = TAU * u.y;
+        Vec3::new(r * phi.cos(), r * phi.sin(), square.sqrt())
+    }
+}
+
+/// A function of the cosine and of alpha: rows at the nodes of alpha.
 #[derive(Clone, Debug)]
 pub struct Table(Vec<Row>);
 
@@ -78,9 +171,7 @@ impl Table {
     /// The row at `alpha`.
     #[inline]
     pub fn row(&self, alpha: f32) -> Row {
-        let x = alpha.clamp(0.0, 1.0).sqrt() * (NODES - 1) as f32;
-        let i = (x as usize).min(NODES - 2);
-        let t = x - i as f32;
+        let (i, t) = position(alpha);
         let (a, b) = (&self.0[i].0, &self.0[i + 1].0);
         Row::from_fn(|j| a[j] + (b[j] - a[j]) * t)
     }
@@ -125,44 +216,32 @@ pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
 }
 
-/// Cosine and alpha of a node, kept off zero: the limits are approached, not reached.
-fn cosine(node: usize) -> f32 {
-    let t = node as f32 / (NODES - 1) as f32;
-    (t * t).max(1e-5)
-}
-
-fn alpha(node: usize) -> f32 {
-    let t = node as f32 / (NODES - 1) as f32;
-    (t * t).max(1e-6)
-}
-
 /// Tabulates `N` functions at once: `f` gives, for a lobe, the direction towards the viewer, Lambda of it and a visible normal,
 /// the terms of their sums.
 fn tabulate<const N: usize>(f: impl Fn(&Ggx, Vec3, f32, Vec3) -> [f32; N] + Sync) -> [Table; N] {
     let rows: Vec<[Row; N]> = (0..NODES)
         .into_par_iter()
         .map(|i| {
-            let ggx = Ggx { alpha_x: alpha(i), alpha_y: alpha(i) };
+            let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
             let mut rows = [Row::ZERO; N];
             for j in 0..NODES {
-                let mu = cosine(j);
+                let mu = node(j);
                 let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
                 let lambda_o = ggx.lambda(wo);
                 let mut sums = [0.0f32; N];
-                for a in 0..QUADRATURE.0 {
-                    for b in 0..QUADRATURE.1 {
-                        let u = Vec2::new(
-                            0.5 * (a as f32 + 0.5) / QUADRATURE.0 as f32,
-                            (b as f32 + 0.5) / QUADRATURE.1 as f32,
-                        );
-                        let terms = f(&ggx, wo, lambda_o, ggx.sample_visible(wo, u));
-                        for (sum, term) in sums.iter_mut().zip(terms) {
-                            *sum += term;
-                        }
+                for k in 0..LATTICE.0 {
+                    // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
+                    // reflections are the ones that are lost.
+                    let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
+                    let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
+                    let weight = 2.0 * rest / LATTICE.0 as f32;
+                    let terms = f(&ggx, wo, lambda_o, ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest)));
+                    for (sum, term) in sums.iter_mut().zip(terms) {
+                        *sum += weight * term;
                     }
                 }
                 for (row, sum) in rows.iter_mut().zip(sums) {
-                    row.0[j] = sum / (QUADRATURE.0 * QUADRATURE.1) as f32;
+                    row.0[j] = sum;
                 }
             }
             rows

@@ -10,7 +10,7 @@
 //! What single scattering between facets loses is given back by a separable lobe, for glass on both sides in the ratio
 //! that keeps it reciprocal \[Kulla and Conty 2017\]. The lobe belongs to the class of the lobe it completes.
 
-use super::energy::{EnergyTables, Row};
+use super::energy::{EnergyTables, Profile, Row, SideTables};
 use super::fresnel::{grazing_weight, is_matched, normal_incidence, reflect, refract, schlick};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
 use super::{BsdfSample, DELTA_ALPHA, LobeSet, Parameters, SHARP_ALPHA, Transport};
@@ -75,13 +75,11 @@ pub struct Layered {
     through: Row,
     /// Compensation for reflecting facets: `returned * loss(o) * loss(i)`, and for thin walls `passed` likewise on the other side;
     /// times pi times the average of `loss` they are albedos.
-    loss: Row,
-    loss_average: f32,
+    loss: Profile,
     returned: Rgb,
     passed: Rgb,
     /// Compensation for solid glass, by side: what is lost from above and from below.
-    glass_loss: [Row; 2],
-    glass_average: [f32; 2],
+    glass_loss: [Profile; 2],
     /// Reflected compensation: `glass_returned[side] * loss(o) * loss(i)`.
     glass_returned: [f32; 2],
     /// Transmitted compensation over the squared index of the side transmitted to (with 1 above): the same from both sides.
@@ -118,20 +116,17 @@ impl Layered {
             diffuse: Rgb::ZERO,
             diffuse_albedo: Rgb::ZERO,
             through: Row::ZERO,
-            loss: Row::ZERO,
-            loss_average: 0.0,
+            loss: Profile::ZERO,
             returned: Rgb::ZERO,
             passed: Rgb::ZERO,
-            glass_loss: [Row::ZERO; 2],
-            glass_average: [0.0; 2],
+            glass_loss: [Profile::ZERO; 2],
             glass_returned: [0.0; 2],
             glass_passed: Rgb::ZERO,
         };
         let white = tables.white.row(alpha);
         let rough = class != LobeSet::DELTA;
         if rough {
-            b.loss = Row::from_fn(|j| (1.0 - white.0[j]).max(0.0));
-            b.loss_average = b.loss.average();
+            b.loss = Profile::new(Row::from_fn(|j| (1.0 - white.0[j]).max(0.0)));
         }
         let f0_max = f0.max_element();
         // Average reflectances of the dielectric from above.
@@ -140,10 +135,10 @@ impl Layered {
                 + Rgb::splat(f90 * above.average_grazing + above.average_total)
         });
         // Reflection of light that facets scatter more than once [Kulla and Conty 2017], as a share of what is lost.
-        let kept = 1.0 - b.loss_average;
+        let kept = 1.0 - b.loss.average;
         let again = |f: Rgb| f * f * kept / (Rgb::ONE - f * (1.0 - kept));
         let metal_average = base + (Rgb::ONE - base) * (1.0 / 21.0);
-        let scale = FRAC_1_PI / b.loss_average.max(1e-9);
+        let scale = FRAC_1_PI / b.loss.average.max(1e-9);
         if rough {
             b.returned = (again(metal_average) * metal + again(average) * matte) * scale;
             if p.thin {
@@ -159,7 +154,7 @@ impl Layered {
                     let multiple = if rough { again(average).max_element() } else { 0.0 };
                     Row::from_fn(|j| {
                         let single = f0_max * (r.0[j] - g.0[j]) + f90 * g.0[j] + (white.0[j] - r.0[j]).max(0.0);
-                        (1.0 - single - multiple * b.loss.0[j]).clamp(0.0, 1.0)
+                        (1.0 - single - multiple * b.loss.nodes()[j]).clamp(0.0, 1.0)
                     })
                 }
             };
@@ -172,17 +167,16 @@ impl Layered {
         b
     }
 
-    fn compensate_glass(&mut self, alpha: f32, white: &Row, sides: [&super::energy::SideTables; 2]) {
+    fn compensate_glass(&mut self, alpha: f32, white: &Row, sides: [&SideTables; 2]) {
         let (f0, f90) = (self.f0.max_element(), self.f90);
         for (side, tables) in sides.into_iter().enumerate() {
             let (r, rg) = (tables.reflected.row(alpha), tables.reflected_grazing.row(alpha));
             let (t, tg) = (tables.transmitted.row(alpha), tables.transmitted_grazing.row(alpha));
-            self.glass_loss[side] = Row::from_fn(|j| {
+            self.glass_loss[side] = Profile::new(Row::from_fn(|j| {
                 let reflected = f0 * (r.0[j] - rg.0[j]) + f90 * rg.0[j] + (white.0[j] - r.0[j]).max(0.0);
                 let transmitted = t.0[j] - f0 * (t.0[j] - tg.0[j]) - f90 * tg.0[j];
                 (1.0 - reflected - transmitted).max(0.0)
-            });
-            self.glass_average[side] = self.glass_loss[side].average();
+            }));
         }
         // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average those of the other side;
         // k makes no share larger than the average transmittance of the smooth interface, which is in proportion to n^2 already.
@@ -190,11 +184,12 @@ impl Layered {
             let total = sides[s].average_total;
             f0 * (1.0 - total - sides[s].average_grazing) + f90 * sides[s].average_grazing + total
         };
-        let largest = self.glass_average[0].max(self.glass_average[1]).max(1e-9);
+        let largest = self.glass_loss[0].average.max(self.glass_loss[1].average).max(1e-9);
         let k = ((1.0 - average(0)) / sqr(self.eta)).min(1.0 - average(1)) / largest;
         for side in 0..2 {
-            let passes = k * self.index2(1 - side) * self.glass_average[1 - side];
-            self.glass_returned[side] = self.glass * (1.0 - passes) * FRAC_1_PI / self.glass_average[side].max(1e-9);
+            let passes = k * self.index2(1 - side) * self.glass_loss[1 - side].average;
+            self.glass_returned[side] =
+                self.glass * (1.0 - passes) * FRAC_1_PI / self.glass_loss[side].average.max(1e-9);
         }
         self.glass_passed = self.base * (self.glass * k * FRAC_1_PI);
     }
@@ -219,6 +214,12 @@ impl Layered {
             set = set | LobeSet::DELTA;
         }
         set
+    }
+
+    /// Its glass is compensated by tables of its own.
+    #[inline]
+    fn is_rough_solid(&self) -> bool {
+        self.glass > 0.0 && !self.thin && self.class != LobeSet::DELTA
     }
 
     /// Index behind the facets over the one before them, seen from `side`.
@@ -270,17 +271,17 @@ impl Layered {
         if self.has_facets && set.has(self.class) {
             let (r, t, _) = self.fresnel(self.effective_cosine(mu), side);
             let loss = self.loss.at(mu);
-            let solid = self.glass > 0.0 && !self.thin && self.class != LobeSet::DELTA;
+            let solid = self.is_rough_solid();
             let glass_loss = if solid { self.glass_loss[side].at(mu) } else { loss };
             a[0] = r * (1.0 - loss) + t * (1.0 - glass_loss);
             if self.class != LobeSet::DELTA {
-                let own = std::f32::consts::PI * self.loss_average * loss;
+                let own = std::f32::consts::PI * self.loss.average * loss;
                 a[1] = self.returned * own;
                 a[2] = self.passed * own;
                 if solid {
                     let pi = std::f32::consts::PI;
-                    a[1] += Rgb::splat(self.glass_returned[side] * glass_loss * self.glass_average[side] * pi);
-                    let other = self.glass_average[1 - side] * self.index2(1 - side);
+                    a[1] += Rgb::splat(self.glass_returned[side] * glass_loss * self.glass_loss[side].average * pi);
+                    let other = self.glass_loss[1 - side].average * self.index2(1 - side);
                     a[2] += self.glass_passed * (glass_loss * other * pi);
                 }
             }
@@ -375,12 +376,16 @@ impl Layered {
                     f += r * value;
                     pdf += shares.facets * Self::reflect_probability(r, t) * density;
                 }
-                f += self.returned * (self.loss.at(mu_o) * self.loss.at(mu_i));
-                if self.glass_returned[side] > 0.0 {
-                    let row = &self.glass_loss[side];
-                    f += Rgb::splat(self.glass_returned[side] * row.at(mu_o) * row.at(mu_i));
+                let (loss_i, density) = self.loss.at_with_pdf_w(mu_i);
+                f += self.returned * (self.loss.at(mu_o) * loss_i);
+                if self.is_rough_solid() {
+                    let profile = &self.glass_loss[side];
+                    let (loss_i, density) = profile.at_with_pdf_w(mu_i);
+                    f += Rgb::splat(self.glass_returned[side] * profile.at(mu_o) * loss_i);
+                    pdf += shares.returned * density;
+                } else {
+                    pdf += shares.returned * density;
                 }
-                pdf += shares.returned * mu_i * FRAC_1_PI;
             }
             if set.has(LobeSet::BROAD) && shares.diffuse > 0.0 {
                 f += self.diffuse * (self.through.at(mu_o) * self.through.at(mu_i));
@@ -396,17 +401,20 @@ impl Layered {
                     f += t * value;
                     pdf += shares.facets * (1.0 - Self::reflect_probability(r, t)) * density;
                 }
-                f += self.passed * (self.loss.at(mu_o) * self.loss.at(mu_i));
+                let (loss_i, density) = self.loss.at_with_pdf_w(mu_i);
+                f += self.passed * (self.loss.at(mu_o) * loss_i);
+                pdf += shares.passed * density;
             } else {
                 let flip = if side == 0 { 1.0 } else { -1.0 };
                 let (o, i) = (Vec3::new(wo.x, wo.y, mu_o), Vec3::new(wi.x, wi.y, flip * wi.z));
                 let (value, density) = self.transmitting_facets(o, i, side);
                 f += value * scale;
                 pdf += shares.facets * density;
-                let rows = self.glass_loss[side].at(mu_o) * self.glass_loss[1 - side].at(mu_i);
-                f += self.glass_passed * (rows * self.index2(1 - side) * scale);
+                let (loss_i, density) = self.glass_loss[1 - side].at_with_pdf_w(mu_i);
+                let losses = self.glass_loss[side].at(mu_o) * loss_i;
+                f += self.glass_passed * (losses * self.index2(1 - side) * scale);
+                pdf += shares.passed * density;
             }
-            pdf += shares.passed * mu_i * FRAC_1_PI;
         }
         (f, pdf)
     }
@@ -495,13 +503,14 @@ impl Layered {
             }
         } else {
             u_lobe -= shares.facets;
-            let cosine = warp::hemisphere_cosine(u);
             if u_lobe < shares.diffuse {
-                (cosine, LobeSet::BROAD)
+                (warp::hemisphere_cosine(u), LobeSet::BROAD)
             } else if u_lobe < shares.diffuse + shares.returned {
-                (cosine, self.class)
+                let profile = if self.is_rough_solid() { &self.glass_loss[side] } else { &self.loss };
+                (profile.sample(u), self.class)
             } else if u_lobe < shares.diffuse + shares.returned + shares.passed {
-                (-cosine, self.class)
+                let profile = if self.is_rough_solid() { &self.glass_loss[1 - side] } else { &self.loss };
+                (-profile.sample(u), self.class)
             } else {
                 // Rounding can lead here without a straight lobe: `delta` refuses it.
                 return delta(-o, self.straight, shares.straight);
