@@ -131,7 +131,7 @@ pub fn sppm(
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
         let error = if record || settings.target_error.is_some() {
-            relative_error(&pixels, settings.levels.own())
+            relative_error(&pixels, settings.levels)
         } else {
             None
         };
@@ -172,7 +172,7 @@ pub fn sppm(
     }
     let seconds = clock.seconds();
     if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels.own());
+        let error = relative_error(&pixels, settings.levels);
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
     Rendered {
