@@ -33,4 +33,6 @@ pub mod transport;
 
 pub mod estimator;
 
+pub mod combine;
+
 pub mod render;

@@ -4,6 +4,7 @@ mod direct;
 mod eye;
 mod interior;
 mod light;
+mod path;
 mod segment;
 mod walk;
 
@@ -13,5 +14,6 @@ pub use eye::{
 };
 pub use interior::{Crossing, Interior};
 pub use light::{Emitted, LightPass, light_path};
+pub use path::path_radiance;
 pub use segment::{Arrival, End, next_surface, transmittance};
 pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

@@ -1,0 +1,87 @@
+//! Unidirectional path tracing with next-event estimation: the independent oracle.
+//!
+//! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
+//! (`direct_light` splits them), so that the two check each other.
+
+use super::interior::Interior;
+use super::segment::transmittance;
+use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use crate::bsdf::{LobeSet, Transport};
+use crate::camera::Camera;
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::random::{Purpose, Stream};
+use crate::scene::Scene;
+
+struct PathTracer<'a> {
+    scene: &'a Scene,
+    max_depth: u32,
+    radiance: Rgb,
+    last: Vec3,
+}
+
+impl PathTracer<'_> {
+    /// Weight of having run into an emitter: full where next-event estimation could not have found it.
+    fn weight(scattered: Option<Scattered>, pdf_light: f32) -> f32 {
+        match scattered {
+            Some(s) if !s.lobe.has(LobeSet::DELTA) => s.pdf_w / (s.pdf_w + pdf_light),
+            _ => 1.0,
+        }
+    }
+
+    fn next_event(&self, vertex: &Vertex<'_>) -> Rgb {
+        let (scene, surface, draws) = (self.scene, vertex.surface, vertex.draws);
+        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
+            return Rgb::ZERO;
+        };
+        let f = vertex.shading.eval_cos(vertex.wo, light.wi, Transport::Radiance, LobeSet::SMOOTH);
+        let pdf =
+            vertex.shading.pdf(vertex.wo, light.wi, Transport::Radiance, LobeSet::ALL) * vertex.survival(LobeSet::ALL);
+        let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
+        let arriving = f * light.radiance * (weight / light.pdf_w);
+        if arriving.max_element() <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let origin = surface.spawn(light.wi);
+        let (direction, tmax) = light.target.map_or((light.wi, f32::INFINITY), |target| {
+            let to = target - origin;
+            (to.normalize(), to.length())
+        });
+        let crosses = light.wi.dot(surface.ng) * vertex.wo.dot(surface.ng) < 0.0;
+        let interior = if crosses { vertex.interior_behind } else { vertex.interior };
+        arriving * transmittance(scene, origin, direction, tmax, interior, draws.token(Purpose::ShadowAlpha))
+    }
+}
+
+impl Visitor for PathTracer<'_> {
+    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+        let from = if scattered.is_none() { vertex.from } else { self.last };
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, from, vertex.surface) {
+            self.radiance += vertex.throughput * radiance * Self::weight(scattered, pdf);
+        }
+        self.last = vertex.surface.p;
+        if vertex.depth < self.max_depth {
+            self.radiance += vertex.throughput * self.next_event(vertex);
+        }
+        Next::Continue(LobeSet::ALL)
+    }
+
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+        let radiance = &mut self.radiance;
+        self.scene
+            .lights
+            .escape(direction, |light, pdf| *radiance += throughput * light * Self::weight(scattered, pdf));
+    }
+}
+
+/// Radiance of one path through a uniform point of pixel `(x, y)`.
+pub fn path_radiance(scene: &Scene, camera: &Camera, pixel: (u32, u32), stream: Stream, max_depth: u32) -> Rgb {
+    let draws = stream.vertex(0);
+    let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
+    let ray = camera.ray(film, draws.two(Purpose::Lens));
+    let start =
+        PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: Interior::default() };
+    let mut tracer = PathTracer { scene, max_depth, radiance: Rgb::ZERO, last: ray.origin };
+    walk(scene, start, stream, Transport::Radiance, max_depth, &mut tracer);
+    tracer.radiance
+}
