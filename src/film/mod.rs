@@ -1,0 +1,8 @@
+//! Pictures as data: named layers of float planes, their names in files, and cryptomatte ranks.
+
+pub mod cryptomatte;
+mod layers;
+mod naming;
+
+pub use layers::{Layer, LayerSet, Plane, Role, Sample};
+pub use naming::{Description, Naming, Selection, check, describe};
