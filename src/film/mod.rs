@@ -1,6 +1,7 @@
 //! Pictures as data: named layers of float planes, their names in files, and cryptomatte ranks.
 
 pub mod cryptomatte;
+pub mod output;
 mod layers;
 mod naming;
 

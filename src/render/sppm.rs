@@ -130,11 +130,8 @@ pub fn sppm(
         let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
-        let error = if record || settings.target_error.is_some() {
-            relative_error(&pixels, settings.levels)
-        } else {
-            None
-        };
+        let error =
+            if record || settings.target_error.is_some() { relative_error(&pixels, settings.levels) } else { None };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
