@@ -2,5 +2,10 @@
 
 pub mod atomic;
 pub mod exr;
+pub mod flip;
+pub mod heat;
+pub mod metrics;
 pub mod png;
 pub mod tonemap;
+
+pub use metrics::{Comparison, compare};

@@ -54,11 +54,12 @@ pub(super) fn aces(x: f32) -> f32 {
     (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).clamp(0.0, 1.0)
 }
 
-/// AgX, the base look: linear Rec. 709 to linear Rec. 709.
+/// AgX, the base look as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.
 ///
-/// Sobotka's AgX as Blender 4 has it: Rec. 2020, an inset that moves the primaries towards white, log2 of 16.5 stops around middle grey
-/// 0.18, a sigmoid through (0.606, 0.18^(1/2.4)) of slope 2.4, the outset back, and decoding of the display's power. Matrices and limits as
-/// published with the configurations by T. Sobotka (github.com/sobotka/AgX) and E. Chow (AgX_LUT_Gen), and used by Filament and three.js.
+/// In Rec. 2020: an inset moves the primaries towards white, log2 of 16.5 stops around middle grey 0.18 goes through a sigmoid, its power
+/// of 2.4 is undone, hues that the curve turned go three fifths of the way back, and an outset restores colourfulness. After T. Sobotka
+/// (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen, whose "mix percent" is 40); matrices rounded as Filament has them. Blender's
+/// guard against colours outside Rec. 709 is left out: channels clip instead.
 fn agx(colour: Rgb) -> Rgb {
     /// Rows of Rec. 709 to Rec. 2020 (ITU-R BT.2087).
     const TO_2020: [[f32; 3]; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];
@@ -80,9 +81,38 @@ fn agx(colour: Rgb) -> Rgb {
     let to_2020 = rows(&TO_2020);
     let inset = (rows(&INSET) * to_2020 * colour).max(Vec3::splat(1e-10));
     let curved = inset.to_array().map(|v| sigmoid((v.log2() - MIN_EV) / (MAX_EV - MIN_EV)));
-    let outset = (rows(&OUTSET) * Vec3::from_array(curved)).max(Vec3::ZERO);
-    let linear = Vec3::from_array(outset.to_array().map(|v| v.powf(2.4)));
-    to_2020.inverse() * linear
+    let linear = curved.map(|v| v.powf(2.4));
+    let (before, after) = (hue(inset.to_array()), hue(linear));
+    // The shorter way around the circle.
+    let turned = (after - before + 9.0).rem_euclid(6.0) - 3.0;
+    let restored = with_hue(linear, before + 0.4 * turned);
+    to_2020.inverse() * (rows(&OUTSET) * restored)
+}
+
+/// Hue of the hexagonal model (HSV) in sixths of a turn, red 0, green 2, blue 4; of grey, 0.
+fn hue([r, g, b]: [f32; 3]) -> f32 {
+    let (high, low) = (r.max(g).max(b), r.min(g).min(b));
+    let chroma = high - low;
+    if chroma <= 0.0 {
+        0.0
+    } else if high == r {
+        (g - b) / chroma
+    } else if high == g {
+        2.0 + (b - r) / chroma
+    } else {
+        4.0 + (r - g) / chroma
+    }
+}
+
+/// The colour of another hue with the same largest and smallest channel.
+fn with_hue([r, g, b]: [f32; 3], hue: f32) -> Rgb {
+    let (high, low) = (r.max(g).max(b), r.min(g).min(b));
+    // A channel is high within a sixth of its own hue, low beyond a third, and changes evenly between.
+    let channel = |own: f32| {
+        let away = ((hue - own + 9.0).rem_euclid(6.0) - 3.0).abs();
+        low + (high - low) * (2.0 - away).clamp(0.0, 1.0)
+    };
+    Vec3::new(channel(0.0), channel(2.0), channel(4.0))
 }
 
 /// AgX's default contrast: two power curves that meet in the pivot with slope 2.4 and reach 0 and 1 at the ends
@@ -118,6 +148,16 @@ mod tests {
             let y = sigmoid(i as f32 / 1000.0);
             assert!(y > last);
             last = y;
+        }
+    }
+
+    #[test]
+    fn hues_round_trip() {
+        for i in 0..60 {
+            let angle = i as f32 / 10.0;
+            let colour = with_hue([0.2, 0.9, 0.5], angle);
+            assert!((hue(colour.to_array()).rem_euclid(6.0) - angle).abs() < 1e-5, "{angle}: {colour}");
+            assert_eq!((colour.max_element(), colour.min_element()), (0.9, 0.2));
         }
     }
 

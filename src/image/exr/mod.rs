@@ -13,6 +13,7 @@ pub use read::read;
 pub use write::{Compression, Options, write};
 
 use crate::error::{Error, Kind, Result};
+use crate::film::ascii_json;
 
 /// Name of the attribute that holds our JSON object.
 pub const ATTRIBUTE: &str = "caustique";
@@ -33,7 +34,7 @@ impl Attributes {
     pub fn insert(&mut self, name: &str, object: &impl serde::Serialize) -> Result<()> {
         let json = serde_json::to_string(object)
             .map_err(|cause| Error::new(Kind::Image, format!("attribute \"{name}\""), cause))?;
-        self.0.insert(name.to_owned(), escape(&json));
+        self.0.insert(name.to_owned(), ascii_json(&json));
         Ok(())
     }
 
@@ -41,19 +42,4 @@ impl Attributes {
     pub fn object(&self) -> Option<serde_json::Value> {
         serde_json::from_str(self.0.get(ATTRIBUTE)?).ok()
     }
-}
-
-/// JSON in ASCII: other characters, which JSON allows within strings only, become `\u` escapes (surrogate pairs above U+FFFF).
-pub fn escape(json: &str) -> String {
-    let mut ascii = String::with_capacity(json.len());
-    for c in json.chars() {
-        if c.is_ascii() {
-            ascii.push(c);
-        } else {
-            for unit in c.encode_utf16(&mut [0; 2]) {
-                ascii.push_str(&format!("\\u{unit:04x}"));
-            }
-        }
-    }
-    ascii
 }
