@@ -7,6 +7,7 @@ mod info;
 mod number;
 mod output;
 mod plot;
+mod processor;
 mod progress;
 mod render;
 mod scene;
@@ -42,6 +43,9 @@ enum Command {
 
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
+    if let Err(error) = processor::check() {
+        return fail(&error);
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => match usage::explain(&error) {
@@ -53,13 +57,13 @@ pub fn main() -> ExitCode {
             }
         },
     };
-    let result = processor().and_then(|()| match cli.command {
+    let result = match cli.command {
         Command::Render(args) => render::run(&args),
         Command::Combine(args) => combine::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Doctor(args) => doctor::run(&args),
-    });
+    };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error),
@@ -73,20 +77,6 @@ fn fail(error: &Error) -> ExitCode {
         eprintln!("hint: {hint}");
     }
     ExitCode::from(error.exit_code())
-}
-
-/// The program is built for processors with AVX2 and FMA; without them it would end with an illegal instruction.
-fn processor() -> Result<()> {
-    #[cfg(target_arch = "x86_64")]
-    if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
-        return Err(Error::new(
-            Kind::Library,
-            "processor",
-            "it has no AVX2 and FMA instructions, which this build needs",
-        )
-        .hint("use a processor made since 2013, or build from source without the flags in .cargo/config.toml"));
-    }
-    Ok(())
 }
 
 /// Threads for everything that a command does; 0 takes all cores.

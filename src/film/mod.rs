@@ -2,9 +2,9 @@
 
 mod ascii;
 pub mod cryptomatte;
-pub mod output;
 mod layers;
 mod naming;
+pub mod output;
 
 pub use ascii::ascii_json;
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};
