@@ -94,7 +94,7 @@ fn environment(description: &mut Description, args: &SceneArgs) -> Result<()> {
     if let Some(choice) = &args.env {
         let source = match choice {
             EnvironmentChoice::Color(color) => EnvironmentSource::Color((*color).into()),
-            EnvironmentChoice::File(path) => environment_file::read(path)?,
+            EnvironmentChoice::File(path) => environment_file::read(path, &mut description.warnings)?,
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
     }

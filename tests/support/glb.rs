@@ -1,4 +1,4 @@
-//! A small scene as a .glb file: a floor, a tilted mirror over it, a point light, two cameras.
+//! A small scene as a .glb file: a floor, an upright mirror on it, a point light, two cameras.
 
 use serde_json::json;
 use std::path::Path;
@@ -8,10 +8,10 @@ pub fn write(path: &Path, lamp: bool) {
     std::fs::write(path, bytes(lamp)).expect("the scene can be written");
 }
 
-/// Quads as positions and indices: the floor looks up, the mirror up and towards +Z.
+/// Quads as positions and indices: the floor looks up, the mirror along +Z.
 fn bytes(lamp: bool) -> Vec<u8> {
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
-    let mirror: [[f32; 3]; 4] = [[-1.0, 1.0, -1.0], [-1.0, 0.2, 1.0], [1.0, 0.2, 1.0], [1.0, 1.0, -1.0]];
+    let mirror: [[f32; 3]; 4] = [[-1.0, 0.1, -1.5], [1.0, 0.1, -1.5], [1.0, 2.0, -1.5], [-1.0, 2.0, -1.5]];
     let mut binary = Vec::new();
     for quad in [floor, mirror] {
         binary.extend(quad.iter().flatten().flat_map(|x| x.to_le_bytes()));
@@ -27,7 +27,7 @@ fn bytes(lamp: bool) -> Vec<u8> {
         "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [light]}},
         "scene": 0,
-        "scenes": [{"nodes": if lamp { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
+        "scenes": [{"extras": {"caustique": {"light_units": "radiometric"}}, "nodes": if lamp { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
         "nodes": [
             {"name": "Floor", "mesh": 0},
             {"name": "Mirror", "mesh": 1},
@@ -44,7 +44,7 @@ fn bytes(lamp: bool) -> Vec<u8> {
         ],
         "accessors": [
             positions(0, [-5.0, 0.0, -5.0], [5.0, 0.0, 5.0]),
-            positions(1, [-1.0, 0.2, -1.0], [1.0, 1.0, 1.0]),
+            positions(1, [-1.0, 0.1, -1.5], [1.0, 2.0, -1.5]),
             {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
         ],
         "bufferViews": [
