@@ -132,11 +132,8 @@ pub fn sppm(
         let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
-        let error = if record || settings.target_error.is_some() {
-            relative_error(&pixels, settings.levels.own())
-        } else {
-            None
-        };
+        let error =
+            if record || settings.target_error.is_some() { relative_error(&pixels, settings.levels) } else { None };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
@@ -174,7 +171,7 @@ pub fn sppm(
     }
     let seconds = clock.seconds();
     if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels.own());
+        let error = relative_error(&pixels, settings.levels);
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
     Rendered {
