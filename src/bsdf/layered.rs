@@ -418,6 +418,19 @@ impl<'a> Layered<'a> {
         self.evaluate_shares(wo, wi, at, side, transport, set, &shares)
     }
 
+    /// The first part of [`Layered::evaluate`], where that is cheaper: no densities, so no shares.
+    #[inline]
+    pub(super) fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
+        let mu_o = wo.z.abs();
+        // A covering asks its shares which of its lobes are in the set.
+        if self.cover.is_some() || !(mu_o > 0.0 && wi.z.abs() > 0.0) {
+            return self.evaluate(wo, wi, transport, set).0;
+        }
+        let side = usize::from(wo.z < 0.0);
+        self.evaluate_shares(wo, wi, Position::new(mu_o), side, transport, set, &Shares::default()).0
+    }
+
+    #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     fn evaluate_shares(
         &self,

@@ -152,7 +152,10 @@ impl<'a> Bsdf<'a> {
     /// The first part of [`Bsdf::evaluate`].
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
-        self.evaluate(wo, wi, transport, set).0
+        match self {
+            Bsdf::Matte(_) => self.evaluate(wo, wi, transport, set).0,
+            Bsdf::Layered(layered) => layered.eval(wo, wi, transport, set),
+        }
     }
 
     /// The second part of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.
