@@ -42,13 +42,13 @@ crate = b.principled("crate", (0.30, 0.19, 0.10), 0.75)
 b.thing("crate", b.box("crate", (0.55, 0.45, 0.40), 0.012), crate, (1.25, 1.35, 0.20), (0, 0, 22))
 b.thing("crate", b.box("small crate", (0.36, 0.32, 0.27), 0.010), crate, (1.22, 1.38, 0.535), (0, 0, -12))
 
-b.spot("beam", (-2.05, 0.9, 2.42), (-0.25, 0.5, 0.978), 420, 15.5, (1.0, 0.93, 0.80), 0.15, 0.02)
-b.point("lantern", (1.9, -0.2, 2.2), 9, (0.45, 0.62, 1.0), 0.06)
+b.spot("beam", (-2.05, 0.9, 2.42), (-0.25, 0.5, 0.978), 1500, 15.5, (1.0, 0.93, 0.80), 0.15, 0.02)
+b.point("lantern", (1.9, -0.2, 2.2), 160, (0.45, 0.62, 1.0), 0.06)
 world = b.sky((0, 0, 0))
 tree = world.node_tree
 fog = tree.nodes.new("ShaderNodeVolumeScatter")
 fog.inputs["Color"].default_value = (0.95, 0.95, 0.95, 1)
-fog.inputs["Density"].default_value, fog.inputs["Anisotropy"].default_value = 0.16, 0.35
+fog.inputs["Density"].default_value, fog.inputs["Anisotropy"].default_value = 0.20, 0.35
 tree.links.new(fog.outputs[0], b.export.shading.output_of(tree).inputs["Volume"])
 b.camera((0.35, -2.15, 1.28), (0.05, 0.6, 0.98), lens=30)
 b.finish(__file__)

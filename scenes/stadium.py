@@ -39,8 +39,7 @@ def turf(size=512):
     return b.blend((0.16, 0.30, 0.10), (0.36, 0.50, 0.20), np.clip(0.6 * blades + 0.5 * tufts, 0, 1))
 
 
-grass = [b.principled(name, roughness=0.9, texture=b.image("turf", turf()) if not k else None, Specular_IOR_Level=0.2)
-         for k, name in enumerate(("turf",))][0]
+grass = b.principled("turf", roughness=0.9, texture=b.image("turf", turf()), Specular_IOR_Level=0.2)
 dark = b.principled("turf dark", (0.045, 0.115, 0.025), 0.9, Specular_IOR_Level=0.2)
 chalk = b.principled("chalk", (0.78, 0.78, 0.75), 0.9, Specular_IOR_Level=0.1)
 concrete = b.principled("concrete", (0.42, 0.42, 0.41), 0.8)
@@ -61,7 +60,6 @@ b.thing("plinth", b.box("plinth", (0.62, 0.62, 0.20), 0.012, 4), stone, (0, 0, 0
 b.thing("ball", b.sphere("ball", 0.05, 7), b.glass("glass", 1.52), (0, 0, 0.25005))
 
 # Stands in two tiers, stepped; seats in blocks of colour; a roof.
-steps = [(4 + 0.8 * k // 2 * 2 / 2, 0) for k in range(0)]
 lower = [(4.0, 0.0), (4.0, 1.2)]
 for k in range(22):
     lower += [(4.0 + 0.85 * k, 1.2 + 0.42 * k), (4.85 + 0.85 * k, 1.2 + 0.42 * k)]
@@ -89,13 +87,18 @@ for tier, count, first, run, rise in (("lower", 22, 4.45, 0.85, 0.42), ("upper",
             b.thing("seats", seat[pick], None, (x, y, base + rise * k + 0.28), (0, 0, math.degrees(math.atan2(y2 - y1, x2 - x1))), (length * 0.88, 1, 1))
 
 # Fifty floodlights under the rim of the roof, all aimed at the pitch.
-housing = b.box("floodlight", (1.2, 0.5, 0.9), 0.05, 2)
+housing = b.box("floodlight", (1.3, 0.5, 1.0), 0.05, 2)
+face = b.plane("floodlight face", 1.1, 0.8)
+face.materials.append(b.emission("floodlight face", (22, 21, 19)))
 for k in range(50):
     x, y = oval(2 * math.pi * (k + 0.5) / 50, 11.2)
     aim = (0.12 * x * random.random(), 0.12 * y * random.random(), 0)
     b.spot(f"floodlight {k}", (x * 0.992, y * 0.992, 33.2), aim, 9000, 80, (1.0, 0.97, 0.91), 0.5, 0.25)
-    b.thing("floodlight", housing, steel, (x * 1.004, y * 1.004, 33.9), (0, 0, math.degrees(math.atan2(y, x)) - 90))
+    turned = (b.Vector(aim) - b.Vector((x, y, 33.2))).to_track_quat("-Z", "Y").to_matrix().to_4x4()
+    there = b.Matrix.Translation((x, y, 33.2)) @ turned
+    b.thing("floodlight", housing, steel).matrix_world = there @ b.Matrix.Translation((0, 0, 0.85)) @ b.Matrix.Rotation(math.pi / 2, 4, "X")
+    b.thing("floodlight face", face, None).matrix_world = there @ b.Matrix.Translation((0, 0, 0.55)) @ b.Matrix.Rotation(math.pi, 4, "X")
 
 b.sky((0.012, 0.018, 0.036))
-b.camera((0.19, -0.80, 0.46), (0.005, 0.06, 0.258), lens=31)
+b.camera((-0.44, -0.215, 0.372), (0.5, 0.255, 0.408), lens=20)
 b.finish(__file__)

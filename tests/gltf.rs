@@ -1,6 +1,6 @@
 //! The glTF reader: what it reads, what it warns of, what it refuses, and that damaged files never bring it down.
 
-#[path = "support/glb.rs"]
+#[path = "gltf/glb.rs"]
 mod glb;
 
 #[path = "gltf/bad_input.rs"]

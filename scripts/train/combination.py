@@ -10,7 +10,8 @@ from torch.utils.checkpoint import checkpoint
 # Largest exponent of an affinity, and bounds of the logarithms: they keep every weight positive in float32.
 MAX_DISTANCE = 60.0
 MAX_LOG_WEIGHT = 12.0
-LOG_FALLOFF = (-20.0, 4.0)
+# Falloff at most 1: a narrower window would be the centre alone, where the gradient vanishes and training ends.
+LOG_FALLOFF = (-20.0, 0.0)
 
 
 def combine(output, levels, kind, window, features=0):

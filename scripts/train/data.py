@@ -138,7 +138,7 @@ def arguments():
     parser.add_argument("--variants", type=int, default=5)
     parser.add_argument("--renders", type=int, default=6, help="noisy renders of each variant")
     parser.add_argument("--iterations", type=int, nargs="+", default=[16, 32, 64, 128, 256], help="of noisy renders, in turn")
-    parser.add_argument("--reference-iterations", type=int, default=8192)
+    parser.add_argument("--reference-iterations", type=int, default=4096)
     parser.add_argument("--reference-method", default="sppm")
     parser.add_argument("--width", type=int, default=384)
     parser.add_argument("--height", type=int, default=256)
@@ -150,7 +150,7 @@ def arguments():
 
 
 def variant(args, path, index):
-    """Render one variant of a scene and write its crops; returns how many."""
+    """Render one variant of a scene and write its crops; returns how many, or None without a reference."""
     rng = np.random.default_rng([args.seed, index, *path.stem.encode()])
     work = args.output / "work"
     work.mkdir(parents=True, exist_ok=True)
@@ -167,7 +167,7 @@ def variant(args, path, index):
     density = max(1.0, PAPER_PHOTONS_PER_PIXEL)
     if not render(args, varied, exr, "--method", args.reference_method, "--levels", "1", "--layers", "beauty",
                   "--iterations", args.reference_iterations, "--photons", photons(density), "--seed", 10_000 + index):
-        return 0
+        return None
     reference = layers(exr, ["RGB"])["RGB"]
     count = 0
     for k in range(args.renders):
@@ -190,7 +190,8 @@ def main():
             done = args.output / "work" / f"{path.stem}-{index}.done"
             if not done.exists():
                 count = variant(args, path, index)
-                done.parent.mkdir(exist_ok=True)
+                if count is None:
+                    continue
                 done.touch()
                 print(f"{path.stem}, variant {index}: {count} crops", flush=True)
 

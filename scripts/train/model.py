@@ -53,11 +53,11 @@ class Compact(nn.Module):
         self.up1, self.dec1 = conv(quarter, half, 1), Block(half, half)
         self.up0, self.skip0, self.dec0 = conv(half, last, 1), conv(full, last, 1), conv(last, last)
         self.head = conv(last, (levels - 1) * (features + 3), 1)
-        # Begin as a filter that is smooth near the centre and ends before the window does.
+        # Begin as a filter of about a pixel: near the best level already, and wide enough to learn from.
         pairs = levels - 1
         with torch.no_grad():
             self.head.bias.zero_()
-            self.head.bias[-pairs:] = -3.0
+            self.head.bias[-pairs:] = -1.0
 
     def forward(self, x):
         full = torch.relu(self.stem(x))

@@ -109,7 +109,7 @@ def arguments():
     parser.add_argument("--steps", type=int, default=1_000_000, help="of the learning-rate schedule, if time allows them")
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--side", type=int, default=64, help="of training crops, pixels")
-    parser.add_argument("--rate", type=float, default=1e-3, help="largest learning rate (Adam)")
+    parser.add_argument("--rate", type=float, default=5e-4, help="largest learning rate (Adam)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=0, help="0: all")
     return parser.parse_args()
@@ -169,7 +169,7 @@ def main():
         recent.append(loss.item())
         step += 1
         seconds = before + time.monotonic() - start
-        if time.monotonic() - spoken > 120:
+        if time.monotonic() - spoken > 180:
             save()
             spoken = time.monotonic()
     save()

@@ -1,9 +1,20 @@
 //! The scattering model: one closed set of lobes that agrees with the glTF specification and conserves energy.
 
-mod stub;
-use crate::math::{Rgb, Vec3};
+mod energy;
+mod fresnel;
+mod layered;
+mod microfacet;
+mod parameters;
+mod shading;
+
+pub use energy::EnergyTables;
+pub use layered::Layered;
+pub use parameters::Parameters;
+pub use shading::Shading;
+
+use crate::math::{Rgb, Vec2, Vec3, warp};
+use std::f32::consts::FRAC_1_PI;
 use std::ops::{BitAnd, BitOr};
-pub use stub::*;
 
 /// A set of lobe classes. The classes decide who carries light that arrives at a surface: see [`LobeSet::BROAD`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -55,6 +66,9 @@ impl BitAnd for LobeSet {
 /// GGX alpha (perceptual roughness squared) below which a glossy lobe is [`LobeSet::SHARP`].
 pub const SHARP_ALPHA: f32 = 0.2;
 
+/// GGX alpha below which a lobe is a perfect mirror or a clear interface (perceptual roughness 0.03).
+pub const DELTA_ALPHA: f32 = 1e-3;
+
 /// Which quantity a walk carries; refraction compresses radiance by 1/eta^2 and leaves importance's adjoint alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
@@ -77,4 +91,103 @@ pub struct BsdfSample {
     pub lobe: LobeSet,
     /// The direction crosses to the other side of the surface.
     pub transmitted: bool,
+}
+
+/// How a surface scatters at one point, in its shading frame: z is the shading normal, directions point away from the
+/// surface, z > 0 is its front. Built per vertex; no table is needed afterwards.
+// Boxing the large variant would allocate once per vertex.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug)]
+pub enum Bsdf {
+    /// Lambert's reflection of some colour on both sides.
+    Matte(Rgb),
+    /// Everything else.
+    Layered(Layered),
+}
+
+impl Bsdf {
+    /// The BSDF of `parameters`. `tables` were made for their refractive index (the nearest one is used).
+    #[inline]
+    pub fn new(parameters: &Parameters, tables: &EnergyTables) -> Bsdf {
+        if parameters.is_matte() {
+            Bsdf::Matte(parameters.base_color)
+        } else {
+            Bsdf::Layered(Layered::new(parameters, tables))
+        }
+    }
+
+    /// Classes of lobes that are there.
+    #[inline]
+    pub fn lobes(&self) -> LobeSet {
+        match self {
+            Bsdf::Matte(color) if color.max_element() > 0.0 => LobeSet::BROAD,
+            Bsdf::Matte(_) => LobeSet::NONE,
+            Bsdf::Layered(layered) => layered.lobes(),
+        }
+    }
+
+    /// The BSDF (1/sr, without cosine) over the lobes of `set` that are not delta, and the density per solid angle with which
+    /// [`Bsdf::sample`] draws `wi` for `wo` and `set`.
+    ///
+    /// [`Transport::Radiance`]: light from `wi` is seen along `wo`; [`Transport::Importance`]: flux that came from `wo` leaves
+    /// along `wi`. They differ for refraction only: with n the index on the side of a direction,
+    /// `f_radiance(o, i) = f_importance(i, o) = f_importance(o, i) n_o^2 / n_i^2`.
+    #[inline]
+    pub fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        match self {
+            Bsdf::Matte(color) => {
+                if wo.z * wi.z > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
+                    (*color * FRAC_1_PI, wi.z.abs() * FRAC_1_PI)
+                } else {
+                    (Rgb::ZERO, 0.0)
+                }
+            }
+            Bsdf::Layered(layered) => layered.evaluate(wo, wi, transport, set),
+        }
+    }
+
+    /// The first part of [`Bsdf::evaluate`].
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
+        self.evaluate(wo, wi, transport, set).0
+    }
+
+    /// The second part of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
+        self.evaluate(wo, wi, transport, set).1
+    }
+
+    /// Draws a direction from the lobes of `set`; `u_lobe` chooses the lobe, `u` the direction. `None` where the lobes scatter
+    /// nothing, or the direction drawn is not one they scatter to.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        match self {
+            Bsdf::Matte(color) => {
+                let mut wi = warp::hemisphere_cosine(u);
+                if !self.lobes().has(set) || wi.z <= 0.0 || !(wo.z.abs() > 0.0) {
+                    return None;
+                }
+                let pdf_w = wi.z * FRAC_1_PI;
+                wi.z = wi.z.copysign(wo.z);
+                Some(BsdfSample { wi, weight: *color, pdf_w, lobe: LobeSet::BROAD, transmitted: false })
+            }
+            Bsdf::Layered(layered) => layered.sample(wo, transport, set, u_lobe, u),
+        }
+    }
+
+    /// Albedo of the lobes of `set`: the share of flux from `wo` that they scatter. Exact for delta and diffuse lobes, a good estimate for others.
+    #[inline]
+    pub fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {
+        match self {
+            Bsdf::Matte(color) => {
+                if set.has(LobeSet::BROAD) {
+                    *color
+                } else {
+                    Rgb::ZERO
+                }
+            }
+            Bsdf::Layered(layered) => layered.albedo(wo, set),
+        }
+    }
 }

@@ -26,12 +26,12 @@ pub const SCALARS: usize = 3;
 /// Largest number of dimensions of the feature space.
 pub const MAX_DIMENSIONS: usize = 8;
 
-/// Exponents of affinities end here, so that every weight stays positive in f32.
-const MAX_DISTANCE: f32 = 60.0;
+/// Exponents of affinities end here, in powers of two (exp(-60)), so that every weight stays positive in f32.
+const MAX_DISTANCE: f32 = 60.0 * std::f32::consts::LOG2_E;
 
 /// Bounds of the logarithms, as in training; what is no number counts as 0.
 const LOG_WEIGHT: (f32, f32) = (-12.0, 12.0);
-const LOG_FALLOFF: (f32, f32) = (-20.0, 4.0);
+const LOG_FALLOFF: (f32, f32) = (-20.0, 0.0);
 
 /// Pixels handled together.
 const LANES: usize = 8;
@@ -69,7 +69,9 @@ fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features:
         let correlated = &stack.levels[pair + 1][image_y * stack.width + core.x0..][..core.width()];
         for (block, sums) in sums.chunks_mut(LANES).enumerate() {
             let x = block * LANES;
-            let falloff = from_fn(|l| falloff.get(x + l).map_or(0.0, |f| exp_bounded(*f, LOG_FALLOFF)));
+            let falloff = from_fn(|l| {
+                falloff.get(x + l).map_or(0.0, |f| std::f32::consts::LOG2_E * exp_bounded(*f, LOG_FALLOFF))
+            });
             let (difference, weight) = neighbours.window_sums(x, y, falloff);
             for (l, sum) in sums.iter_mut().enumerate() {
                 let scale = exp_bounded(centre[x + l], LOG_WEIGHT);
@@ -86,7 +88,7 @@ fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features:
 struct Neighbours<const D: usize> {
     radius: usize,
     pitch: usize,
-    /// phi.
+    /// phi, scaled so that squared distances are exponents of two.
     phi: [Vec<f32>; D],
     /// exp(source), zero outside the image and at invalid pixels.
     weight: Vec<f32>,
@@ -133,12 +135,13 @@ impl<const D: usize> Neighbours<D> {
                 }
             })
         };
-        let phi = from_fn(|d| channel(pair * D + d, |x| if x.is_finite() { x } else { 0.0 }));
+        let scaled = |x: f32| if x.is_finite() { x * std::f32::consts::LOG2_E.sqrt() } else { 0.0 };
+        let phi = from_fn(|d| channel(pair * D + d, scaled));
         Neighbours { radius, pitch, phi, weight, difference: from_fn(difference) }
     }
 
     /// Sums over the windows of the pixels (x .. x + LANES, y) of the core: w (y_i - z_i), and w, all without the
-    /// centre's own factor.
+    /// centre's own factor. `falloff` is in powers of two.
     #[inline]
     fn window_sums(&self, x: usize, y: usize, falloff: Lanes) -> ([Lanes; 3], Lanes) {
         let side = 2 * self.radius + 1;
@@ -146,23 +149,28 @@ impl<const D: usize> Neighbours<D> {
         let centre: [Lanes; D] = from_fn(|d| lanes(&self.phi[d], centre_at));
         let (mut sums, mut total) = ([[0.0; LANES]; 3], [0.0; LANES]);
         for v in 0..side {
-            let row = (y + v) * self.pitch + x;
-            let dy2 = v.abs_diff(self.radius).pow(2);
+            // Rows cut to the length read, so that their ends are tested once a row.
+            let from = (y + v) * self.pitch + x;
+            let part = from..from + side - 1 + LANES;
+            let phi: [&[f32]; D] = from_fn(|d| &self.phi[d][part.clone()]);
+            let difference: [&[f32]; 3] = from_fn(|c| &self.difference[c][part.clone()]);
+            let weight = &self.weight[part.clone()];
+            let dy = v as f32 - self.radius as f32;
             for u in 0..side {
-                let at = row + u;
-                let squared = (dy2 + u.abs_diff(self.radius).pow(2)) as f32;
+                let dx = u as f32 - self.radius as f32;
+                let squared = dx * dx + dy * dy;
                 let mut distance: Lanes = from_fn(|l| falloff[l] * squared);
-                for (centre, plane) in centre.iter().zip(&self.phi) {
-                    let phi = lanes(plane, at);
+                for (centre, row) in centre.iter().zip(phi) {
+                    let phi = lanes(row, u);
                     for l in 0..LANES {
                         let step = centre[l] - phi[l];
                         distance[l] = fma(step, step, distance[l]);
                     }
                 }
-                let source = lanes(&self.weight, at);
-                let w: Lanes = from_fn(|l| source[l] * exp_minus(distance[l]));
-                for (sum, plane) in sums.iter_mut().zip(&self.difference) {
-                    let difference = lanes(plane, at);
+                let source = lanes(weight, u);
+                let w: Lanes = from_fn(|l| source[l] * exp2_minus(distance[l]));
+                for (sum, row) in sums.iter_mut().zip(difference) {
+                    let difference = lanes(row, u);
                     for l in 0..LANES {
                         sum[l] = fma(w[l], difference[l], sum[l]);
                     }
@@ -188,23 +196,32 @@ fn fma(a: f32, b: f32, c: f32) -> f32 {
     if cfg!(any(target_feature = "fma", target_arch = "aarch64")) { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// exp(-x) for x >= 0, x cut at [`MAX_DISTANCE`]; relative error below 5e-7, and no branch, so that loops vectorise.
+/// 2^-x for x >= 0, x cut at [`MAX_DISTANCE`]; relative error below 5e-7, and no branch, so that loops vectorise.
 #[inline(always)]
-fn exp_minus(x: f32) -> f32 {
+fn exp2_minus(x: f32) -> f32 {
     // 2^t = 2^n 2^f with n the nearest integer, found by adding 1.5 * 2^23, whose last bits then hold n.
     const SHIFT: f32 = 12_582_912.0;
-    let x = if x < MAX_DISTANCE { x } else { MAX_DISTANCE };
-    let t = x * -std::f32::consts::LOG2_E;
+    let t = -if x < MAX_DISTANCE { x } else { MAX_DISTANCE };
     let shifted = t + SHIFT;
-    let n = shifted.to_bits();
-    let f = (t - (shifted - SHIFT)) * std::f32::consts::LN_2;
-    // Taylor's series of exp(f), |f| <= ln(2) / 2.
-    let mut p = 1.0 / 720.0;
-    for k in [1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
-        p = fma(p, f, k);
+    let f = t - (shifted - SHIFT);
+    let mut p = TAYLOR[0];
+    for coefficient in &TAYLOR[1..] {
+        p = fma(p, f, *coefficient);
     }
-    f32::from_bits(p.to_bits().wrapping_add(n << 23))
+    f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23))
 }
+
+/// Taylor's series of 2^f = exp(f ln 2) to degree 6, highest power first; |f| <= 1/2.
+const TAYLOR: [f32; 7] = {
+    let mut coefficients = [1.0; 7];
+    let (mut term, mut k) = (1.0f64, 0);
+    while k < 6 {
+        k += 1;
+        term *= std::f64::consts::LN_2 / k as f64;
+        coefficients[6 - k] = term as f32;
+    }
+    coefficients
+};
 
 /// exp(x) with x kept within bounds, and read as 0 where it is no number.
 fn exp_bounded(x: f32, (least, most): (f32, f32)) -> f32 {
@@ -223,14 +240,14 @@ mod tests {
 
     #[test]
     fn exponential_is_accurate_and_positive() {
-        for k in 0..=600_000 {
+        for k in 0..=860_000 {
             let x = k as f32 * 1e-4;
-            let (got, want) = (f64::from(exp_minus(x)), (-f64::from(x)).exp());
-            // f32 carries x log2(e) to half a unit in 2^-18 at x = 60.
-            let bound = 5e-7 + 6e-8 * f64::from(x) * 1.5;
-            assert!((got / want - 1.0).abs() < bound, "exp(-{x}) = {got:e}, not {want:e}");
+            let (got, want) = (f64::from(exp2_minus(x)), (-f64::from(x)).exp2());
+            assert!((got / want - 1.0).abs() < 5e-7, "2^-{x} = {got:e}, not {want:e}");
         }
-        assert!(exp_minus(f32::INFINITY) > 0.0 && exp_minus(f32::MAX) > 0.0);
-        assert_eq!(exp_minus(0.0), 1.0);
+        for x in [0.0, 1.0, 86.0] {
+            assert_eq!(exp2_minus(x), (-x).exp2());
+        }
+        assert!(exp2_minus(f32::INFINITY) > 0.0 && exp2_minus(f32::MAX) > 0.0);
     }
 }

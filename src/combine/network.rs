@@ -127,11 +127,3 @@ fn check_outlets(session: &Session, facts: &Facts) -> std::result::Result<(), St
 fn one_line(message: &dyn std::fmt::Display) -> String {
     message.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
-
-#[cfg(test)]
-impl Network {
-    /// Plants the bug that tiles see too little around them.
-    pub(super) fn forget_halo(&mut self) {
-        self.facts.halo = 0;
-    }
-}

@@ -1,7 +1,7 @@
 //! Finding and loading ONNX Runtime, once per process.
 //!
-//! Candidates in order: the file that the environment variable `CAUSTIQUE_ONNXRUNTIME` names; the system's loader under
-//! the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/` of the current directory or of a
+//! Candidates in order: the file that the environment variable `CAUSTIQUE_ONNXRUNTIME` names, and then no other; the
+//! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/` of the current directory or of a
 //! folder above the executable (where `scripts/setup.sh` puts it).
 
 use std::path::{Path, PathBuf};
@@ -14,8 +14,12 @@ use crate::error::{Error, Kind, Result};
 /// Environment variable that names the library's file.
 pub const VARIABLE: &str = "CAUSTIQUE_ONNXRUNTIME";
 
-/// Names to ask the system's loader for; Debian 13 installs the first.
-const NAMES: [&str; 3] = ["libonnxruntime.so.1.21", "libonnxruntime.so.1", "libonnxruntime.so"];
+/// What every name of the library begins with.
+const NAME: &str = "libonnxruntime.so";
+
+/// Minor versions whose sonames the system's loader is asked for (Debian 13 installs libonnxruntime.so.1.21). The first
+/// is the oldest that `ort` takes here.
+const MINOR_VERSIONS: std::ops::RangeInclusive<u32> = 17..=49;
 
 /// Where `scripts/setup.sh` installs, below the project's folder.
 const FOLDER: &str = ".deps/onnxruntime";
@@ -74,7 +78,9 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
         }
         return Ok(vec![absolute]);
     }
-    let mut all: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
+    let versioned = MINOR_VERSIONS.rev().map(|minor| format!("{NAME}.1.{minor}"));
+    let mut all: Vec<PathBuf> =
+        [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned).map(PathBuf::from).collect();
     let executable = std::env::current_exe().ok();
     let above = executable.iter().flat_map(|path| path.ancestors().skip(1)).map(Path::to_path_buf);
     for folder in std::env::current_dir().ok().into_iter().chain(above) {
@@ -93,7 +99,7 @@ fn libraries(folder: &Path, depth: usize, all: &mut Vec<PathBuf>) {
             if depth > 0 {
                 libraries(&path, depth - 1, all);
             }
-        } else if file_name(&path).starts_with("libonnxruntime.so") && !all.contains(&path) {
+        } else if file_name(&path).starts_with(NAME) && !all.contains(&path) {
             all.push(path);
         }
     }
@@ -115,8 +121,8 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
                 let environment = environment.map_err(|cause| Error::new(Kind::Library, path.display(), cause))?;
                 return Ok(Runtime { environment, path });
             }
-            // A name unknown to the loader is no news; a file that refuses is.
-            Err(_) if !candidate.is_absolute() => {}
+            // A name unknown to the loader is no news; a file that refuses, or a library too old, is.
+            Err(ort::LoadDynamicError::Dlopen { .. }) if !candidate.is_absolute() => {}
             Err(cause) => refusals.push(cause.to_string()),
         }
     }
@@ -135,7 +141,7 @@ fn located(candidate: &Path) -> PathBuf {
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
     let mapped =
         maps.lines().filter_map(|line| line.split_once('/')).map(|(_, path)| PathBuf::from(format!("/{path}")));
-    let found = mapped.into_iter().find(|path| file_name(path).starts_with("libonnxruntime.so"));
+    let found = mapped.into_iter().find(|path| file_name(path).starts_with(NAME));
     found.unwrap_or_else(|| candidate.to_path_buf())
 }
 

@@ -1,5 +1,6 @@
 //! Materials as glTF and its extensions define them: parameters and textures, evaluated at a surface.
 
+mod evaluate;
 mod library;
 
 pub use library::Materials;

@@ -24,3 +24,38 @@ pub fn t_critical(alpha: f64, tests: usize, freedom: f64) -> f64 {
         Err(error) => panic!("no t distribution with {freedom} degrees of freedom: {error}"),
     }
 }
+
+/// P-value of Pearson's chi-squared test of counts against expectations. Cells are pooled, in order of expectation, until
+/// each pool expects at least [`LEAST_EXPECTED`]; counts where next to nothing is expected make the value zero.
+pub fn chi_squared_p(counts: &[f64], expected: &[f64]) -> f64 {
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+    let mut cells: Vec<(f64, f64)> = expected.iter().copied().zip(counts.iter().copied()).collect();
+    cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut statistic, mut pools, mut pool) = (0.0, 0, (0.0, 0.0));
+    for (i, (e, c)) in cells.iter().enumerate() {
+        pool = (pool.0 + e, pool.1 + c);
+        let last = i + 1 == cells.len();
+        if pool.0 >= LEAST_EXPECTED {
+            statistic += (pool.1 - pool.0) * (pool.1 - pool.0) / pool.0;
+            pools += 1;
+            pool = (0.0, 0.0);
+        } else if last && pool.1 > pool.0 + 10.0 * LEAST_EXPECTED {
+            return 0.0;
+        }
+    }
+    if pools < 2 {
+        return 1.0;
+    }
+    match ChiSquared::new(f64::from(pools - 1)) {
+        Ok(chi) => 1.0 - chi.cdf(statistic),
+        Err(error) => panic!("no chi-squared distribution with {pools} pools: {error}"),
+    }
+}
+
+/// Least expectation of a pool of cells.
+pub const LEAST_EXPECTED: f64 = 8.0;
+
+/// Significance of one of `tests` simultaneous tests at a family-wise error rate of `alpha` (Sidak).
+pub fn sidak(alpha: f64, tests: usize) -> f64 {
+    1.0 - (1.0 - alpha).powf(1.0 / tests as f64)
+}

@@ -74,7 +74,7 @@ fn both_forms_equal_the_equation_word_for_word() {
                         let phi: f64 = (3 * j..3 * j + 3).map(|k| (value(k, c) - value(k, i)).powi(2)).sum();
                         let squared = ((c[0] - i[0]).pow(2) + (c[1] - i[1]).pow(2)) as f64;
                         let (source, centre) = (value(3 * pairs + j, i), value(4 * pairs + j, c));
-                        (source + centre - value(5 * pairs + j, c).exp() * squared - phi).exp()
+                        (source + centre - value(5 * pairs + j, c).min(0.0).exp() * squared - phi).exp()
                     })
                 }
                 Weights::Kernel(map) => oracle(&stack, 2, |j, c, i| {

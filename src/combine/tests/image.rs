@@ -1,5 +1,6 @@
 //! The shipped network on whole images: sizes, tiles, threads, units, bad input.
 
+use super::tile::Rect;
 use super::*;
 
 #[test]
@@ -25,11 +26,27 @@ fn tiles_leave_no_seams() {
             assert!(error < 1e-5, "{width} x {height} in tiles of {pixels}: {error}");
         }
     }
-    // The test can fail: without a halo the seams show.
-    let stack = random.stack(211, 150, 5);
-    let whole = combiner.run_tiled(&stack, usize::MAX).unwrap();
-    combiner.network.forget_halo();
-    assert!(distance(&combiner.run_tiled(&stack, 50 * 50).unwrap(), &whole, 1.0) > 1e-5);
+}
+
+#[test]
+fn the_network_sees_no_further_than_its_halo_but_does_see_that_far() {
+    let (stack, mut combiner) = (Random(6).stack(212, 152, 5), combiner());
+    let halo = combiner.facts().halo;
+    let normalisation = Normalisation::of(&stack);
+    let mut output = |rect: Rect| match combiner.network.run(&tensor::fill(&stack, &normalisation, rect), rect) {
+        Ok(Weights::Features(map)) => map,
+        other => panic!("{other:?}"),
+    };
+    let whole = output(Rect { x0: 0, y0: 0, x1: 212, y1: 152 });
+    let tile = output(Rect { x0: 100, y0: 40, x1: 200, y1: 140 });
+    let difference = |x: usize, y: usize| {
+        let channels = 0..whole.data.len() / (212 * 152);
+        channels.map(|k| (whole.row(k, y)[x] - tile.row(k, y)[x - 100]).abs()).fold(0.0, f32::max)
+    };
+    assert!(difference(100 + halo, 40 + halo) < 1e-5);
+    assert!(difference(199 - halo, 139 - halo) < 1e-5);
+    // A tile without a halo would show seams: the tests above can fail.
+    assert!(difference(100, 90) > 1e-3 && difference(150, 139) > 1e-3);
 }
 
 #[test]

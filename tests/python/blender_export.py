@@ -9,10 +9,7 @@ import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
-try:
-    import bpy
-except ImportError:
-    raise unittest.SkipTest("bpy is not installed: pip install bpy") from None
+import bpy  # noqa: E402
 import export  # noqa: E402
 import glb  # noqa: E402
 import lighting  # noqa: E402

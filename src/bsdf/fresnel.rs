@@ -1,0 +1,93 @@
+//! Reflectance of smooth interfaces, and the directions light takes there.
+
+use crate::math::{Rgb, Vec3, sqr};
+
+/// Ratios of refractive indices this near to 1 are taken for 1: the interface does nothing. Below it the half vector of
+/// refraction, a difference of nearly equal vectors, drowns in rounding.
+pub const MATCHED: f32 = 2e-3;
+
+/// Above this ratio of refractive indices the interface reflects all light (glTF's legacy ior 0 arrives as infinity).
+const MIRROR_ETA: f32 = 1e3;
+
+/// Whether an interface of relative index `eta` bends and reflects nothing.
+#[inline]
+pub fn is_matched(eta: f32) -> bool {
+    (eta - 1.0).abs() < MATCHED
+}
+
+/// Fresnel's equations for unpolarised light that meets a smooth dielectric from a medium in which the ray makes the angle
+/// `cos_o` (in `[0, 1]`) with the normal; `eta` is the index on the far side over the index on the near side.
+/// Returns the reflectance and the cosine of the refracted ray; `(1, 0)` at total internal reflection.
+#[inline]
+pub fn dielectric(cos_o: f32, eta: f32) -> (f32, f32) {
+    if is_matched(eta) {
+        return (0.0, cos_o);
+    }
+    if eta > MIRROR_ETA {
+        return (1.0, 1.0);
+    }
+    let sin2_t = (1.0 - cos_o * cos_o).max(0.0) / (eta * eta);
+    if sin2_t >= 1.0 {
+        return (1.0, 0.0);
+    }
+    let cos_t = (1.0 - sin2_t).sqrt();
+    let parallel = (eta * cos_o - cos_t) / (eta * cos_o + cos_t);
+    let perpendicular = (cos_o - eta * cos_t) / (cos_o + eta * cos_t);
+    (0.5 * (sqr(parallel) + sqr(perpendicular)), cos_t)
+}
+
+/// Reflectance of a dielectric at normal incidence; the same from both sides.
+#[inline]
+pub fn normal_incidence(eta: f32) -> f32 {
+    if is_matched(eta) {
+        0.0
+    } else if eta > MIRROR_ETA {
+        1.0
+    } else {
+        sqr((eta - 1.0) / (eta + 1.0))
+    }
+}
+
+/// Schlick's weight of F90: `(1 - cos)^5`.
+#[inline]
+pub fn schlick_weight(cos: f32) -> f32 {
+    let x = (1.0 - cos).clamp(0.0, 1.0);
+    sqr(sqr(x)) * x
+}
+
+/// Where the exact reflectance lies between its value at normal incidence (0) and at grazing incidence (1): lets
+/// KHR_materials_specular's F0 and F90 shape the exact curve, as they shape Schlick's in the extension's text.
+/// Returns the weight of F90 and the cosine of the refracted ray; `None` at total internal reflection.
+#[inline]
+pub fn grazing_weight(cos_o: f32, eta: f32) -> Option<(f32, f32)> {
+    if is_matched(eta) {
+        return Some((0.0, cos_o));
+    }
+    if eta > MIRROR_ETA {
+        return Some((schlick_weight(cos_o), 1.0));
+    }
+    let (f, cos_t) = dielectric(cos_o, eta);
+    if cos_t <= 0.0 && eta < 1.0 {
+        return None;
+    }
+    let f0 = normal_incidence(eta);
+    Some((((f - f0) / (1.0 - f0)).clamp(0.0, 1.0), cos_t))
+}
+
+/// Mirror image of `w` about the unit vector `h`.
+#[inline]
+pub fn reflect(w: Vec3, h: Vec3) -> Vec3 {
+    h * (2.0 * w.dot(h)) - w
+}
+
+/// The direction into which `w` is refracted at a facet with normal `h` on the side of `w`; `cos_t` from [`dielectric`].
+#[inline]
+pub fn refract(w: Vec3, h: Vec3, eta: f32, cos_t: f32) -> Vec3 {
+    h * (w.dot(h) / eta - cos_t) - w / eta
+}
+
+/// Schlick's reflectance of a metal of colour `f0`.
+#[inline]
+pub fn schlick(f0: Rgb, cos: f32) -> Rgb {
+    f0 + (Rgb::ONE - f0) * schlick_weight(cos)
+}

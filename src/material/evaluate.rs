@@ -1,0 +1,160 @@
+//! Materials at a surface: textures looked up, in the order the glTF specification multiplies them.
+
+use super::Material;
+use crate::bsdf::{EnergyTables, Parameters};
+use crate::geometry::Surface;
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, sqr};
+use crate::texture::{Texture, TextureRef};
+
+/// A texture at a surface; white where there is none or its index is past the list.
+#[inline]
+fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]) -> Vec4 {
+    let Some(reference) = texture else { return Vec4::ONE };
+    match textures.get(reference.texture as usize) {
+        Some(texture) => texture.sample(reference.coordinates(surface.uv)),
+        None => Vec4::ONE,
+    }
+}
+
+/// In `[0, 1]`; what is not a number is 0.
+#[inline]
+fn unit(x: f32) -> f32 {
+    if x > 0.0 { x.min(1.0) } else { 0.0 }
+}
+
+#[inline]
+fn unit_color(c: Rgb) -> Rgb {
+    Rgb::new(unit(c.x), unit(c.y), unit(c.z))
+}
+
+impl Material {
+    /// Base colour and alpha: factor, texture and vertex colour multiplied.
+    #[inline]
+    fn base(&self, surface: &Surface, textures: &[Texture]) -> Vec4 {
+        Vec4::from_array(self.base_color) * surface.color * look_up(&self.base_color_texture, surface, textures)
+    }
+
+    /// The parameters of the scattering model; `eta` is the index of refraction behind the surface (its back) over the one before it.
+    #[inline]
+    pub fn parameters(&self, surface: &Surface, textures: &[Texture], eta: f32) -> Parameters {
+        if self.unlit {
+            return Parameters { base_color: Rgb::ZERO, ..Parameters::default() };
+        }
+        let base = self.base(surface, textures);
+        let mut p = Parameters {
+            base_color: unit_color(base.truncate()),
+            metallic: unit(self.metallic),
+            eta,
+            transmission: unit(self.transmission),
+            thin: self.thin,
+            specular: unit(self.specular),
+            specular_color: self.specular_color.max(Rgb::ZERO),
+            ..Parameters::default()
+        };
+        let mut roughness = unit(self.roughness);
+        if self.metallic_roughness_texture.is_some() {
+            let texel = look_up(&self.metallic_roughness_texture, surface, textures);
+            roughness *= unit(texel.y);
+            p.metallic *= unit(texel.z);
+        }
+        let alpha = sqr(roughness);
+        (p.alpha_x, p.alpha_y) = (alpha, alpha);
+        if self.anisotropy != 0.0 {
+            // KHR_materials_anisotropy: along the direction, alpha is drawn towards 1.
+            let texel = look_up(&self.anisotropy_texture, surface, textures);
+            p.alpha_x = alpha + (1.0 - alpha) * sqr(unit(self.anisotropy * texel.z));
+        }
+        if self.transmission_texture.is_some() {
+            p.transmission *= unit(look_up(&self.transmission_texture, surface, textures).x);
+        }
+        if self.specular_texture.is_some() {
+            p.specular *= unit(look_up(&self.specular_texture, surface, textures).w);
+        }
+        if self.specular_color_texture.is_some() {
+            let texel = look_up(&self.specular_color_texture, surface, textures);
+            p.specular_color *= texel.truncate().max(Rgb::ZERO);
+        }
+        if self.clearcoat > 0.0 {
+            p.clearcoat = unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x);
+            let texel = look_up(&self.clearcoat_roughness_texture, surface, textures);
+            p.clearcoat_alpha = sqr(unit(self.clearcoat_roughness) * unit(texel.y));
+        }
+        if self.sheen_color.max_element() > 0.0 {
+            let texel = look_up(&self.sheen_color_texture, surface, textures);
+            p.sheen_color = unit_color(self.sheen_color) * unit_color(texel.truncate());
+            let texel = look_up(&self.sheen_roughness_texture, surface, textures);
+            p.sheen_alpha = sqr(unit(self.sheen_roughness) * unit(texel.w));
+        }
+        p
+    }
+
+    /// The shading frame: z the interpolated normal, turned by the normal map and kept on the side of the geometric normal; x along the
+    /// direction of anisotropy. Where the mesh has no tangents, a normal map has no frame to be read in and is ignored.
+    #[inline]
+    pub fn shading_frame(&self, surface: &Surface, textures: &[Texture]) -> Frame {
+        let tangent = surface.tangent.truncate();
+        let mut frame = Frame::from_normal_tangent(surface.ns, tangent);
+        let has_tangents = tangent != Vec3::ZERO;
+        let handedness = if surface.tangent.w < 0.0 { -1.0 } else { 1.0 };
+        if let (Some((texture, scale)), true) = (&self.normal_texture, has_tangents) {
+            let texel = look_up(&Some(*texture), surface, textures).truncate() * 2.0 - Vec3::ONE;
+            let local = Vec3::new(texel.x * scale, texel.y * scale * handedness, texel.z);
+            if let Some(n) = frame.to_world(local).try_normalize() {
+                frame = Frame::from_normal_tangent(on_side_of(n, surface.ng), tangent);
+            }
+        }
+        if self.anisotropy != 0.0 {
+            let texel = look_up(&self.anisotropy_texture, surface, textures);
+            let read = match self.anisotropy_texture {
+                Some(_) => Vec2::new(texel.x, texel.y) * 2.0 - Vec2::ONE,
+                None => Vec2::X,
+            };
+            let direction = Vec2::from_angle(self.anisotropy_rotation).rotate(read);
+            let along = frame.t * direction.x + frame.b * (direction.y * handedness);
+            frame = Frame::from_normal_tangent(frame.n, along);
+        }
+        frame
+    }
+
+    /// Alpha: of the base colour, its texture and the vertex colour.
+    #[inline]
+    pub fn alpha(&self, surface: &Surface, textures: &[Texture]) -> f32 {
+        self.base_color[3] * surface.color.w * look_up(&self.base_color_texture, surface, textures).w
+    }
+
+    /// Emitted radiance (W/sr/m2) of the front; unlit materials give their base colour.
+    #[inline]
+    pub fn emitted(&self, surface: &Surface, textures: &[Texture]) -> Rgb {
+        if self.unlit {
+            return self.base(surface, textures).truncate();
+        }
+        if self.emission_texture.is_none() {
+            return self.emission;
+        }
+        self.emission * look_up(&self.emission_texture, surface, textures).truncate()
+    }
+}
+
+/// `n` where it is at least a little on the side of `ng`, else moved there.
+#[inline]
+fn on_side_of(n: Vec3, ng: Vec3) -> Vec3 {
+    /// Least cosine between a mapped normal and the geometric one.
+    const LEAST: f32 = 0.05;
+    let cos = n.dot(ng);
+    if cos >= LEAST { n } else { (n + ng * (LEAST - cos)).normalize() }
+}
+
+impl EnergyTables {
+    /// Tables for all interfaces that surfaces of these materials make with the open space and with each other's solids.
+    pub fn for_materials(materials: &[Material]) -> EnergyTables {
+        let index = |m: &Material| if m.ior.is_finite() { m.ior } else { 1.0 };
+        let mut around: Vec<f32> = materials.iter().filter(|m| m.is_solid_glass()).map(index).chain([1.0]).collect();
+        around.sort_by(f32::total_cmp);
+        around.dedup();
+        let mut etas = vec![];
+        for material in materials {
+            etas.extend(around.iter().map(|n| material.ior / n));
+        }
+        EnergyTables::for_etas(etas)
+    }
+}
