@@ -162,6 +162,7 @@ fn complete(header: &mut Map<String, Value>, args: &RenderArgs, scene: &Scene, c
         && let Some(Value::Object(phases)) = header.get_mut("phases")
     {
         phases.insert("layers_and_combiner".into(), seconds.into());
+        header.insert("peak_memory".into(), peak_memory().into());
     }
 }
 
