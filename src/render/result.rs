@@ -5,7 +5,7 @@ use super::settings::{Levels, Settings};
 use crate::estimator::{Pixel, SquaredError};
 use serde::Serialize;
 
-/// Processor-independent record of where the time went, wall seconds per phase.
+/// Where the time went: core-seconds (processor time of the whole process) per phase.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Phases {
     /// Pilot pass and initial bandwidths.

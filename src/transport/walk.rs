@@ -35,7 +35,7 @@ pub struct Vertex<'a> {
     /// The surface.
     pub surface: &'a Surface,
     /// How it scatters.
-    pub shading: &'a Shading,
+    pub shading: &'a Shading<'a>,
     /// Unit direction back along the path.
     pub wo: Vec3,
     /// Weight of the path up to here, before this vertex scatters.

@@ -105,9 +105,12 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
     let unknown: Vec<&String> = required.iter().filter(|name| !SUPPORTED.contains(&name.as_str())).collect();
     if let Some(first) = unknown.first() {
         let names: Vec<String> = unknown.iter().map(|name| format!("\"{name}\"")).collect();
-        let word = if unknown.len() == 1 { "extension" } else { "extensions" };
-        return Err(fault("extensionsRequired", format!("{word} {} is required but not supported", names.join(", ")))
-            .hint(remedy(first)));
+        let (word, are) = if unknown.len() == 1 { ("extension", "is") } else { ("extensions", "are") };
+        return Err(fault(
+            "extensionsRequired",
+            format!("{word} {} {are} required but not supported", names.join(", ")),
+        )
+        .hint(remedy(first)));
     }
     let mut used = listed("extensionsUsed");
     collect(document, &mut used);

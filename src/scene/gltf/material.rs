@@ -93,7 +93,7 @@ pub(super) struct Loaded {
     pub(super) material: Material,
     /// `Some(true)`: a volume extension with a thickness, or a medium inside. `Some(false)`: a volume extension without thickness.
     pub(super) solid: Option<bool>,
-    /// Some texture is not read because its light transport is simulated.
+    /// It has an occlusion texture, which is not read: occlusion is simulated.
     pub(super) occlusion: bool,
 }
 

@@ -4,6 +4,7 @@ use super::Glass;
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
 use super::texture::Textures;
+use super::topology::Solid;
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
@@ -29,15 +30,16 @@ impl Library {
         Library { glass, list, textures, loaded: HashMap::new(), known: HashMap::new(), occluded: 0 }
     }
 
-    /// The material of a mesh. `closed`: the mesh bounds a solid.
+    /// The material of a mesh that bounds `bounds`.
     pub(super) fn wear(
         &mut self,
         document: &Document,
         index: Option<usize>,
         mesh: &Mesh,
-        closed: bool,
+        bounds: Solid,
         warnings: &mut Vec<String>,
     ) -> Result<u32> {
+        let closed = bounds.closed;
         let place = place(document, index)?;
         if !self.loaded.contains_key(&index) {
             let loaded = match index {
@@ -56,10 +58,11 @@ impl Library {
                 Glass::Thin => false,
             });
         if solid && !closed {
-            warnings.push(format!(
-                "mesh \"{}\": its {place} is solid, but the mesh is not closed: light may get lost inside",
-                mesh.name
-            ));
+            let why = match bounds.flipped {
+                true => "part of its faces is turned over: recalculate its normals",
+                false => "the mesh is not closed: light may get lost inside",
+            };
+            warnings.push(format!("mesh \"{}\": its {place} is solid, but {why}", mesh.name));
         }
         check_coordinates(&loaded.material, mesh, &place, warnings);
         if let Some(&known) = self.known.get(&(index, solid)) {

@@ -1,15 +1,15 @@
 //! Primitives to triangle meshes.
 
 use super::document::{Document, get, named};
-use super::{fault, shading_frame};
+use super::{counted, fault, shading_frame};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-/// Larger coordinates (m) leave no room to square and add them in f32.
-pub(super) const FARTHEST: f64 = 1e15;
+/// Larger coordinates (m) leave no room for the square of an area in f32.
+pub(super) const FARTHEST: f64 = 1e9;
 
 /// Reads primitive `primitive` of mesh `mesh`. `None`: it has nothing to render, and a warning says why.
 ///
@@ -139,11 +139,8 @@ impl Reader<'_> {
             bad += 1;
         }
         if bad > 0 {
-            warnings.push(format!(
-                "{}: {bad} values of {} are not finite and are replaced",
-                self.place,
-                semantic.to_string()
-            ));
+            let (what, at) = (semantic.to_string(), counted(bad, "vertex", "vertices"));
+            warnings.push(format!("{}: {what} is not finite at {at}: replaced", self.place));
         }
         Ok(values)
     }
@@ -154,7 +151,8 @@ impl Reader<'_> {
         mesh.normals = normals.into_iter().map(|v| Vec3::from_array(v).normalize_or_zero()).collect();
         let repaired = shading_frame::repair_normals(mesh);
         if repaired > 0 {
-            warnings.push(format!("{}: {repaired} normals have no direction and are made from the faces", self.place));
+            let at = counted(repaired, "vertex", "vertices");
+            warnings.push(format!("{}: NORMAL has no direction at {at}: made from the faces", self.place));
         }
         for set in 0..2 {
             let values = self.vertex_values::<2>(&Semantic::TexCoords(set), n, [0.0; 2], warnings)?;

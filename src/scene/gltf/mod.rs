@@ -80,6 +80,11 @@ pub fn read_bytes(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<De
     nodes::describe(bytes, path, options).map_err(|e| e.within(path.display()))
 }
 
+/// `1 vertex`, `2 vertices`.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
 /// A fault of the scene file at a place in it.
 fn fault(place: impl Display, cause: impl Display) -> Error {
     Error::new(Kind::Scene, place, cause)

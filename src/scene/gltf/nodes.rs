@@ -4,7 +4,7 @@ use super::document::{Document, extension, get, named};
 use super::extras::{self, SceneExtras};
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
-use super::{ReadOptions, fault, lights, mesh, shading_frame, topology, uri};
+use super::{ReadOptions, counted, fault, lights, mesh, shading_frame, topology};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{DAffine3, DMat3, DVec3, Rgb};
@@ -13,7 +13,7 @@ use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Place
 use crate::scene::environment_file;
 use serde::Deserialize;
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// More copies of one node than this are taken for damage.
@@ -28,6 +28,7 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         document: &document,
         library: Library::new(options.glass),
         meshes: HashMap::new(),
+        bounds: Vec::new(),
         divisor: None,
         options: *options,
         scene: SceneExtras::default(),
@@ -40,6 +41,8 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
         out.warnings.push(format!("{n} {plural}, ignored: occlusion is simulated"));
     }
+    let mut said = HashSet::new();
+    out.warnings.retain(|warning| said.insert(warning.clone()));
     out.materials = library.list;
     out.textures = library.textures.list;
     Ok(out)
@@ -80,6 +83,8 @@ struct Reader<'r> {
     library: Library,
     /// By mesh of the file.
     meshes: HashMap<usize, Vec<Part>>,
+    /// Local bounds of the meshes read.
+    bounds: Vec<(DVec3, DVec3)>,
     /// What divides intensities, once it is known.
     divisor: Option<f32>,
     options: ReadOptions,
@@ -112,8 +117,8 @@ impl Reader<'_> {
         self.environment(&place).map_err(|e| e.within(&place))?;
         self.walk(roots)?;
         if let Some(animations) = document.raw["animations"].as_array().filter(|a| !a.is_empty()) {
-            let n = animations.len();
-            self.out.warnings.push(format!("{n} animation(s) ignored: the nodes are rendered where they stand"));
+            let n = counted(animations.len(), "animation", "animations");
+            self.out.warnings.push(format!("{n} ignored: the nodes are rendered where they stand"));
         }
         Ok(())
     }
@@ -144,10 +149,7 @@ impl Reader<'_> {
                 }
                 EnvironmentSource::Color(color)
             }
-            (None, Some(file)) => {
-                let path = uri::path_of(file, self.document.folder).map_err(|e| e.within("environment"))?;
-                environment_file::read(&path, &mut self.out.warnings)?
-            }
+            (None, Some(file)) => environment_file::read(&self.document.folder.join(file), &mut self.out.warnings)?,
             _ => {
                 self.out
                     .warnings
@@ -253,12 +255,13 @@ impl Reader<'_> {
     }
 
     fn check_reach(&self, mesh: u32, to_world: &DAffine3, place: &str) -> Result<()> {
-        let mesh = &self.out.meshes[mesh as usize];
-        let far = |p: &crate::math::Vec3| {
-            let p = to_world.transform_point3(p.as_dvec3());
-            !(p.abs().max_element() <= FARTHEST)
+        let (low, high) = self.bounds[mesh as usize];
+        let far = |i: usize| {
+            let corner = DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), low, high);
+            let reach = to_world.transform_point3(corner).abs().max_element();
+            reach.is_nan() || reach > FARTHEST
         };
-        if mesh.positions.iter().any(far) {
+        if (0..8).any(far) {
             return Err(fault(place, "it reaches too far from the origin").hint("look at its scale and position"));
         }
         Ok(())
@@ -287,7 +290,9 @@ impl Reader<'_> {
             let place = format!("{}, primitive {i}", named("mesh", source.name.as_deref(), index));
             let dropped = mesh::drop_degenerate(&mut mesh);
             if dropped > 0 {
-                self.out.warnings.push(format!("{place}: {dropped} triangle(s) without area are left out"));
+                self.out
+                    .warnings
+                    .push(format!("{place}: {} without area left out", counted(dropped, "triangle", "triangles")));
             }
             if mesh.triangles.is_empty() {
                 self.out.warnings.push(format!("{place}: it has no triangle to render"));
@@ -298,7 +303,7 @@ impl Reader<'_> {
             let bounds = if own.closed { own } else { whole };
             let material = self
                 .library
-                .wear(document, index, &mesh, bounds.closed, warnings)
+                .wear(document, index, &mesh, bounds, warnings)
                 .map_err(|e| if e.place.is_empty() { e.within(&place) } else { e })?;
             let worn = &self.library.list[material as usize];
             if worn.is_solid_glass() && bounds.closed && bounds.volume < 0.0 {
@@ -312,6 +317,9 @@ impl Reader<'_> {
                 shading_frame::make_tangents(&mut mesh, set);
             }
             parts.push(Part { mesh: self.out.meshes.len() as u32, material });
+            let points = || mesh.positions.iter().map(|p| p.as_dvec3());
+            let low = points().fold(DVec3::INFINITY, DVec3::min);
+            self.bounds.push((low, points().fold(DVec3::NEG_INFINITY, DVec3::max)));
             self.out.meshes.push(mesh);
         }
         self.meshes.insert(index, parts.clone());

@@ -9,6 +9,8 @@ use std::collections::HashMap;
 pub(super) struct Solid {
     /// Every edge, vertices welded by position, is shared by exactly two triangles that run along it in opposite directions.
     pub(super) closed: bool,
+    /// Every edge is shared by two triangles, but some run along it in the same direction: part of the faces is turned over.
+    pub(super) flipped: bool,
     /// Volume inside (m3); negative when the front faces look inwards. Meaningless for an open surface.
     pub(super) volume: f64,
 }
@@ -43,10 +45,10 @@ pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
         }
     }
     edges.sort_unstable();
-    let pairs = edges.chunks(2).all(|pair| matches!(pair, [(a, b, false), (c, d, true)] if a == c && b == d));
-    // Two pairs on one edge are four triangles.
-    let twice = edges.windows(3).any(|e| (e[0].0, e[0].1) == (e[2].0, e[2].1));
-    Solid { closed: !edges.is_empty() && pairs && !twice, volume }
+    let same = |a: &(u32, u32, bool), b: &(u32, u32, bool)| (a.0, a.1) == (b.0, b.1);
+    let paired = !edges.is_empty() && edges.chunk_by(same).all(|edge| edge.len() == 2);
+    let opposite = edges.chunk_by(same).all(|edge| edge.first().map(|e| e.2) != edge.last().map(|e| e.2));
+    Solid { closed: paired && opposite, flipped: paired && !opposite, volume }
 }
 
 #[cfg(test)]
@@ -69,10 +71,12 @@ mod tests {
         assert!(found.closed && (found.volume - 1.0 / 6.0).abs() < 1e-12);
         let mut open = whole.clone();
         open.triangles.pop();
-        assert!(!solid(&[&open]).closed);
+        let found = solid(&[&open]);
+        assert!(!found.closed && !found.flipped);
         let mut flipped = whole.clone();
         flipped.triangles[3].swap(0, 1);
-        assert!(!solid(&[&flipped]).closed);
+        let found = solid(&[&flipped]);
+        assert!(!found.closed && found.flipped);
         let mut inside_out = whole.clone();
         inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         let found = solid(&[&inside_out]);
