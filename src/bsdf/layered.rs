@@ -19,6 +19,9 @@ use super::{BsdfSample, DELTA_ALPHA, LobeSet, Parameters, SHARP_ALPHA, Transport
 use crate::math::{Rgb, Vec2, Vec3, sqr, warp};
 use std::f32::consts::{FRAC_1_PI, PI};
 
+/// Directions nearer to the surface than this (cosine) are in it: nothing comes from there. Below it, products of cosines underflow.
+const LEAST_COSINE: f32 = 1e-6;
+
 /// Mean of the channels: what lobes are chosen by.
 #[inline]
 fn mean(c: Rgb) -> f32 {
@@ -116,6 +119,8 @@ pub struct Layered<'a> {
     passed: Rgb,
     /// Compensation for solid glass, by side: what is lost from above and from below.
     glass_loss: [Profile<'a>; 2],
+    /// Albedo of its reflecting facets, by side.
+    glass_reflected: [Profile<'a>; 2],
     /// Reflected compensation: `glass_returned[side] * loss(o) * loss(i)`.
     glass_returned: [f32; 2],
     /// Transmitted compensation over the squared index of the side transmitted to (with 1 above): the same from both sides.
@@ -176,6 +181,7 @@ impl<'a> Layered<'a> {
             returned: Rgb::ZERO,
             passed: Rgb::ZERO,
             glass_loss: [nothing; 2],
+            glass_reflected: [nothing; 2],
             glass_returned: [0.0; 2],
             glass_passed: Rgb::ZERO,
             cover: None,
@@ -218,6 +224,7 @@ impl<'a> Layered<'a> {
     fn compensate_glass(&mut self, alpha: Position, sides: [&'a SideTables; 2]) {
         let (f0, f90) = (self.f0.max_element(), self.f90);
         self.glass_loss = sides.map(|s| s.glass_loss(alpha, f0, f90));
+        self.glass_reflected = sides.map(|s| s.reflection(alpha, f0, f90));
         // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average those of the other side;
         // k makes no share larger than the average transmittance of the smooth interface, which is in proportion to n^2 already.
         let transmitted = sides.map(|s| 1.0 - s.average_reflectance(f0, f90));
@@ -291,29 +298,37 @@ impl<'a> Layered<'a> {
         if side == 0 || self.thin { self.eta } else { 1.0 / self.eta }
     }
 
-    /// Reflectance and transmittance of a facet at the angle of cosine `cos`, and the cosine of the refracted ray.
+    /// Reflectance of the dielectric at a facet, what it lets through, and the cosine of the refracted ray.
     #[inline]
-    fn fresnel(&self, cos: f32, side: usize) -> (Rgb, Rgb, f32) {
-        let mut reflected = if self.metal > 0.0 { schlick(self.base, cos) * self.metal } else { Rgb::ZERO };
-        let mut transmitted = Rgb::ZERO;
-        let mut refracted = 0.0;
-        let dielectric = |eta: f32| match grazing_weight(cos, eta) {
+    fn dielectric(&self, cos: f32, eta: f32) -> (Rgb, f32, f32) {
+        match grazing_weight(cos, eta) {
             None => (Rgb::ONE, 0.0, 0.0),
             Some((grazing, cos_t)) => {
                 let f = self.f0 + (Rgb::splat(self.f90) - self.f0) * grazing;
-                (f, 1.0 - f.max_element(), cos_t)
+                (f, (1.0 - f.max_element()).max(0.0), cos_t)
             }
-        };
+        }
+    }
+
+    /// Reflectance of metal and of the matte's interface at a facet.
+    #[inline]
+    fn opaque(&self, cos: f32) -> Rgb {
+        let mut reflected = if self.metal > 0.0 { schlick(self.base, cos) * self.metal } else { Rgb::ZERO };
         if self.matte > 0.0 {
-            reflected += dielectric(self.eta).0 * self.matte;
+            reflected += self.dielectric(cos, self.eta).0 * self.matte;
         }
-        if self.glass > 0.0 {
-            let (f, t, cos_t) = dielectric(self.eta_from(side));
-            reflected += f * self.glass;
-            transmitted = self.base * (self.glass * t.max(0.0));
-            refracted = cos_t;
+        reflected
+    }
+
+    /// Reflectance and transmittance of a facet at the angle of cosine `cos`, and the cosine of the refracted ray.
+    #[inline]
+    fn fresnel(&self, cos: f32, side: usize) -> (Rgb, Rgb, f32) {
+        let opaque = self.opaque(cos);
+        if self.glass == 0.0 {
+            return (opaque, Rgb::ZERO, 0.0);
         }
-        (reflected, transmitted, refracted)
+        let (f, t, cos_t) = self.dielectric(cos, self.eta_from(side));
+        (opaque + f * self.glass, self.base * (self.glass * t), cos_t)
     }
 
     /// A cosine at which the smooth interface reflects about as much as the rough one does at `mu`.
@@ -334,20 +349,24 @@ impl<'a> Layered<'a> {
         let rough = self.class != LobeSet::DELTA;
         let facets = self.has_facets && set.has(self.class);
         if facets {
-            let (r, t, _) = self.fresnel(self.effective_cosine(mu), side);
+            let cos = self.effective_cosine(mu);
             let loss = self.loss.at(at);
-            let solid = self.is_rough_solid();
-            let glass_loss = if solid { self.glass_loss[side].at(at) } else { loss };
-            a[0] = r * (1.0 - loss) + t * (1.0 - glass_loss);
-            if rough {
-                let own = PI * self.loss.average * loss;
-                a[1] = self.returned * own;
-                a[2] = self.passed * own;
-                if solid {
-                    a[1] += Rgb::splat(self.glass_returned[side] * glass_loss * self.glass_loss[side].average * PI);
-                    let other = self.glass_loss[1 - side].average * self.index2(1 - side);
-                    a[2] += self.glass_passed * (glass_loss * other * PI);
-                }
+            let own = PI * self.loss.average * loss;
+            a[1] = self.returned * own;
+            a[2] = self.passed * own;
+            if self.is_rough_solid() {
+                let glass_loss = self.glass_loss[side].at(at);
+                let reflected = self.glass_reflected[side].at(at);
+                let transmitted = (1.0 - glass_loss - reflected).max(0.0);
+                let smooth = self.dielectric(cos, self.eta_from(side)).0;
+                let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);
+                a[0] = self.opaque(cos) * (1.0 - loss) + (tint * reflected + self.base * transmitted) * self.glass;
+                a[1] += Rgb::splat(self.glass_returned[side] * glass_loss * self.glass_loss[side].average * PI);
+                let other = self.glass_loss[1 - side].average * self.index2(1 - side);
+                a[2] += self.glass_passed * (glass_loss * other * PI);
+            } else {
+                let (r, t, _) = self.fresnel(cos, side);
+                a[0] = (r + t) * (1.0 - loss);
             }
         }
         if set.has(LobeSet::BROAD) && self.diffuse.max_element() > 0.0 {
@@ -409,7 +428,7 @@ impl<'a> Layered<'a> {
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let side = usize::from(wo.z < 0.0);
         let (mu_o, mu_i) = (wo.z.abs(), wi.z.abs());
-        if !(mu_o > 0.0 && mu_i > 0.0) || !(set & LobeSet::SMOOTH).has(self.lobes()) {
+        if !(mu_o > LEAST_COSINE && mu_i > LEAST_COSINE) || !(set & LobeSet::SMOOTH).has(self.lobes()) {
             return (Rgb::ZERO, 0.0);
         }
         // Delta lobes take their share of the directions drawn from the set.
@@ -590,7 +609,7 @@ impl<'a> Layered<'a> {
         let side = usize::from(wo.z < 0.0);
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let o = Vec3::new(wo.x, wo.y, wo.z.abs());
-        if !(o.z > 0.0) {
+        if !(o.z > LEAST_COSINE) {
             return None;
         }
         let at = Position::new(o.z);
@@ -671,7 +690,7 @@ impl<'a> Layered<'a> {
         };
         let wi = back(i.normalize());
         let (f, pdf_w) = self.evaluate_shares(wo, wi, at, side, transport, set, &shares);
-        if !(pdf_w > 0.0) {
+        if !(pdf_w > 0.0 && i.z.abs() > LEAST_COSINE) {
             return None;
         }
         Some(BsdfSample { wi, weight: f * (wi.z.abs() / pdf_w), pdf_w, lobe, transmitted: i.z < 0.0 })
