@@ -33,4 +33,10 @@ pub mod transport;
 
 pub mod estimator;
 
+pub mod film;
+
+pub mod image;
+
+pub mod combine;
+
 pub mod render;

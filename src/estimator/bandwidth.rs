@@ -8,8 +8,7 @@
 use crate::camera::Camera;
 use crate::photon::{PhotonMap, nearest_radius2};
 use crate::random::{Domain, Stream};
-use crate::scene::Scene;
-use crate::transport::{GatherPoint, gather_point, same_surface};
+use crate::transport::{Eye, GatherPoint, same_surface};
 use rayon::prelude::*;
 
 /// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the picture says
@@ -38,14 +37,8 @@ fn span(camera: &Camera, length: f32) -> f32 {
 }
 
 /// Largest initial bandwidth of every pixel, row by row.
-pub fn initial_bandwidths(
-    scene: &Scene,
-    camera: &Camera,
-    rule: InitialBandwidth,
-    seed: u64,
-    pilot: &PhotonMap,
-    max_depth: u32,
-) -> Vec<f32> {
+pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilot: &PhotonMap) -> Vec<f32> {
+    let (scene, camera) = (eye.scene, eye.camera);
     let (width, height) = camera.size();
     let pixels = width as usize * height as usize;
     if let InitialBandwidth::Fixed(r) = rule {
@@ -70,7 +63,7 @@ pub fn initial_bandwidths(
         .map(|i| {
             let pixel = (i as u32 % width, i as u32 / width);
             let stream = Stream::new(seed, 0, Domain::PilotEye, i as u64);
-            gather_point(scene, camera, pixel, stream, max_depth).map(|point| of_point(&point))
+            eye.gather_point(pixel, stream).map(|point| of_point(&point))
         })
         .collect();
     let mut known: Vec<f32> = found.iter().flatten().copied().collect();

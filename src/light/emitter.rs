@@ -1,6 +1,7 @@
 //! One light source and the densities that belong to it.
 
 use super::Environment;
+use crate::geometry::Shapes;
 use crate::math::{Frame, Rgb, Vec3, luminance, sqr};
 use std::f32::consts::{PI, TAU};
 
@@ -92,6 +93,17 @@ impl Emitter {
             Emitter::Sun { irradiance, .. } => luminance(*irradiance) * disc,
             Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc,
         })
+    }
+
+    /// A point of the light, just before its front; `None` for light from infinity.
+    pub fn anywhere(&self, shapes: &Shapes) -> Option<Vec3> {
+        match self {
+            Emitter::Triangle { instance, primitive, .. } => {
+                shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.spawn(s.ng))
+            }
+            Emitter::Point { p, .. } | Emitter::Spot { p, .. } => Some(*p),
+            Emitter::Sun { .. } | Emitter::Environment => None,
+        }
     }
 
     /// No ray that is not aimed at it can find it.

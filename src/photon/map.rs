@@ -68,6 +68,7 @@ struct Node {
 pub struct PhotonMap {
     photons: Vec<Photon>,
     leaves: Vec<Leaf>,
+    quantiser: Quantiser,
     /// `levels[0]` is the root's level (one node); the last level's children are leaves.
     levels: Vec<Vec<Node>>,
 }
@@ -81,6 +82,21 @@ fn spread(v: u64) -> u64 {
     x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
     x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
     (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// Maps positions to Morton codes.
+#[derive(Clone, Copy)]
+struct Quantiser {
+    min: Vec3,
+    scale: f32,
+}
+
+impl Quantiser {
+    #[inline]
+    fn code(&self, p: Vec3) -> u64 {
+        let q = ((p - self.min) * self.scale).clamp(Vec3::ZERO, Vec3::splat(((1u32 << MORTON_BITS) - 1) as f32));
+        spread(q.x as u64) | spread(q.y as u64) << 1 | spread(q.z as u64) << 2
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -105,15 +121,9 @@ impl PhotonMap {
         photons.retain(|p| p.p.is_finite() && p.flux.is_finite());
         let bounds = photons.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb { min: p.p, max: p.p }));
         let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
-        let scale = ((1u64 << MORTON_BITS) - 1) as f32 / extent;
-        let mut order: Vec<(u64, u32)> = photons
-            .par_iter()
-            .enumerate()
-            .map(|(i, photon)| {
-                let q = (photon.p - bounds.min) * scale;
-                (spread(q.x as u64) | spread(q.y as u64) << 1 | spread(q.z as u64) << 2, i as u32)
-            })
-            .collect();
+        let quantiser = Quantiser { min: bounds.min, scale: ((1u32 << MORTON_BITS) - 1) as f32 / extent };
+        let mut order: Vec<(u64, u32)> =
+            photons.par_iter().enumerate().map(|(i, photon)| (quantiser.code(photon.p), i as u32)).collect();
         order.par_sort_unstable();
         let photons: Vec<Photon> = order.par_iter().map(|&(_, i)| photons[i as usize]).collect();
 
@@ -151,7 +161,7 @@ impl PhotonMap {
         }
         levels.reverse();
         debug_assert!(levels.len() <= MAX_LEVELS);
-        PhotonMap { photons, leaves, levels }
+        PhotonMap { photons, leaves, quantiser, levels }
     }
 
     /// The photons, in Morton order.
@@ -164,6 +174,13 @@ impl PhotonMap {
         self.photons.len() * size_of::<Photon>()
             + self.leaves.len() * size_of::<Leaf>()
             + self.levels.iter().map(|l| l.len() * size_of::<Node>()).sum::<usize>()
+    }
+
+    /// About `2 * reach` photons around `p` along the Morton curve: a good guess at its neighbourhood.
+    pub(super) fn around(&self, p: Vec3, reach: usize) -> &[Photon] {
+        let code = self.quantiser.code(p);
+        let at = self.photons.partition_point(|photon| self.quantiser.code(photon.p) < code);
+        &self.photons[at.saturating_sub(reach)..(at + reach).min(self.photons.len())]
     }
 
     /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p`, in Morton order.

@@ -6,6 +6,14 @@ use crate::math::Vec3;
 /// Most neighbours that can be asked for.
 pub const MAX_NEIGHBOURS: usize = 1024;
 
+/// Puts a distance into the sorted run of the `k` best; returns the radius squared that matters from now on.
+fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
+    best.insert(best.partition_point(|&d| d <= distance2), distance2);
+    best.truncate(k);
+    // Strictly nearer photons only may still displace the k-th.
+    if best.len() == k { best[k - 1].min(radius2) } else { radius2 }
+}
+
 /// Squared distance from `p` to its `k`-th nearest photon among those that `accept` takes and that lie nearer than
 /// `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
 pub fn nearest_radius2(
@@ -16,19 +24,21 @@ pub fn nearest_radius2(
     accept: impl Fn(&Photon) -> bool,
 ) -> Option<f32> {
     // A sorted run of the best distances: k is small, and an insertion moves half of it.
-    let mut best: Vec<f32> = Vec::with_capacity(k);
-    map.traverse(p, limit2, |photon, distance2, radius2| {
+    let mut best: Vec<f32> = Vec::with_capacity(k + 1);
+    // The neighbourhood along the curve bounds the distance, so that the search proper starts small.
+    let mut bound = limit2;
+    for photon in map.around(p, 2 * k) {
+        let distance2 = photon.p.distance_squared(p);
+        if distance2 < bound && accept(photon) {
+            bound = insert(&mut best, k, distance2, bound);
+        }
+    }
+    best.clear();
+    // The bound itself was reached by some photon: it must stay within.
+    let start = if bound < limit2 { bound.next_up() } else { limit2 };
+    map.traverse(p, start, |photon, distance2, radius2| {
         // The other photons of a leaf were found before the radius shrank.
-        if distance2 >= radius2 || !accept(photon) {
-            return radius2;
-        }
-        let at = best.partition_point(|&d| d <= distance2);
-        if best.len() == k {
-            best.pop();
-        }
-        best.insert(at, distance2);
-        // Strictly nearer photons only may still displace the k-th.
-        if best.len() == k { best[k - 1] } else { radius2 }
+        if distance2 >= radius2 || !accept(photon) { radius2 } else { insert(&mut best, k, distance2, radius2) }
     });
     (best.len() == k).then(|| best[k - 1])
 }

@@ -1,11 +1,12 @@
 //! Rendering: the pass loop, when it stops, and what it reports.
 
 mod control;
+pub mod output;
 mod result;
 mod settings;
 mod sppm;
 
-pub use control::{Control, History, Progress, StopReason};
-pub use result::Rendered;
-pub use settings::{Levels, Settings, Shard};
+pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
+pub use result::{Phases, Rendered};
+pub use settings::{DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_PHOTONS, Levels, Settings, Shard};
 pub use sppm::sppm;

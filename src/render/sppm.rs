@@ -13,7 +13,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::{Photon, PhotonMap};
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
-use crate::transport::{EyeMeasure, LevelRadii, LightPass, eye_path, light_path};
+use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Surroundings, light_path};
 use rayon::prelude::*;
 
 /// Light paths per unit of work. Constant, so that the photons' order does not depend on threads.
@@ -22,14 +22,14 @@ const CHUNK: u32 = 1024;
 const TILE: usize = 16;
 
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
-pub fn trace_photons(scene: &Scene, pass: &LightPass) -> Vec<Photon> {
+pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Vec<Photon> {
     let chunks = pass.paths().div_ceil(CHUNK);
     let parts: Vec<Vec<Photon>> = (0..chunks)
         .into_par_iter()
         .map(|chunk| {
             let mut photons = Vec::with_capacity(CHUNK as usize * 2);
             for index in chunk * CHUNK..((chunk + 1) * CHUNK).min(pass.paths()) {
-                light_path(scene, pass, index, &mut photons);
+                light_path(scene, surroundings, pass, index, &mut photons);
             }
             photons
         })
@@ -38,8 +38,8 @@ pub fn trace_photons(scene: &Scene, pass: &LightPass) -> Vec<Photon> {
 }
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
-fn eye_pass(scene: &Scene, camera: &Camera, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
-    let (width, _) = camera.size();
+fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
+    let (width, _) = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
     let rows = width as usize * TILE;
@@ -56,18 +56,18 @@ fn eye_pass(scene: &Scene, camera: &Camera, settings: &Settings, i: u64, photons
                     let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
                     let trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
                         let stream = Stream::new(settings.seed, i, domain, index);
-                        eye_path(scene, camera, (x as u32, y as u32), stream, photons, radii, settings.max_depth)
+                        eye.measure((x as u32, y as u32), stream, photons, radii)
                     };
                     if levels.two_paths {
                         let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));
                         let others =
                             LevelRadii::new((1..levels.count.max(2)).map(|k| radius2(k.min(levels.count - 1))));
                         let correlated = trace(Domain::EyeCorrelated, &others);
-                        keep_first_hit(scene, camera, pixel, &independent);
+                        keep_first_hit(eye, pixel, &independent);
                         pixel.add(&independent, Some(&correlated), levels.count, levels.own());
                     } else {
                         let all = trace(Domain::EyeIndependent, &LevelRadii::new((0..levels.count).map(radius2)));
-                        keep_first_hit(scene, camera, pixel, &all);
+                        keep_first_hit(eye, pixel, &all);
                         pixel.add(&all, None, levels.count, levels.own());
                     }
                 }
@@ -76,10 +76,10 @@ fn eye_pass(scene: &Scene, camera: &Camera, settings: &Settings, i: u64, photons
     });
 }
 
-fn keep_first_hit(scene: &Scene, camera: &Camera, pixel: &mut Pixel, measure: &EyeMeasure) {
+fn keep_first_hit(eye: &Eye<'_>, pixel: &mut Pixel, measure: &EyeMeasure) {
     if let (0, Some(first)) = (pixel.iterations, measure.first) {
-        pixel.z = camera.depth(first.p);
-        pixel.p = (first.p.as_dvec3() + scene.origin).as_vec3();
+        pixel.z = eye.camera.depth(first.p);
+        pixel.p = (first.p.as_dvec3() + eye.scene.origin).as_vec3();
     }
 }
 
@@ -94,13 +94,15 @@ pub fn sppm(
     let cpu_start = cpu_seconds();
     let (width, height) = camera.size();
     let mut phases = Phases::default();
+    let surroundings = Surroundings::new(scene, camera.position());
+    let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
     let pilot = if matches!(settings.initial, InitialBandwidth::Nearest(_)) {
         let pass = LightPass::new(settings.seed, 0, Domain::PilotLight, settings.photons, settings.max_depth);
-        PhotonMap::build(trace_photons(scene, &pass))
+        PhotonMap::build(trace_photons(scene, &surroundings, &pass))
     } else {
         PhotonMap::build(Vec::new())
     };
-    let bandwidths = initial_bandwidths(scene, camera, settings.initial, settings.seed, &pilot, settings.max_depth);
+    let bandwidths = initial_bandwidths(&eye, settings.initial, settings.seed, &pilot);
     drop(pilot);
     let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
     phases.pilot = clock.seconds();
@@ -114,11 +116,11 @@ pub fn sppm(
         // Iterations count from 1; pass 0 is the pilot's.
         let i = iteration + 1;
         let pass = LightPass::new(settings.seed, i, Domain::Light, settings.photons, settings.max_depth);
-        let photons = trace_photons(scene, &pass);
+        let photons = trace_photons(scene, &surroundings, &pass);
         let t1 = clock.seconds();
         let map = PhotonMap::build(photons);
         let t2 = clock.seconds();
-        eye_pass(scene, camera, settings, i, &map, &mut pixels);
+        eye_pass(&eye, settings, i, &map, &mut pixels);
         let seconds = clock.seconds();
         phases.light += t1 - t0;
         phases.map += t2 - t1;
@@ -130,11 +132,8 @@ pub fn sppm(
         let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
-        let error = if record || settings.target_error.is_some() {
-            relative_error(&pixels, settings.levels.own())
-        } else {
-            None
-        };
+        let error =
+            if record || settings.target_error.is_some() { relative_error(&pixels, settings.levels) } else { None };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
@@ -172,7 +171,7 @@ pub fn sppm(
     }
     let seconds = clock.seconds();
     if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels.own());
+        let error = relative_error(&pixels, settings.levels);
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
     Rendered {

@@ -57,12 +57,8 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeS
         if !set.has(LobeSet::SMOOTH) {
             continue;
         }
-        let f = shading.eval_cos(*wo, sample.wi, Transport::Radiance, set);
-        if f.max_element() <= 0.0 {
-            continue;
-        }
-        let other = if sample.delta { 0.0 } else { tries * shading.pdf(*wo, sample.wi, Transport::Radiance, set) };
-        scattered += f * balance(sample.pdf_w, other);
+        let (f, pdf) = shading.evaluate_cos(*wo, sample.wi, Transport::Radiance, set);
+        scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
     let arriving = scattered * sample.radiance / sample.pdf_w;
     // Written so that NaN is dropped here, before it costs a ray.

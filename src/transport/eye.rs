@@ -227,38 +227,52 @@ impl Visitor for Gather<'_> {
     }
 }
 
-/// Traces one eye path through pixel `(x, y)` and measures all levels of `radii`.
-#[inline]
-pub fn eye_path(
-    scene: &Scene,
-    camera: &Camera,
-    pixel: (u32, u32),
-    stream: Stream,
-    photons: &PhotonMap,
-    radii: &LevelRadii,
-    max_depth: u32,
-) -> EyeMeasure {
-    let mut gather = Gather {
-        scene,
-        photons,
-        radii,
-        max_depth,
-        measure: EyeMeasure::default(),
-        length: 0.0,
-        stage: Stage::Clear,
-        last: Vec3::ZERO,
-    };
-    walk(scene, eye_start(camera, pixel, stream), stream, Transport::Radiance, max_depth, &mut gather);
-    gather.measure
+/// What all eye paths of a render share.
+#[derive(Clone, Copy)]
+pub struct Eye<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The camera.
+    pub camera: &'a Camera,
+    /// The solids around the camera.
+    pub interior: Interior,
+    /// Longest path in segments.
+    pub max_depth: u32,
 }
 
-/// The first ray of an eye path through a uniform point of the pixel.
-#[inline]
-fn eye_start(camera: &Camera, pixel: (u32, u32), stream: Stream) -> PathStart {
-    let draws = stream.vertex(0);
-    let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
-    let ray = camera.ray(film, draws.two(Purpose::Lens));
-    PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: Interior::default() }
+impl Eye<'_> {
+    /// The first ray of an eye path through a uniform point of pixel `(x, y)`.
+    #[inline]
+    pub fn start(&self, pixel: (u32, u32), stream: Stream) -> PathStart {
+        let draws = stream.vertex(0);
+        let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
+        let ray = self.camera.ray(film, draws.two(Purpose::Lens));
+        PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: self.interior }
+    }
+
+    /// Traces one eye path and measures all levels of `radii`.
+    #[inline]
+    pub fn measure(&self, pixel: (u32, u32), stream: Stream, photons: &PhotonMap, radii: &LevelRadii) -> EyeMeasure {
+        let mut gather = Gather {
+            scene: self.scene,
+            photons,
+            radii,
+            max_depth: self.max_depth,
+            measure: EyeMeasure::default(),
+            length: 0.0,
+            stage: Stage::Clear,
+            last: Vec3::ZERO,
+        };
+        walk(self.scene, self.start(pixel, stream), stream, Transport::Radiance, self.max_depth, &mut gather);
+        gather.measure
+    }
+
+    /// The first vertex of an eye path whose lobes gather photons.
+    pub fn gather_point(&self, pixel: (u32, u32), stream: Stream) -> Option<GatherPoint> {
+        let mut find = FindGatherPoint { found: None, length: 0.0 };
+        walk(self.scene, self.start(pixel, stream), stream, Transport::Radiance, self.max_depth, &mut find);
+        find.found
+    }
 }
 
 /// Where an eye path would gather photons first.
@@ -287,17 +301,4 @@ impl Visitor for FindGatherPoint {
         }
         Next::Continue(lobes)
     }
-}
-
-/// The first vertex of an eye path whose lobes gather photons.
-pub fn gather_point(
-    scene: &Scene,
-    camera: &Camera,
-    pixel: (u32, u32),
-    stream: Stream,
-    max_depth: u32,
-) -> Option<GatherPoint> {
-    let mut find = FindGatherPoint { found: None, length: 0.0 };
-    walk(scene, eye_start(camera, pixel, stream), stream, Transport::Radiance, max_depth, &mut find);
-    find.found
 }

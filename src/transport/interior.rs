@@ -7,10 +7,15 @@
 //! (the eye or a lamp was inside) is taken to have been in it.
 
 use crate::material::{Material, MediumParameters};
+use crate::math::Vec3;
 use crate::scene::Scene;
+use crate::trace::Ray;
 
 /// Most solids a path can be inside of at once; further ones are entered as if they replaced the innermost.
 const MAX_NESTED: usize = 6;
+
+/// Surfaces looked at to find where a path starts; a scene with more along one ray has walls enough around the point.
+const MAX_SURROUNDING_HITS: u32 = 1000;
 
 /// The solids a path is inside of: (object, material), in order of entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,6 +38,41 @@ pub struct Crossing {
 impl Interior {
     fn entries(&self) -> &[(u32, u32)] {
         &self.inside[..usize::from(self.len)]
+    }
+
+    /// The solids around `p`: those that a ray from it leaves without having entered. Where paths start.
+    pub fn at(scene: &Scene, p: Vec3) -> Interior {
+        let mut interior = Interior::default();
+        if !scene.survey.solids {
+            return interior;
+        }
+        // No axis, so that it grazes no wall of a box.
+        let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
+        let mut ray = Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 };
+        let mut entered: Vec<u32> = Vec::new();
+        let mut left: Vec<(u32, u32)> = Vec::new();
+        for _ in 0..MAX_SURROUNDING_HITS {
+            let Some(hit) = scene.tracer.intersect(&ray) else { break };
+            let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { break };
+            ray.origin = surface.spawn(direction);
+            if !scene.materials.list[surface.material as usize].is_solid_glass() {
+                continue;
+            }
+            let object = scene.shapes.instances[surface.instance as usize].object;
+            if direction.dot(surface.ng) < 0.0 {
+                entered.push(object);
+            } else if let Some(at) = entered.iter().position(|&o| o == object) {
+                entered.swap_remove(at);
+            } else {
+                left.push((object, surface.material));
+            }
+        }
+        // What is left last was entered first.
+        for &entry in left.iter().rev().take(MAX_NESTED) {
+            interior.inside[usize::from(interior.len)] = entry;
+            interior.len += 1;
+        }
+        interior
     }
 
     /// Material that fills the space here; `None` is the open space.
@@ -92,5 +132,34 @@ impl Crossing {
     #[inline]
     pub fn is_nothing(&self) -> bool {
         self.before == self.after
+    }
+}
+
+/// Where the paths of a render start: the solids around the camera and around each light.
+pub struct Surroundings {
+    /// Around the camera.
+    pub eye: Interior,
+    /// Around the lights, by index; empty when the scene has no solids.
+    lights: Vec<Interior>,
+}
+
+impl Surroundings {
+    /// Looks around the camera and one point of every light.
+    pub fn new(scene: &Scene, eye: Vec3) -> Surroundings {
+        let lights = if scene.survey.solids {
+            let emitters = scene.lights.emitters().iter();
+            emitters
+                .map(|e| e.anywhere(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
+                .collect()
+        } else {
+            Vec::new()
+        };
+        Surroundings { eye: Interior::at(scene, eye), lights }
+    }
+
+    /// Around light `index`.
+    #[inline]
+    pub fn light(&self, index: u32) -> Interior {
+        self.lights.get(index as usize).copied().unwrap_or_default()
     }
 }

@@ -1,6 +1,6 @@
 //! Light paths that leave photons.
 
-use super::interior::Interior;
+use super::interior::Surroundings;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::Vec2;
@@ -51,7 +51,7 @@ impl LightPass {
 
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
-    pub fn emit(&self, scene: &Scene, index: u32) -> Option<Emitted> {
+    pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
         let choice = self.choice.point(index).x;
         let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
         let emission = scene.lights.sample_emission(&scene.shapes, &scene.materials, choice, point, direction)?;
@@ -60,7 +60,7 @@ impl LightPass {
                 origin: emission.origin,
                 direction: emission.direction,
                 throughput: emission.flux / self.paths as f32,
-                interior: Interior::default(),
+                interior: surroundings.light(emission.light),
             },
             stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
             delta: emission.delta,
@@ -103,8 +103,8 @@ impl Visitor for Deposit<'_> {
 
 /// Traces light path `index` of the pass and appends its photons.
 #[inline]
-pub fn light_path(scene: &Scene, pass: &LightPass, index: u32, photons: &mut Vec<Photon>) {
-    let Some(emitted) = pass.emit(scene, index) else { return };
+pub fn light_path(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, index: u32, photons: &mut Vec<Photon>) {
+    let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
     let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
     walk(scene, emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
 }

@@ -9,10 +9,8 @@ mod segment;
 mod walk;
 
 pub use direct::{balance, direct_light};
-pub use eye::{
-    EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, eye_path, gather_point, same_surface,
-};
-pub use interior::{Crossing, Interior};
+pub use eye::{Eye, EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, same_surface};
+pub use interior::{Crossing, Interior, Surroundings};
 pub use light::{Emitted, LightPass, light_path};
 pub use path::path_radiance;
 pub use segment::{Arrival, End, next_surface, transmittance};

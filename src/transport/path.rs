@@ -3,12 +3,11 @@
 //! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
 //! (`direct_light` splits them), so that the two check each other.
 
-use super::interior::Interior;
+use super::eye::Eye;
 use super::segment::transmittance;
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
-use crate::camera::Camera;
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{Rgb, Vec3};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 
@@ -75,13 +74,9 @@ impl Visitor for PathTracer<'_> {
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
-pub fn path_radiance(scene: &Scene, camera: &Camera, pixel: (u32, u32), stream: Stream, max_depth: u32) -> Rgb {
-    let draws = stream.vertex(0);
-    let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
-    let ray = camera.ray(film, draws.two(Purpose::Lens));
-    let start =
-        PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: Interior::default() };
-    let mut tracer = PathTracer { scene, max_depth, radiance: Rgb::ZERO, last: ray.origin };
-    walk(scene, start, stream, Transport::Radiance, max_depth, &mut tracer);
+pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
+    let start = eye.start(pixel, stream);
+    let mut tracer = PathTracer { scene: eye.scene, max_depth: eye.max_depth, radiance: Rgb::ZERO, last: start.origin };
+    walk(eye.scene, start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.radiance
 }

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Appends a figure to scripts/figures/results.jsonl, with the commit, the date and the machine it was measured on.
+
+From a shell:   scripts/figures/record.py interior-iteration scene=interior core_seconds=1.42 photons=100000
+From Python:    from record import record; record("interior-iteration", {"core_seconds": 1.42})
+
+A value is read as JSON where that works (numbers, lists) and as text otherwise. One line is one object:
+{"name": .., "values": {..}, "commit": .., "date": .., "machine": {"cpu": .., "cores": .., "memory_gib": .., "system": ..}}
+"""
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULTS = Path(__file__).resolve().parent / "results.jsonl"
+
+
+def commit():
+    """The commit that is checked out, "-dirty" added if tracked files other than the results differ from it."""
+    try:
+        head = _git("rev-parse", "HEAD")
+        changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", f":!{RESULTS.relative_to(ROOT)}")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return head + ("-dirty" if changed else "")
+
+
+def _git(*args):
+    return subprocess.run(["git", "-C", ROOT, *args], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def machine():
+    """Processor, usable cores, memory and system."""
+    try:
+        info = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        cpu = next(line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name"))
+    except (OSError, StopIteration):
+        cpu = platform.processor() or platform.machine()
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    try:
+        system = platform.freedesktop_os_release()["PRETTY_NAME"]
+    except (OSError, KeyError):
+        system = platform.system()
+    return {"cpu": cpu, "cores": len(os.sched_getaffinity(0)), "memory_gib": round(memory, 1), "system": system}
+
+
+def record(name, values, file=RESULTS):
+    """Appends one line and returns the object. `values`: a dict of what JSON can say, without NaN."""
+    now = datetime.datetime.now(datetime.timezone.utc)
+    entry = {
+        "name": name,
+        "values": values,
+        "commit": commit(),
+        "date": now.strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "machine": machine(),
+    }
+    line = json.dumps(entry, allow_nan=False)
+    with open(file, "a", encoding="utf-8") as sink:
+        sink.write(line + "\n")
+    return entry
+
+
+def pair(text):
+    """KEY=VALUE of the command line."""
+    key, separator, value = text.partition("=")
+    if not (key and separator):
+        raise argparse.ArgumentTypeError(f"{text!r} is not KEY=VALUE")
+    try:
+        return key, json.loads(value, parse_constant=_refuse)
+    except json.JSONDecodeError:
+        return key, value
+
+
+def _refuse(constant):
+    raise argparse.ArgumentTypeError(f"{constant} is no figure")
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Stores a figure with commit, date and machine.")
+    parser.add_argument("name")
+    parser.add_argument("values", nargs="+", type=pair, metavar="KEY=VALUE")
+    parser.add_argument("--file", type=Path, default=RESULTS)
+    arguments = parser.parse_args()
+    record(arguments.name, dict(arguments.values), arguments.file)
+
+
+if __name__ == "__main__":
+    main()

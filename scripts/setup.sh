@@ -1,0 +1,239 @@
+#!/usr/bin/env bash
+# Installs what is missing on Debian (12, 13, and relatives with apt) and leaves alone what is there.
+#
+#   scripts/setup.sh render    what building and rendering need: Rust (checked), a C linker, Embree, ONNX Runtime
+#   scripts/setup.sh python    render, and the Python packages of the tests in .venv
+#   scripts/setup.sh test      python, and Blender as a Python module in .venv-bpy
+#
+# Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
+# CAUSTIQUE_EMBREE and CAUSTIQUE_ONNXRUNTIME name libraries to use instead; CAUSTIQUE_PYTHON names a Python.
+
+set -euo pipefail
+
+ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+# Everything that Blender's module links to and a minimal system lacks.
+BPY_LIBRARIES=(libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1)
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+
+# fail FAULT HINT
+fail() {
+    printf 'setup: error: %s\nhint: %s\n' "$1" "$2" >&2
+    exit 1
+}
+
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then
+        "$@"
+    elif command -v sudo >/dev/null; then
+        sudo "$@"
+    else
+        fail "not root, and there is no sudo to run: $*" "run it as root, then run this script again"
+    fi
+}
+
+# The package lists are fetched once a run, before the first look at them.
+apt_updated=
+apt_update() {
+    [ -z "$apt_updated" ] || return 0
+    command -v apt-get >/dev/null ||
+        fail "something is missing and this system has no apt-get to install it" \
+            "install by hand: a C compiler, Embree 4 or 3, ONNX Runtime 1.17 or newer, Python 3 with venv"
+    as_root apt-get update -qq >&2 ||
+        fail "apt-get update failed" "check the network and /etc/apt/sources.list, then run this script again"
+    apt_updated=1
+}
+
+# apt_install PACKAGE...
+apt_install() {
+    apt_update
+    say "installing $*"
+    # env: sudo drops variables of the caller. Only the log of a failure is of interest.
+    local log
+    log=$(mktemp)
+    if ! as_root env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends "$@" >"$log" 2>&1; then
+        tail -n 20 "$log" >&2
+        rm -f "$log"
+        fail "apt-get could not install: $*" "the lines above say why; install these packages, then run this script again"
+    fi
+    rm -f "$log"
+}
+
+# apt_has PACKAGE: whether apt could install it
+apt_has() {
+    apt_update
+    # No `grep -q` behind a pipe in these scripts: it leaves early, the writer dies of SIGPIPE, and pipefail sees that.
+    [ -n "$(LC_ALL=C apt-cache policy "$1" 2>/dev/null | sed -n '/Candidate: [^(]/p')" ]
+}
+
+need_python() {
+    PYTHON=${CAUSTIQUE_PYTHON:-python3}
+    if ! command -v "$PYTHON" >/dev/null; then
+        [ -z "${CAUSTIQUE_PYTHON:-}" ] || fail "CAUSTIQUE_PYTHON=$CAUSTIQUE_PYTHON is not there" "name a Python 3 or unset it"
+        apt_install python3
+    fi
+}
+
+# at_least OLDEST VERSION: compares dotted numbers
+at_least() { [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]; }
+
+need_rust() {
+    local oldest version
+    oldest=$(sed -n 's/^rust-version *= *"\([0-9.]*\)".*/\1/p' "$ROOT/Cargo.toml" | head -n 1)
+    if ! command -v cargo >/dev/null && [ -x "${CARGO_HOME:-$HOME/.cargo}/bin/cargo" ]; then
+        PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+        export PATH
+    fi
+    if ! command -v cargo >/dev/null || ! command -v rustc >/dev/null; then
+        fail "no Rust toolchain (cargo, rustc) found" "install Rust $oldest or newer with rustup: https://rustup.rs"
+    fi
+    version=$(cd "$ROOT" && rustc --version) ||
+        fail "rustc does not run" "repair the toolchain: 'rustup toolchain install stable'"
+    version=$(printf '%s\n' "$version" | sed 's/^rustc \([0-9.]*\).*/\1/')
+    at_least "$oldest" "$version" ||
+        fail "Rust $version is too old, $oldest is needed" \
+            "run 'rustup update stable'; where Rust came from apt, install rustup: https://rustup.rs"
+}
+
+links() { printf 'int main(void) { return 0; }\n' | cc -x c -o /dev/null - -lm 2>/dev/null; }
+
+need_linker() {
+    links || apt_install gcc libc6-dev
+    links || fail "cc cannot link a C program" "reinstall gcc and libc6-dev"
+}
+
+# loads LIBRARY: whether the dynamic loader takes it, by the same call that the program makes
+loads() { "$PYTHON" -c 'import ctypes, sys; ctypes.CDLL(sys.argv[1])' "$1" 2>/dev/null; }
+
+find_embree() {
+    local library
+    for library in "${CAUSTIQUE_EMBREE:-libembree4.so.4}" "${CAUSTIQUE_EMBREE:-libembree3.so.3}"; do
+        if loads "$library"; then
+            EMBREE=$library
+            return
+        fi
+    done
+    return 1
+}
+
+need_embree() {
+    local package
+    find_embree && return
+    [ -z "${CAUSTIQUE_EMBREE:-}" ] ||
+        fail "CAUSTIQUE_EMBREE=$CAUSTIQUE_EMBREE does not load" "name a file that is Embree 3 or 4, or unset it"
+    for package in libembree4-4 libembree3-3; do
+        if apt_has "$package"; then
+            apt_install "$package"
+            break
+        fi
+    done
+    find_embree || fail "no Embree 4 or 3 found, and apt has no libembree4-4 or libembree3-3" \
+        "install Embree 4 and set CAUSTIQUE_EMBREE to its libembree4.so.4"
+}
+
+# A pip that needs no packages of the system beyond python3-venv.
+need_venv_module() {
+    "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null && return
+    [ -z "${CAUSTIQUE_PYTHON:-}" ] || fail "$PYTHON has no venv module" "install it, or unset CAUSTIQUE_PYTHON"
+    apt_install python3-venv
+    "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null ||
+        fail "$(command -v "$PYTHON") has no venv module" "set CAUSTIQUE_PYTHON=/usr/bin/python3"
+}
+
+find_onnxruntime() { ONNXRUNTIME=$("$PYTHON" "$ROOT/scripts/setup_onnxruntime.py"); }
+
+# unpack_onnxruntime TEMPORARY. The library inside the wheel does not depend on the Python; naming one takes the wheel
+# whatever the Python here.
+unpack_onnxruntime() {
+    "$PYTHON" -m venv "$1/venv" &&
+        "$1/venv/bin/python" -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
+            --python-version 3.11 -d "$1" -r "$ROOT/scripts/requirements-onnxruntime.txt" >&2 &&
+        "$PYTHON" "$ROOT/scripts/setup_onnxruntime.py" unpack "$1"/onnxruntime-*.whl >/dev/null
+}
+
+need_onnxruntime() {
+    local package temporary
+    find_onnxruntime && return
+    [ -z "${CAUSTIQUE_ONNXRUNTIME:-}" ] ||
+        fail "CAUSTIQUE_ONNXRUNTIME=$CAUSTIQUE_ONNXRUNTIME is no ONNX Runtime 1.17 or newer" "name its libonnxruntime.so, or unset it"
+    apt_update
+    package=$(apt-cache pkgnames libonnxruntime1. | grep -E '^libonnxruntime1\.[0-9]+$' | sort -V | tail -n 1 || true)
+    if [ -n "$package" ] && at_least libonnxruntime1.17 "$package"; then
+        apt_install "$package"
+    else
+        say "unpacking ONNX Runtime from its Python wheel into .deps/onnxruntime"
+        need_venv_module
+        temporary=$(mktemp -d)
+        if ! unpack_onnxruntime "$temporary"; then
+            rm -rf "$temporary"
+            fail "pip could not fetch ONNX Runtime" \
+                "check the network, or install it and set CAUSTIQUE_ONNXRUNTIME to libonnxruntime.so"
+        fi
+        rm -rf "$temporary"
+    fi
+    find_onnxruntime || fail "the installed ONNX Runtime does not load" "set CAUSTIQUE_ONNXRUNTIME to a working libonnxruntime.so"
+}
+
+# need_venv DIRECTORY PYTHON REQUIREMENTS: a virtual environment with exactly these requirements
+need_venv() {
+    local directory=$ROOT/$1 python=$2 requirements=$ROOT/scripts/$3 stamp
+    stamp="$("$python" --version) $(sha256sum <"$requirements")"
+    if [ "$(cat "$directory/.complete" 2>/dev/null)" = "$stamp" ] && "$directory/bin/python" -c '' 2>/dev/null; then
+        return
+    fi
+    say "making $1 from $3"
+    "$python" -m venv --clear "$directory" ||
+        fail "$python could not make the virtual environment $1" "check that the disk has room"
+    "$directory/bin/python" -m pip install -q --disable-pip-version-check -r "$requirements" >&2 ||
+        fail "pip could not install what scripts/$3 lists" "check the network and the disk, then run this script again"
+    printf '%s\n' "$stamp" >"$directory/.complete"
+}
+
+# Blender's module exists for some Pythons only.
+find_bpy_python() {
+    local python
+    for python in "$PYTHON" python3.13 python3.11; do
+        if "$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)))' 2>/dev/null; then
+            BPY_PYTHON=$python
+            return
+        fi
+    done
+    fail "Blender's Python module needs Python 3.11 or 3.13 with venv, and neither is here" \
+        "install one of them and set CAUSTIQUE_PYTHON to it"
+}
+
+missing_libraries() { LC_ALL=C ldd "$1" | sed -n 's/^[[:space:]]*\([^ ]*\) => not found.*/\1/p'; }
+
+need_bpy() {
+    find_bpy_python
+    need_venv .venv-bpy "$BPY_PYTHON" requirements-bpy.txt
+    # Asking the loader names what is missing; importing the module would start Blender and stop at the first.
+    local module
+    for module in "$ROOT"/.venv-bpy/lib/python3*/site-packages/bpy/__init__*.so; do :; done
+    [ -f "$module" ] || fail "$module is not there" "remove .venv-bpy, then run this script again"
+    [ -z "$(missing_libraries "$module")" ] || apt_install "${BPY_LIBRARIES[@]}"
+    [ -z "$(missing_libraries "$module")" ] ||
+        fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
+}
+
+# setup render|python|test
+setup() {
+    case $1 in render | python | test) ;; *) fail "unknown mode '$1'" "one of: render python test" ;; esac
+    need_rust
+    need_linker
+    need_python
+    need_embree
+    need_onnxruntime
+    say "Embree: $EMBREE; ONNX Runtime: $ONNXRUNTIME"
+    [ "$1" != render ] || return 0
+    need_venv_module
+    need_venv .venv "$PYTHON" requirements-test.txt
+    [ "$1" != python ] || return 0
+    need_bpy
+}
+
+if [ "${BASH_SOURCE[0]}" = "$0" ]; then
+    setup "${1:-render}"
+fi

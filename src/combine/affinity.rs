@@ -1,0 +1,253 @@
+//! Equation (6) with pairwise weights, from the network output `features`.
+//!
+//! Per pixel i and pair j of levels the network gives a point phi_i^j of a small space and three scalars; the weight of
+//! neighbour i for centre c is, always positive,
+//!
+//! ```text
+//! w_i^j = exp(source_i^j + centre_c^j - exp(falloff_c^j) |c - i|^2 - |phi_c^j - phi_i^j|^2)
+//! ```
+//!
+//! with |c - i| in pixels. Channels, of P pairs and D dimensions: phi (P D, pair by pair), source (P), centre (P),
+//! falloff (P). So a network with tens of outputs commands windows of hundreds of weights: what the
+//! paper's last layer (1444 filters) computes is here two loops, run on eight pixels at a time.
+
+use std::array::from_fn;
+
+use rayon::prelude::*;
+
+use super::Sums;
+use super::network::Map;
+use super::stack::LevelStack;
+use super::tile::Rect;
+
+/// Channels per pair besides the feature space: source, centre, falloff.
+pub const SCALARS: usize = 3;
+
+/// Largest number of dimensions of the feature space.
+pub const MAX_DIMENSIONS: usize = 8;
+
+/// Exponents of affinities end here, in powers of two (exp(-60)), so that every weight stays positive in f32.
+const MAX_DISTANCE: f32 = 60.0 * std::f32::consts::LOG2_E;
+
+/// Bounds of the logarithms, as in training; what is no number counts as 0.
+const LOG_WEIGHT: (f32, f32) = (-12.0, 12.0);
+const LOG_FALLOFF: (f32, f32) = (-20.0, 0.0);
+
+/// Pixels handled together.
+const LANES: usize = 8;
+
+type Lanes = [f32; LANES];
+
+/// Adds pair `pair` (levels 1 and `pair` + 2) of equation (6) to `sums`, over the pixels of `core`.
+///
+/// `features` covers `core` and a window's radius around it where the image does; `valid` tells for each pixel of the
+/// image whether it may be a neighbour.
+pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize, sums: &mut [Sums]) {
+    let pairs = stack.levels.len() - 1;
+    let dimensions = (features.data.len() / (features.rect.width() * features.rect.height())) / pairs - SCALARS;
+    let add = match dimensions {
+        1 => add::<1>,
+        2 => add::<2>,
+        3 => add::<3>,
+        4 => add::<4>,
+        5 => add::<5>,
+        6 => add::<6>,
+        7 => add::<7>,
+        _ => add::<MAX_DIMENSIONS>,
+    };
+    add(stack, valid, core, features, pair, sums);
+}
+
+fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize, sums: &mut [Sums]) {
+    let neighbours = Neighbours::<D>::gather(stack, valid, core, features, pair);
+    let (_, centre, falloff) = scalar_channels::<D>(stack.levels.len() - 1, pair);
+    sums.par_chunks_mut(core.width()).enumerate().for_each(|(y, sums)| {
+        let image_y = core.y0 + y;
+        let from = core.x0 - features.rect.x0;
+        let scalar = |channel: usize| &features.row(channel, image_y)[from..from + core.width()];
+        let (centre, falloff) = (scalar(centre), scalar(falloff));
+        let correlated = &stack.levels[pair + 1][image_y * stack.width + core.x0..][..core.width()];
+        for (block, sums) in sums.chunks_mut(LANES).enumerate() {
+            let x = block * LANES;
+            let falloff = from_fn(|l| {
+                falloff.get(x + l).map_or(0.0, |f| std::f32::consts::LOG2_E * exp_bounded(*f, LOG_FALLOFF))
+            });
+            let (difference, weight) = neighbours.window_sums(x, y, falloff);
+            for (l, sum) in sums.iter_mut().enumerate() {
+                let scale = exp_bounded(centre[x + l], LOG_WEIGHT);
+                // The centre may be invalid; its sums are replaced later and must only stay free of panics.
+                let z = correlated[x + l];
+                sum.value = from_fn(|c| sum.value[c] + scale * (difference[c][l] + z[c] * weight[l]));
+                sum.weight += scale * weight[l];
+            }
+        }
+    });
+}
+
+/// What equation (6) reads of every neighbour, in planes around the core: no bounds to test in the loops.
+struct Neighbours<const D: usize> {
+    radius: usize,
+    pitch: usize,
+    /// phi, scaled so that squared distances are exponents of two.
+    phi: [Vec<f32>; D],
+    /// exp(source), zero outside the image and at invalid pixels.
+    weight: Vec<f32>,
+    /// y - z, RGB.
+    difference: [Vec<f32>; 3],
+}
+
+impl<const D: usize> Neighbours<D> {
+    fn gather(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize) -> Self {
+        let radius = features.window / 2;
+        let pitch = core.width().next_multiple_of(LANES) + 2 * radius;
+        let rows = core.height() + 2 * radius;
+        let (source, ..) = scalar_channels::<D>(stack.levels.len() - 1, pair);
+        // Image columns that the planes show, and where they begin in a plane's row.
+        let (x0, x1) = (core.x0.saturating_sub(radius), (core.x1 + radius).min(stack.width));
+        let offset = x0 + radius - core.x0;
+        let plane = |value: &(dyn Fn(usize, &mut [f32]) + Sync)| {
+            let mut plane = vec![0.0; pitch * rows];
+            plane.par_chunks_mut(pitch).enumerate().for_each(|(v, row)| {
+                let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.height) else { return };
+                value(y, &mut row[offset..offset + x1 - x0]);
+            });
+            plane
+        };
+        let channel = |index: usize, f: fn(f32) -> f32| {
+            plane(&move |y, row| {
+                let values = &features.row(index, y)[x0 - features.rect.x0..];
+                row.iter_mut().zip(values).for_each(|(out, value)| *out = f(*value));
+            })
+        };
+        let mask = |y: usize| &valid[y * stack.width + x0..y * stack.width + x1];
+        let mut weight = channel(source, |x| exp_bounded(x, LOG_WEIGHT));
+        weight.par_chunks_mut(pitch).enumerate().for_each(|(v, row)| {
+            let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.height) else { return };
+            row[offset..].iter_mut().zip(mask(y)).filter(|(_, valid)| !**valid).for_each(|(w, _)| *w = 0.0);
+        });
+        let difference = |c: usize| {
+            plane(&move |y, row| {
+                let start = y * stack.width + x0;
+                let pixels = stack.levels[0][start..].iter().zip(&stack.levels[pair + 1][start..]).zip(mask(y));
+                for (out, ((independent, correlated), valid)) in row.iter_mut().zip(pixels) {
+                    // Zero times a value that is not finite would still spoil the sum.
+                    *out = if *valid { independent[c] - correlated[c] } else { 0.0 };
+                }
+            })
+        };
+        let scaled = |x: f32| if x.is_finite() { x * std::f32::consts::LOG2_E.sqrt() } else { 0.0 };
+        let phi = from_fn(|d| channel(pair * D + d, scaled));
+        Neighbours { radius, pitch, phi, weight, difference: from_fn(difference) }
+    }
+
+    /// Sums over the windows of the pixels (x .. x + LANES, y) of the core: w (y_i - z_i), and w, all without the
+    /// centre's own factor. `falloff` is in powers of two.
+    #[inline]
+    fn window_sums(&self, x: usize, y: usize, falloff: Lanes) -> ([Lanes; 3], Lanes) {
+        let side = 2 * self.radius + 1;
+        let centre_at = (y + self.radius) * self.pitch + x + self.radius;
+        let centre: [Lanes; D] = from_fn(|d| lanes(&self.phi[d], centre_at));
+        let (mut sums, mut total) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for v in 0..side {
+            // Rows cut to the length read, so that their ends are tested once a row.
+            let from = (y + v) * self.pitch + x;
+            let part = from..from + side - 1 + LANES;
+            let phi: [&[f32]; D] = from_fn(|d| &self.phi[d][part.clone()]);
+            let difference: [&[f32]; 3] = from_fn(|c| &self.difference[c][part.clone()]);
+            let weight = &self.weight[part.clone()];
+            let dy = v as f32 - self.radius as f32;
+            for u in 0..side {
+                let dx = u as f32 - self.radius as f32;
+                let squared = dx * dx + dy * dy;
+                let mut distance: Lanes = from_fn(|l| falloff[l] * squared);
+                for (centre, row) in centre.iter().zip(phi) {
+                    let phi = lanes(row, u);
+                    for l in 0..LANES {
+                        let step = centre[l] - phi[l];
+                        distance[l] = fma(step, step, distance[l]);
+                    }
+                }
+                let source = lanes(weight, u);
+                let w: Lanes = from_fn(|l| source[l] * exp2_minus(distance[l]));
+                for (sum, row) in sums.iter_mut().zip(difference) {
+                    let difference = lanes(row, u);
+                    for l in 0..LANES {
+                        sum[l] = fma(w[l], difference[l], sum[l]);
+                    }
+                }
+                for l in 0..LANES {
+                    total[l] += w[l];
+                }
+            }
+        }
+        (sums, total)
+    }
+}
+
+/// LANES values from `start` on.
+#[inline(always)]
+fn lanes(plane: &[f32], start: usize) -> Lanes {
+    plane[start..start + LANES].try_into().unwrap_or([0.0; LANES])
+}
+
+/// a b + c, fused where the processor can: elsewhere `mul_add` is a slow library call.
+#[inline(always)]
+fn fma(a: f32, b: f32, c: f32) -> f32 {
+    if cfg!(any(target_feature = "fma", target_arch = "aarch64")) { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// 2^-x for x >= 0, x cut at [`MAX_DISTANCE`]; relative error below 5e-7, and no branch, so that loops vectorise.
+#[inline(always)]
+fn exp2_minus(x: f32) -> f32 {
+    // 2^t = 2^n 2^f with n the nearest integer, found by adding 1.5 * 2^23, whose last bits then hold n.
+    const SHIFT: f32 = 12_582_912.0;
+    let t = -if x < MAX_DISTANCE { x } else { MAX_DISTANCE };
+    let shifted = t + SHIFT;
+    let f = t - (shifted - SHIFT);
+    let mut p = TAYLOR[0];
+    for coefficient in &TAYLOR[1..] {
+        p = fma(p, f, *coefficient);
+    }
+    f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23))
+}
+
+/// Taylor's series of 2^f = exp(f ln 2) to degree 6, highest power first; |f| <= 1/2.
+const TAYLOR: [f32; 7] = {
+    let mut coefficients = [1.0; 7];
+    let (mut term, mut k) = (1.0f64, 0);
+    while k < 6 {
+        k += 1;
+        term *= std::f64::consts::LN_2 / k as f64;
+        coefficients[6 - k] = term as f32;
+    }
+    coefficients
+};
+
+/// exp(x) with x kept within bounds, and read as 0 where it is no number.
+fn exp_bounded(x: f32, (least, most): (f32, f32)) -> f32 {
+    if x.is_nan() { 1.0 } else { x.clamp(least, most).exp() }
+}
+
+/// Channels of source, centre and falloff.
+const fn scalar_channels<const D: usize>(pairs: usize, pair: usize) -> (usize, usize, usize) {
+    let first = pairs * D + pair;
+    (first, first + pairs, first + 2 * pairs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponential_is_accurate_and_positive() {
+        for k in 0..=860_000 {
+            let x = k as f32 * 1e-4;
+            let (got, want) = (f64::from(exp2_minus(x)), (-f64::from(x)).exp2());
+            assert!((got / want - 1.0).abs() < 5e-7, "2^-{x} = {got:e}, not {want:e}");
+        }
+        for x in [0.0, 1.0, 86.0] {
+            assert_eq!(exp2_minus(x), (-x).exp2());
+        }
+        assert!(exp2_minus(f32::INFINITY) > 0.0 && exp2_minus(f32::MAX) > 0.0);
+    }
+}

@@ -1,0 +1,129 @@
+//! One network in ONNX Runtime: load, check against its own description, run on a tile.
+
+use ort::session::Session;
+use ort::session::builder::GraphOptimizationLevel;
+use ort::value::{Outlet, TensorRef, ValueType};
+
+use super::model::{Contract, Facts, Model};
+use super::runtime::Runtime;
+use super::tensor;
+use super::tile::Rect;
+use crate::error::{Error, Kind, Result};
+
+/// A network output, `[channel][y][x]`, over the rectangle that the network saw.
+#[derive(Debug)]
+pub struct Map {
+    /// The rectangle.
+    pub rect: Rect,
+    /// Window side of equation (6).
+    pub window: usize,
+    /// All channels.
+    pub data: Vec<f32>,
+}
+
+impl Map {
+    /// Row `y` of the image in channel `channel`, from the rectangle's left edge on.
+    pub fn row(&self, channel: usize, y: usize) -> &[f32] {
+        let width = self.rect.width();
+        let start = (channel * self.rect.height() + y - self.rect.y0) * width;
+        &self.data[start..start + width]
+    }
+}
+
+/// The weights of equation (6), in either form.
+#[derive(Debug)]
+pub enum Weights {
+    /// See [`affinity`](super::affinity).
+    Features(Map),
+    /// See [`kernel`](super::kernel).
+    Kernel(Map),
+}
+
+/// A loaded network.
+pub struct Network {
+    session: Session,
+    facts: Facts,
+    name: String,
+}
+
+impl Network {
+    /// Loads and checks `model`; inference uses `threads` threads.
+    ///
+    /// # Errors
+    /// [`Kind::Model`] naming what is wrong with the file.
+    pub fn load(model: &Model, runtime: &Runtime, threads: usize) -> Result<Self> {
+        let refuse = |cause: &dyn std::fmt::Display| {
+            Error::new(Kind::Model, format!("model {}", model.name), one_line(cause))
+                .hint("make network files with scripts/train/export.py")
+        };
+        let session = open(model, runtime, threads).map_err(|cause| refuse(&cause))?;
+        let facts = {
+            let metadata = session.metadata().map_err(|cause| refuse(&cause))?;
+            Facts::read(|key| metadata.custom(&format!("caustique.{key}"))).map_err(|cause| refuse(&cause))?
+        };
+        check_outlets(&session, &facts).map_err(|cause| refuse(&cause))?;
+        Ok(Network { session, facts, name: model.name.clone() })
+    }
+
+    /// What the network says about itself.
+    pub fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    /// Runs the network on `input`, the tensor of `rect` from [`tensor::fill`].
+    ///
+    /// # Errors
+    /// [`Kind::Model`] when ONNX Runtime fails or the output has the wrong shape.
+    pub fn run(&mut self, input: &[f32], rect: Rect) -> Result<Weights> {
+        let Network { session, facts, name } = self;
+        let fail = |cause: &dyn std::fmt::Display| Error::new(Kind::Model, format!("model {name}"), one_line(cause));
+        let shape = [1, tensor::channels(facts.levels), rect.height(), rect.width()];
+        let tensor = TensorRef::from_array_view((shape, input)).map_err(|cause| fail(&cause))?;
+        let outputs = session.run(ort::inputs!["input" => tensor]).map_err(|cause| fail(&cause))?;
+        let output = outputs.get(facts.output()).ok_or_else(|| fail(&"the output is missing"))?;
+        let (shape, data) = output.try_extract_tensor::<f32>().map_err(|cause| fail(&cause))?;
+        let expected = [1, facts.output_channels(), rect.height(), rect.width()].map(|n| n as i64);
+        if **shape != expected {
+            return Err(fail(&format!("the output has shape {shape:?} instead of {expected:?}")));
+        }
+        let map = Map { rect, window: facts.window, data: data.to_vec() };
+        Ok(match facts.contract {
+            Contract::Features { .. } => Weights::Features(map),
+            Contract::Weights => Weights::Kernel(map),
+        })
+    }
+}
+
+fn open(model: &Model, runtime: &Runtime, threads: usize) -> ort::Result<Session> {
+    let mut builder = Session::builder(runtime.environment())?
+        .with_optimization_level(GraphOptimizationLevel::All)?
+        .with_intra_threads(threads)?
+        // Idle inference threads must not spin while equation (6) needs the cores.
+        .with_intra_op_spinning(false)?;
+    builder.commit_from_memory(&model.bytes)
+}
+
+fn check_outlets(session: &Session, facts: &Facts) -> std::result::Result<(), String> {
+    let channels = |name: &str, dtype: &ValueType| match dtype {
+        ValueType::Tensor { shape, .. } if shape.len() == 4 => Ok(shape[1]),
+        other => Err(format!("its {name} is no image tensor but {other}")),
+    };
+    let find = |outlets: &[Outlet], name: &str| {
+        let found = outlets.iter().find(|outlet| outlet.name() == name);
+        channels(name, found.ok_or_else(|| format!("it has no tensor named {name:?}"))?.dtype())
+    };
+    let expected = [("input", tensor::channels(facts.levels)), (facts.output(), facts.output_channels())];
+    let found = [find(session.inputs(), "input")?, find(session.outputs(), facts.output())?];
+    for ((name, expected), found) in expected.into_iter().zip(found) {
+        // A negative number is a size left open.
+        if found >= 0 && found != expected as i64 {
+            return Err(format!("its {name} has {found} channels, its metadata imply {expected}"));
+        }
+    }
+    Ok(())
+}
+
+/// ONNX Runtime's messages may span lines; ours are one clause.
+fn one_line(message: &dyn std::fmt::Display) -> String {
+    message.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+}

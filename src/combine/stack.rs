@@ -1,0 +1,84 @@
+//! The combiner's input: all layers it reads, checked for size, and its rule for values that are not finite.
+
+use rayon::prelude::*;
+
+use crate::error::{Error, Kind, Result};
+
+/// The layers of one render that the combiner reads; every plane holds `width * height` pixels, rows from the top.
+#[derive(Clone, Debug, Default)]
+pub struct LevelStack {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `Level1`, `Level2`, ...: scene-linear radiance, smallest bandwidth first.
+    pub levels: Vec<Vec<[f32; 3]>>,
+    /// `Variance1`, `Variance2`, ...: variance of each level's mean.
+    pub variances: Vec<Vec<[f32; 3]>>,
+    /// `albedo`: reflectance at the first hit, 0 to 1.
+    pub albedo: Vec<[f32; 3]>,
+    /// `normal`: world-space unit normal at the first hit, zero on the background.
+    pub normal: Vec<[f32; 3]>,
+    /// `depth`: distance along the path to the first hit; 1e9 and more (or not finite) is background.
+    pub depth: Vec<f32>,
+}
+
+impl LevelStack {
+    /// Checks that all planes are there, of one size, and that there are `expected` levels.
+    pub(crate) fn check(&self, expected: usize) -> Result<()> {
+        let pixels = self.width.checked_mul(self.height).unwrap_or(0);
+        if pixels == 0 {
+            return Err(Error::new(Kind::Image, "", format!("an image of {} x {} pixels", self.width, self.height)));
+        }
+        let count = self.levels.len();
+        if count != expected {
+            let cause = format!("the image has {count} levels, the network takes {expected}");
+            return Err(Error::new(Kind::Image, "", cause)
+                .hint(format!("render with --levels {expected}, or give a network trained for {count} with --model")));
+        }
+        let plane = |name: String, size: usize| {
+            if size == pixels {
+                return Ok(());
+            }
+            let cause = format!("the layer holds {size} pixels, the image {pixels}");
+            Err(Error::new(Kind::Image, format!("layer {name}"), cause).hint("render with --layers all"))
+        };
+        for index in 0..count {
+            plane(format!("Level{}", index + 1), self.levels[index].len())?;
+            plane(format!("Variance{}", index + 1), self.variances.get(index).map_or(0, Vec::len))?;
+        }
+        plane("albedo".into(), self.albedo.len())?;
+        plane("normal".into(), self.normal.len())?;
+        plane("depth".into(), self.depth.len())
+    }
+
+    /// For every pixel whether all its levels are finite; only such pixels take part in equation (6).
+    pub(crate) fn valid(&self) -> Vec<bool> {
+        let at = |i: usize| self.levels.iter().all(|level| level[i].iter().all(|v| v.is_finite()));
+        (0..self.width * self.height).into_par_iter().map(at).collect()
+    }
+}
+
+/// Gives every pixel that is not valid its first finite level, else the mean of valid pixels of `image` no further than
+/// `radius` in x and y, else black.
+pub(crate) fn fill_invalid(stack: &LevelStack, valid: &[bool], radius: usize, image: &mut [[f32; 3]]) {
+    let (width, height) = (stack.width, stack.height);
+    let replacement = |i: usize| {
+        let own = stack.levels.iter().map(|level| level[i]).find(|rgb| rgb.iter().all(|v| v.is_finite()));
+        own.unwrap_or_else(|| {
+            let (x, y) = (i % width, i / width);
+            let (mut sum, mut count) = ([0.0f64; 3], 0.0);
+            for v in y.saturating_sub(radius)..(y + radius + 1).min(height) {
+                for u in x.saturating_sub(radius)..(x + radius + 1).min(width) {
+                    let k = v * width + u;
+                    if valid[k] {
+                        sum = std::array::from_fn(|c| sum[c] + f64::from(stack.levels[0][k][c]));
+                        count += 1.0;
+                    }
+                }
+            }
+            if count > 0.0 { sum.map(|s| (s / count) as f32) } else { [0.0; 3] }
+        })
+    };
+    image.par_iter_mut().enumerate().filter(|(i, _)| !valid[*i]).for_each(|(i, out)| *out = replacement(i));
+}

@@ -1,0 +1,133 @@
+//! Agreement with the training code (`scripts/train/fixture.py` writes the numbers), and what network files may say.
+
+use super::model::{Contract, Facts};
+use super::network::Map;
+use super::tile::Rect;
+use super::*;
+use std::collections::HashMap;
+
+/// Reads the fixture part by part.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn floats(&mut self, count: usize) -> Vec<f32> {
+        let (head, rest) = self.0.split_at(4 * count);
+        self.0 = rest;
+        head.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+    }
+
+    fn rgb(&mut self, count: usize) -> Vec<[f32; 3]> {
+        self.floats(3 * count).chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+    }
+}
+
+#[test]
+fn input_and_equation_equal_the_training_codes() {
+    let mut reader = Reader(include_bytes!("../testdata/contract.f32"));
+    let header: Vec<usize> = reader.floats(5).iter().map(|v| *v as usize).collect();
+    let [levels, height, width, dimensions, side] = header[..] else { panic!() };
+    let n = width * height;
+    let stack = LevelStack {
+        width,
+        height,
+        levels: (0..levels).map(|_| reader.rgb(n)).collect(),
+        variances: (0..levels).map(|_| reader.rgb(n)).collect(),
+        albedo: reader.rgb(n),
+        normal: reader.rgb(n),
+        depth: reader.floats(n),
+    };
+    let bright = stack.levels.iter().flatten().flatten().copied().fold(0.0, f32::max);
+    let rect = Rect { x0: 0, y0: 0, x1: width, y1: height };
+
+    let want = reader.floats(tensor::channels(levels) * n);
+    let got = tensor::fill(&stack, &Normalisation::of(&stack), rect);
+    for (k, (got, want)) in got.iter().zip(&want).enumerate() {
+        assert!((got - want).abs() < 1e-5, "channel {}: {got}, not {want}", k / n);
+    }
+
+    let tile = Tile { core: rect, input: rect };
+    let data = reader.floats((levels - 1) * (dimensions + affinity::SCALARS) * n);
+    let features = Weights::Features(Map { rect, window: 19, data });
+    let got = combine_tile(&stack, &stack.valid(), &tile, &features);
+    assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
+
+    let got = combiner().run(&stack).unwrap();
+    assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
+
+    let corner = Rect { x0: 0, y0: 0, x1: width / 2, y1: height / 2 };
+    let cut = |plane: &Vec<[f32; 3]>| {
+        plane.chunks(width).take(corner.y1).flat_map(|row| &row[..corner.x1]).copied().collect()
+    };
+    let part = LevelStack {
+        width: corner.x1,
+        height: corner.y1,
+        levels: stack.levels.iter().map(cut).collect(),
+        ..LevelStack::default()
+    };
+    let n = corner.x1 * corner.y1;
+    let data = reader.floats((levels - 1) * side * side * n);
+    let weights = Weights::Kernel(Map { rect: corner, window: side, data });
+    let got = combine_tile(&part, &part.valid(), &Tile { core: corner, input: corner }, &weights);
+    assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
+    assert!(reader.0.is_empty());
+}
+
+#[test]
+fn the_shipped_network_is_as_it_says() {
+    let combiner = combiner();
+    let facts = combiner.facts();
+    assert_eq!((facts.levels, facts.window), (5, 19));
+    assert_eq!(tensor::channels(facts.levels), 27);
+    assert!(matches!(facts.contract, Contract::Features { .. }));
+    assert!(Model::compact().bytes.len() < 2 << 20);
+}
+
+#[test]
+fn metadata_that_cannot_be_are_refused() {
+    let good = [
+        ("kind", "features"),
+        ("levels", "5"),
+        ("window", "19"),
+        ("features", "4"),
+        ("stride", "4"),
+        ("halo", "32"),
+        ("normalisation", "1"),
+    ];
+    let read = |change: &[(&'static str, &'static str)]| {
+        let mut map: HashMap<&str, &str> = good.into_iter().collect();
+        map.extend(change.iter().copied());
+        Facts::read(|key| map.get(key).filter(|value| !value.is_empty()).map(ToString::to_string))
+    };
+    assert_eq!(read(&[]).unwrap().output_channels(), 28);
+    assert_eq!(read(&[("kind", "weights"), ("window", "3")]).unwrap().output_channels(), 36);
+    for (change, message) in [
+        (("kind", ""), "its metadata lacks caustique.kind"),
+        (("kind", "magic"), "its caustique.kind is \"magic\", neither features nor weights"),
+        (("levels", "1"), "its caustique.levels is \"1\", not a number from 2 to 16"),
+        (("window", "18"), "its window of 18 pixels has no centre"),
+        (("features", "9"), "its caustique.features is \"9\", not a number from 1 to 8"),
+        (("stride", "-4"), "its caustique.stride is \"-4\", not a number from 1 to 64"),
+        (("normalisation", "2"), "it expects input version 2, this program makes 1"),
+    ] {
+        assert_eq!(read(&[change]).unwrap_err(), message);
+    }
+}
+
+#[test]
+fn files_that_are_no_networks_are_errors_with_advice() {
+    let runtime = Runtime::find().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrong.onnx");
+    let error = Model::from_file(&path).unwrap_err();
+    assert_eq!(error.kind, Kind::Io);
+    let compact = Model::compact().bytes;
+    for bytes in [&b""[..], b"not a network", &compact[..compact.len() / 2]] {
+        std::fs::write(&path, bytes).unwrap();
+        let error = Combiner::new(&Model::from_file(&path).unwrap(), &runtime).err().unwrap();
+        assert_eq!(error.kind, Kind::Model);
+        assert!(error.to_string().starts_with(&format!("model {}: ", path.display())), "{error}");
+        assert!(error.hint.unwrap().contains("export.py"));
+    }
+    let error = Model::open("paper").unwrap_err();
+    assert!(error.hint.unwrap().contains("--arch paper"));
+}

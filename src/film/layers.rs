@@ -1,0 +1,171 @@
+//! Named layers of one picture.
+//!
+//! A layer is a few planes, one per component, and `Level1.R` is the plane `R` of the layer `Level1`. The beauty is the
+//! layer with the empty name. A plane that stands alone in a file, such as `Z`, is the only plane `Z` of a layer `Z`.
+
+use crate::error::{Error, Kind, Result};
+
+/// How a plane's values are stored in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sample {
+    /// 16 bits; at most 65504, 11 bits of precision.
+    Half,
+    /// 32 bits.
+    Float,
+}
+
+/// One component of a layer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    /// The component, one letter in files of ours: `R G B A`, `X Y Z`, `U V`, `r g b a` for cryptomatte.
+    pub component: String,
+    /// How it is stored.
+    pub sample: Sample,
+    /// One value per pixel, row by row from the top, `width * height` of them.
+    pub values: Vec<f32>,
+}
+
+/// Planes that belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// The name before the last dot of its channels; empty for the beauty.
+    pub name: String,
+    /// Its components, in the order `R G B A`, `X Y Z`, `U V`.
+    pub planes: Vec<Plane>,
+}
+
+/// All layers of a picture, of one size.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct LayerSet {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// The layers, in the order they were added or stand in the file; no two have the same name.
+    pub layers: Vec<Layer>,
+}
+
+/// What a layer is looked up for, whatever its name in the program that wrote it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The picture itself.
+    Beauty,
+    /// Reflectance at the first rough hit.
+    Albedo,
+    /// Unit normal at the first rough hit.
+    Normal,
+    /// Distance to the first rough hit.
+    Depth,
+}
+
+impl Layer {
+    /// A layer of float planes from interleaved values: `pixels` yields one array per pixel, row by row from the top, and
+    /// `components` has one letter per element, such as `"RGB"`.
+    pub fn interleaved<const N: usize>(
+        name: impl Into<String>,
+        components: &str,
+        pixels: impl IntoIterator<Item = [f32; N]>,
+    ) -> Self {
+        debug_assert_eq!(components.chars().count(), N);
+        let pixels = pixels.into_iter();
+        let mut values: [Vec<f32>; N] = std::array::from_fn(|_| Vec::with_capacity(pixels.size_hint().0));
+        for pixel in pixels {
+            for (plane, value) in values.iter_mut().zip(pixel) {
+                plane.push(value);
+            }
+        }
+        let planes = components.chars().zip(values);
+        let planes = planes.map(|(c, values)| Plane { component: c.into(), sample: Sample::Float, values });
+        Layer { name: name.into(), planes: planes.collect() }
+    }
+
+    /// The same layer stored with `sample`.
+    #[must_use]
+    pub fn stored_as(mut self, sample: Sample) -> Self {
+        self.planes.iter_mut().for_each(|plane| plane.sample = sample);
+        self
+    }
+
+    /// The plane of a component.
+    pub fn plane(&self, component: &str) -> Option<&Plane> {
+        self.planes.iter().find(|plane| plane.component == component)
+    }
+
+    /// The first three planes (`R G B`, `X Y Z`) per pixel; a layer of one or two planes repeats its first in all three, as a
+    /// grey picture does.
+    pub fn triples(&self) -> Vec<[f32; 3]> {
+        let [r, g, b] = std::array::from_fn(|i| {
+            let index = if self.planes.len() < 3 { 0 } else { i };
+            self.planes.get(index).map_or(&[][..], |plane| &plane.values)
+        });
+        r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect()
+    }
+}
+
+impl LayerSet {
+    /// A picture without layers.
+    pub fn new(width: usize, height: usize) -> Self {
+        LayerSet { width, height, layers: Vec::new() }
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Adds a layer, or replaces the one of that name.
+    ///
+    /// Errors: a plane whose size is not that of the picture.
+    pub fn push(&mut self, layer: Layer) -> Result<()> {
+        if let Some(plane) = layer.planes.iter().find(|plane| plane.values.len() != self.pixels()) {
+            let cause = format!("{} values for {} x {} pixels", plane.values.len(), self.width, self.height);
+            return Err(Error::new(Kind::Image, format!("layer \"{}\"", layer.name), cause));
+        }
+        match self.layers.iter_mut().find(|old| old.name == layer.name) {
+            Some(old) => *old = layer,
+            None => self.layers.push(layer),
+        }
+        Ok(())
+    }
+
+    /// The layer of exactly this name.
+    pub fn get(&self, name: &str) -> Option<&Layer> {
+        self.layers.iter().find(|layer| layer.name == name)
+    }
+
+    /// The layer that plays a role, under the names that caustique, Blender, Mitsuba, pbrt, LuxCore and Arnold give it.
+    /// Blender's view layer and a part's name may precede the name (`ViewLayer.Denoising Albedo`).
+    pub fn find(&self, role: Role) -> Option<&Layer> {
+        let names: &[&str] = match role {
+            Role::Beauty => {
+                &["", "Combined", "RGBA", "rgba", "RGB", "rgb", "beauty", "Beauty", "color", "Color", "image"]
+            }
+            Role::Albedo => &["albedo", "Albedo", "Denoising Albedo", "ALBEDO", "denoise_albedo", "DiffCol", "diffuse"],
+            Role::Normal => &[
+                "normal",
+                "Normal",
+                "N",
+                "Ns",
+                "Denoising Normal",
+                "SHADING_NORMAL",
+                "denoise_normal",
+                "sh_normal",
+                "nn",
+            ],
+            Role::Depth => &["depth", "Depth", "Denoising Depth", "Z", "DEPTH", "distance"],
+        };
+        let last = |layer: &Layer, name: &str| layer.name.rsplit('.').next() == Some(name);
+        let exact = names.iter().find_map(|name| self.get(name));
+        exact.or_else(|| names.iter().skip(1).find_map(|name| self.layers.iter().find(|layer| last(layer, name))))
+    }
+
+    /// The picture itself per pixel. Errors: there is none.
+    pub fn beauty(&self) -> Result<Vec<[f32; 3]>> {
+        let layer = self.find(Role::Beauty).filter(|layer| !layer.planes.is_empty()).ok_or_else(|| {
+            let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).take(8).collect();
+            Error::new(Kind::Image, "", format!("no picture among the layers ({})", names.join(", ")))
+                .hint("a picture has the channels R, G, B, or a layer named Combined, beauty or rgba")
+        })?;
+        Ok(layer.triples())
+    }
+}

@@ -1,0 +1,263 @@
+//! Names of layers: what each means, how it is called in files, and which ones `--layers` picks.
+//!
+//! Nuke splits a channel's name into at most three tokens and turns what is not alphanumeric into `_`; Blender takes the last
+//! token for the component, wants one letter there, and holds names in 64 bytes; older readers stop at 31. So names of
+//! ours are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the component, and at most 31 characters.
+
+use super::layers::{Layer, LayerSet};
+use crate::error::{Error, Kind, Result};
+
+/// How channels are called in an EXR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Naming {
+    /// `R`, `Noisy.R`, `albedo.R`, `Z`: what Nuke, tev and OIDN's tools know.
+    #[default]
+    Plain,
+    /// `ViewLayer.Combined.R`, `ViewLayer.Depth.Z`: what Blender gives its own passes.
+    Blender,
+}
+
+impl Naming {
+    /// The layer's name in a file, without component.
+    pub fn layer(self, name: &str) -> String {
+        match self {
+            Naming::Plain => name.to_owned(),
+            Naming::Blender => {
+                let pass = match name {
+                    "" => "Combined",
+                    "Z" => "Depth",
+                    "P" => "Position",
+                    "albedo" => "Denoising Albedo",
+                    "normal" => "Normal",
+                    "depth" => "Denoising Depth",
+                    other => other,
+                };
+                format!("ViewLayer.{pass}")
+            }
+        }
+    }
+
+    /// The channel's name in a file.
+    pub fn channel(self, layer: &str, component: &str) -> String {
+        let prefix = self.layer(layer);
+        // A layer of one plane of the same name stands for a lone channel at the root: `Z`, not `Z.Z`.
+        if prefix.is_empty() || prefix == component { component.to_owned() } else { format!("{prefix}.{component}") }
+    }
+}
+
+/// What `describe` knows of a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Description {
+    /// Components, one letter each.
+    pub components: &'static str,
+    /// Unit of the values.
+    pub unit: &'static str,
+    /// What the values are.
+    pub meaning: &'static str,
+}
+
+const RADIANCE: &str = "W/(sr m^2)";
+
+/// Components, unit and meaning of a layer of ours by its plain name; `None` for a name that is not ours.
+pub fn describe(name: &str) -> Option<Description> {
+    let is = |components, unit, meaning| Some(Description { components, unit, meaning });
+    match name.trim_end_matches(|c: char| c.is_ascii_digit()) {
+        "" if name.is_empty() => is("RGBA", RADIANCE, "beauty: the combined image, or the estimator's own"),
+        "Noisy" => is("RGB", RADIANCE, "the estimator's image without the combiner"),
+        "Level" => is("RGB", RADIANCE, "estimate of one bandwidth level, 1 the smallest"),
+        "Variance" => is("RGB", "(W/(sr m^2))^2", "variance of the mean of one level"),
+        "Radius" => is("X", "m", "bandwidth of the last iteration of one level"),
+        "Direct" => is("RGB", RADIANCE, "light after one bounce"),
+        "Indirect" => is("RGB", RADIANCE, "light after several bounces, caustics excepted"),
+        "Caustic" => is("RGB", RADIANCE, "light from a rough surface that mirrors or glass sent there"),
+        "Emission" => is("RGB", RADIANCE, "light that reaches the camera from its source without a rough bounce"),
+        "Volume" => is("RGB", RADIANCE, "light scattered by media"),
+        "Error" => is("RGB", RADIANCE, "estimated standard error of the beauty, bias included"),
+        "albedo" => is("RGB", "1", "reflectance at the first hit that is not a mirror or clear glass"),
+        "normal" => is("XYZ", "1", "world-space unit normal at that hit"),
+        "depth" => is("Z", "m", "distance along the path to that hit"),
+        "Z" => is("Z", "m", "camera depth of the first visible hit, 1e10 on the background"),
+        "P" => is("XYZ", "m", "position of the first visible hit"),
+        "CryptoObject" => is("rgba", "1", "cryptomatte of objects: two ranks of id and coverage"),
+        "CryptoMaterial" => is("rgba", "1", "cryptomatte of materials: two ranks of id and coverage"),
+        "Rejected" => is("X", "1", "samples rejected as not finite"),
+        _ => None,
+    }
+}
+
+/// What `--layers` asks for.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub enum Selection {
+    /// Every layer.
+    #[default]
+    All,
+    /// The picture alone.
+    Beauty,
+    /// Layers by name; `beauty` stands for the picture, and `Level` for `Level1`, `Level2`, ...
+    List(Vec<String>),
+}
+
+impl Selection {
+    /// Reads `all`, `beauty` or names with commas between them. Errors: no name, or one that no layer of ours has, with the nearest.
+    pub fn parse(text: &str) -> Result<Self> {
+        match text {
+            "all" => return Ok(Selection::All),
+            "beauty" => return Ok(Selection::Beauty),
+            _ => {}
+        }
+        let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).filter(|s| !s.is_empty()).collect();
+        if names.is_empty() {
+            return Err(Error::new(Kind::Usage, "--layers", "no layer is named")
+                .hint("give all, beauty, or names such as beauty,Noisy,albedo"));
+        }
+        match names.iter().find(|name| *name != "beauty" && describe(name).is_none()) {
+            Some(unknown) => Err(unknown_layer(unknown, KNOWN.iter().copied())),
+            None => Ok(Selection::List(names)),
+        }
+    }
+
+    /// Whether a layer of this plain name is asked for.
+    pub fn wants(&self, name: &str) -> bool {
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        match self {
+            Selection::All => true,
+            Selection::Beauty => name.is_empty(),
+            Selection::List(names) => {
+                names.iter().any(|n| n == name || (n == "beauty" && name.is_empty()) || (!stem.is_empty() && n == stem))
+            }
+        }
+    }
+
+    /// The picture with the layers asked for. Errors: one that the picture lacks, with the nearest it has.
+    pub fn apply(&self, set: LayerSet) -> Result<LayerSet> {
+        if let Selection::List(names) = self {
+            let present = |name: &String| {
+                let only = Selection::List(vec![name.clone()]);
+                set.layers.iter().any(|layer| only.wants(&layer.name))
+            };
+            if let Some(missing) = names.iter().find(|name| !present(name)) {
+                let shown =
+                    |layer: &Layer| if layer.name.is_empty() { "beauty".to_owned() } else { layer.name.clone() };
+                let present: Vec<String> = set.layers.iter().map(shown).collect();
+                return Err(unknown_layer(missing, present.iter().map(String::as_str)));
+            }
+        }
+        let layers = set.layers.into_iter().filter(|layer| self.wants(&layer.name)).collect();
+        Ok(LayerSet { layers, ..set })
+    }
+}
+
+/// Names to suggest from; [`describe`] knows each.
+const KNOWN: [&str; 18] = [
+    "beauty",
+    "Noisy",
+    "Level1",
+    "Variance1",
+    "Radius1",
+    "Direct",
+    "Indirect",
+    "Caustic",
+    "Emission",
+    "Volume",
+    "Error",
+    "albedo",
+    "normal",
+    "depth",
+    "Z",
+    "P",
+    "CryptoObject00",
+    "Rejected",
+];
+
+fn unknown_layer<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Error {
+    let known: Vec<&str> = known.collect();
+    let error = Error::new(Kind::Usage, "--layers", format!("no layer \"{name}\""));
+    let nearest = known.iter().map(|k| (distance(&name.to_lowercase(), &k.to_lowercase()), k)).min_by_key(|(d, _)| *d);
+    match nearest {
+        Some((d, k)) if d <= 1 + name.chars().count() / 3 => error.hint(format!("did you mean \"{k}\"?")),
+        _ => error.hint(format!("there are {}", known.join(", "))),
+    }
+}
+
+/// Levenshtein's distance between two words.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &cb) in b.iter().enumerate() {
+            let substitute = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substitute.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// Checks that every channel has a name that Nuke and Blender read unharmed (see the head of this file).
+///
+/// Errors: the first channel that breaks a rule, with the rule.
+pub fn check(set: &LayerSet, naming: Naming) -> Result<()> {
+    let mut seen = std::collections::HashSet::new();
+    for layer in &set.layers {
+        for plane in &layer.planes {
+            let name = naming.channel(&layer.name, &plane.component);
+            let fault = fault(layer, &plane.component, naming, name.len())
+                .or_else(|| (!seen.insert(name.clone())).then_some("two channels have this name"));
+            if let Some(cause) = fault {
+                return Err(Error::new(Kind::Image, format!("channel \"{name}\""), cause));
+            }
+        }
+    }
+    if seen.len() > 1023 {
+        return Err(Error::new(Kind::Image, "", "more than the 1023 channels that Nuke can hold"));
+    }
+    Ok(())
+}
+
+fn fault(layer: &Layer, component: &str, naming: Naming, length: usize) -> Option<&'static str> {
+    let mut letters = layer.name.chars();
+    let starts_well = letters.next().is_none_or(|c| c.is_ascii_alphabetic());
+    if !starts_well || !letters.all(|c| c.is_ascii_alphanumeric() || c == '_') {
+        return Some("a layer's name is a letter, then letters, digits or _");
+    }
+    if component.len() != 1 || !component.chars().all(|c| "RGBAXYZUVrgba".contains(c)) {
+        return Some("a component is one of R G B A, X Y Z, U V, r g b a");
+    }
+    if layer.planes.len() > 4 {
+        return Some("Nuke holds at most four components a layer");
+    }
+    let limit = if naming == Naming::Plain { 31 } else { 63 };
+    (length > limit).then_some("the name is too long for other programs")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_suggested_name_is_described_and_well_formed() {
+        let mut set = LayerSet::new(1, 1);
+        for name in KNOWN {
+            let name = if name == "beauty" { "" } else { name };
+            let components = describe(name).expect(name).components;
+            let planes = components.chars().map(|c| super::super::layers::Plane {
+                component: c.into(),
+                sample: super::super::layers::Sample::Float,
+                values: vec![0.0],
+            });
+            set.push(Layer { name: name.into(), planes: planes.collect() }).unwrap();
+        }
+        check(&set, Naming::Plain).unwrap();
+        check(&set, Naming::Blender).unwrap();
+    }
+
+    #[test]
+    fn distances() {
+        assert_eq!(distance("albedo", "albedo"), 0);
+        assert_eq!(distance("albeod", "albedo"), 2);
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("kitten", "sitting"), 3);
+    }
+}

@@ -1,0 +1,57 @@
+//! Headers with their attributes in order.
+//!
+//! The `exr` crate keeps custom attributes in a `HashMap` and writes them in its order, which changes from run to run. The size of
+//! a header does not depend on the order, so it is put right afterwards, in place.
+
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+/// Bytes of the magic number and the version before the first attribute.
+const PREAMBLE: u64 = 8;
+
+/// Sorts the attributes of a file of one part by name, as OpenEXR itself writes them.
+///
+/// Errors: those of `file`, and `InvalidData` where the bytes are no header.
+pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F) -> io::Result<()> {
+    file.seek(SeekFrom::Start(PREAMBLE))?;
+    let mut attributes = Vec::new();
+    {
+        let mut reader = io::BufReader::new(&mut *file);
+        while let Some(attribute) = read_attribute(&mut reader)? {
+            attributes.push(attribute);
+        }
+    }
+    // The name comes first in the bytes, and its terminating zero before any letter: this is the order of names.
+    attributes.sort_unstable();
+    file.seek(SeekFrom::Start(PREAMBLE))?;
+    file.write_all(&attributes.concat())
+}
+
+/// One attribute as it stands in the file: name, zero, type, zero, size of the value (four bytes, little endian), value. `None` at the end.
+fn read_attribute(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
+    let mut bytes = Vec::new();
+    if read_text(reader, &mut bytes)? == 0 {
+        return Ok(None);
+    }
+    read_text(reader, &mut bytes)?;
+    let mut size = [0; 4];
+    reader.read_exact(&mut size)?;
+    bytes.extend(size);
+    let size = u64::from(u32::from_le_bytes(size));
+    if reader.take(size).read_to_end(&mut bytes)? as u64 != size {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(Some(bytes))
+}
+
+/// Reads up to and with the next zero byte; returns the number of bytes before it.
+fn read_text(reader: &mut impl Read, bytes: &mut Vec<u8>) -> io::Result<usize> {
+    for length in 0..=255 {
+        let mut byte = [0];
+        reader.read_exact(&mut byte)?;
+        bytes.push(byte[0]);
+        if byte[0] == 0 {
+            return Ok(length);
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::InvalidData, "a name in the header has no end"))
+}

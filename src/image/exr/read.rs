@@ -1,0 +1,244 @@
+//! Any flat EXR to layers.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use exr::block::UncompressedBlock;
+use exr::block::chunk::{Chunk, CompressedBlock};
+use exr::meta::attribute::{AttributeValue, Compression, SampleType, Text};
+use exr::meta::header::Header;
+use exr::prelude::f16;
+use rayon::prelude::*;
+
+use super::Attributes;
+use crate::error::{Error, Kind, Result};
+use crate::film::{Layer, LayerSet, Plane, Sample};
+
+/// Reads every channel of every part, and the string attributes of all parts.
+///
+/// The picture is the display window: what a part's data window leaves out is zero, what it has beyond is left out. Samples of
+/// type half and uint become `f32` (uint above 2^24 is rounded). Of tiled files with mip maps the full resolution is read. A channel
+/// `a.b.C` is the component `C` of the layer `a.b`; root channels `R G B A` (or `Y`) are the layer with the empty name, any
+/// other root channel `Q` is the layer `Q` with the one component `Q`. In a file of several parts the part's name precedes channels
+/// that do not hold it yet; only the first part's may stay at the root.
+///
+/// Errors: a file that cannot be opened, is malformed, deep, subsampled or too large for its length. Never panics.
+pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
+    let file = File::open(path).map_err(|cause| Error::io(path, &cause))?;
+    let length = file.metadata().map_err(|cause| Error::io(path, &cause))?.len();
+    if length == 0 {
+        return Err(Error::new(Kind::Image, path.display(), "the file is empty"));
+    }
+    // The decoder asserts what it believes to be true of any file; some files know better.
+    let outcome = catch_unwind(AssertUnwindSafe(|| decode(BufReader::new(file), length)));
+    let outcome = outcome.unwrap_or_else(|_| Err(invalid("the file contradicts itself")));
+    outcome.map_err(|cause| match cause {
+        exr::error::Error::Io(cause) if cause.kind() != std::io::ErrorKind::UnexpectedEof => Error::io(path, &cause),
+        exr::error::Error::Io(_) => Error::new(Kind::Image, path.display(), "the file ends too early")
+            .hint("copy or render it again; it is not whole"),
+        exr::error::Error::NotSupported(cause) => {
+            Error::new(Kind::Image, path.display(), cause).hint("save it as a flat EXR with ZIP compression")
+        }
+        other => Error::new(Kind::Image, path.display(), format!("not a valid EXR: {other}")),
+    })
+}
+
+type Outcome<T> = exr::error::Result<T>;
+
+fn invalid(cause: &'static str) -> exr::error::Error {
+    exr::error::Error::Invalid(cause.into())
+}
+
+fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)> {
+    let reader = exr::block::read(file, false)?;
+    plausible(reader.headers(), length)?;
+    let chunks = reader.filter_chunks(false, |_, _, block| block.level == exr::math::Vec2(0, 0))?;
+    let meta = exr::block::reader::ChunksReader::meta_data(&chunks).clone();
+    let display = meta.headers[0].shared_attributes.display_window;
+    let mut canvas = Canvas::new(display, &meta.headers)?;
+    let mut batch: Vec<Chunk> = Vec::new();
+    let mut chunks = chunks.peekable();
+    while let Some(chunk) = chunks.next() {
+        batch.push(chunk?);
+        if batch.len() == 4 * rayon::current_num_threads() || chunks.peek().is_none() {
+            let decompress = |chunk| {
+                check_sections(&chunk, &meta.headers)?;
+                UncompressedBlock::decompress_chunk(chunk, &meta, false)
+            };
+            let blocks: Vec<Outcome<UncompressedBlock>> = batch.par_drain(..).map(decompress).collect();
+            for block in blocks {
+                canvas.paint(&block?, &meta.headers)?;
+            }
+        }
+    }
+    Ok((canvas.into_layers(&meta.headers), attributes(&meta.headers)))
+}
+
+/// Refuses headers that promise more than the file can hold, before anything is allocated for them.
+fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
+    /// No compression of EXR packs better: DWA runs deflate (1032 to 1) over run lengths of blocks of 64 samples.
+    const RATIO: u128 = 1032 * 64;
+    let Some(first) = headers.first() else { return Err(invalid("no part")) };
+    let window = |size: exr::math::Vec2<usize>| size.0 as u128 * size.1 as u128;
+    let mut promised = 0u128;
+    for header in headers {
+        if header.deep {
+            return Err(exr::error::Error::NotSupported("the file is deep".into()));
+        }
+        if header.channels.list.iter().any(|channel| channel.sampling != exr::math::Vec2(1, 1)) {
+            return Err(exr::error::Error::NotSupported("the file has subsampled channels".into()));
+        }
+        if header.chunk_count as u128 * 8 > u128::from(length) {
+            return Err(invalid("more chunks than bytes"));
+        }
+        let display = window(first.shared_attributes.display_window.size) * 4 * header.channels.list.len() as u128;
+        promised += display.max(window(header.layer_size) * header.channels.bytes_per_pixel as u128);
+    }
+    if promised > u128::from(length) * RATIO { Err(invalid("more pixels than the file can hold")) } else { Ok(()) }
+}
+
+/// A chunk of DWA begins with the sizes of its sections, eleven 64-bit numbers, and the decoder allocates what they say.
+fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
+    let Some(header) = headers.get(chunk.layer_index) else { return Err(invalid("part index")) };
+    let bytes = match &chunk.compressed_block {
+        CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+        CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+        _ => return Err(exr::error::Error::NotSupported("the file is deep".into())),
+    };
+    let size = header.max_block_pixel_size();
+    let whole = size.0.saturating_mul(size.1).saturating_mul(header.channels.bytes_per_pixel) as u64;
+    let packed =
+        matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) && bytes.len() as u64 != whole;
+    // Sections hold the block's samples, in run lengths of at most twice their size, and blocks of 8 x 8 round up.
+    let limit = whole.saturating_mul(4).saturating_add(1 << 16);
+    let number = |eight: &[u8]| eight.iter().rev().fold(0u64, |n, &byte| n << 8 | u64::from(byte));
+    if packed && bytes.chunks_exact(8).take(11).any(|eight| number(eight) > limit) {
+        return Err(invalid("a section larger than its block"));
+    }
+    Ok(())
+}
+
+/// The display window, one plane per channel of every part.
+struct Canvas {
+    left: i64,
+    top: i64,
+    width: usize,
+    height: usize,
+    /// By part, then channel.
+    planes: Vec<Vec<Vec<f32>>>,
+}
+
+impl Canvas {
+    fn new(display: exr::meta::attribute::IntegerBounds, headers: &[Header]) -> Outcome<Self> {
+        let (width, height) = (display.size.0, display.size.1);
+        let pixels = width.checked_mul(height).filter(|&n| n > 0);
+        let pixels = pixels.ok_or_else(|| invalid("the display window has no pixels"))?;
+        let part = |header: &Header| header.channels.list.iter().map(|_| vec![0.0; pixels]).collect();
+        let planes = headers.iter().map(part).collect();
+        Ok(Canvas { left: display.position.0.into(), top: display.position.1.into(), width, height, planes })
+    }
+
+    /// Copies what lies within the display window.
+    fn paint(&mut self, block: &UncompressedBlock, headers: &[Header]) -> Outcome<()> {
+        let part = block.index.layer;
+        let header = headers.get(part).ok_or_else(|| invalid("part index"))?;
+        let origin = header.own_attributes.layer_position;
+        for line in block.lines(&header.channels) {
+            let at = line.location;
+            let y = i64::from(origin.1) + at.position.1 as i64 - self.top;
+            if y < 0 || y >= self.height as i64 {
+                continue;
+            }
+            let x = i64::from(origin.0) + at.position.0 as i64 - self.left;
+            let skip = (-x).clamp(0, at.sample_count as i64) as usize;
+            let start = x.clamp(0, self.width as i64) as usize;
+            let count = (at.sample_count - skip).min(self.width - start);
+            let row = y as usize * self.width + start;
+            let out = &mut self.planes[part][at.channel][row..row + count];
+            convert(line.value, skip, out, header.channels.list[at.channel].sample_type);
+        }
+        Ok(())
+    }
+
+    fn into_layers(self, headers: &[Header]) -> LayerSet {
+        let mut layers: BTreeMap<String, Vec<Plane>> = BTreeMap::new();
+        for (part, (planes, header)) in self.planes.into_iter().zip(headers).enumerate() {
+            let prefix = if headers.len() > 1 { header.own_attributes.layer_name.as_ref() } else { None };
+            let prefix = prefix.map(Text::to_string).unwrap_or_default();
+            for (values, channel) in planes.into_iter().zip(&header.channels.list) {
+                let (name, component) = split(&prefix, part == 0, &channel.name.to_string());
+                let sample = if channel.sample_type == SampleType::F16 { Sample::Half } else { Sample::Float };
+                let planes = layers.entry(name).or_default();
+                // A second channel of the same name, in another part, is another view of it; the first stands.
+                if planes.iter().all(|plane| plane.component != component) {
+                    planes.push(Plane { component, sample, values });
+                }
+            }
+        }
+        let mut layers: Vec<Layer> = layers.into_iter().map(|(name, planes)| Layer { name, planes }).collect();
+        layers.iter_mut().for_each(|layer| layer.planes.sort_by_key(|plane| rank(&plane.component)));
+        LayerSet { width: self.width, height: self.height, layers }
+    }
+}
+
+/// Samples of one line, the first `skip` left out.
+fn convert(bytes: &[u8], skip: usize, out: &mut [f32], sample: SampleType) {
+    let four = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
+    match sample {
+        SampleType::F16 => {
+            for (value, bytes) in out.iter_mut().zip(bytes.chunks_exact(2).skip(skip)) {
+                *value = f16::from_ne_bytes([bytes[0], bytes[1]]).to_f32();
+            }
+        }
+        SampleType::F32 => {
+            for (value, bytes) in out.iter_mut().zip(bytes.chunks_exact(4).skip(skip)) {
+                *value = f32::from_ne_bytes(four(bytes));
+            }
+        }
+        SampleType::U32 => {
+            for (value, bytes) in out.iter_mut().zip(bytes.chunks_exact(4).skip(skip)) {
+                *value = u32::from_ne_bytes(four(bytes)) as f32;
+            }
+        }
+    }
+}
+
+/// Layer and component of a channel, see [`read`].
+fn split(part: &str, first: bool, channel: &str) -> (String, String) {
+    let (group, component) = channel.rsplit_once('.').unwrap_or(("", channel));
+    let at_root = part.is_empty() || (first && group.is_empty());
+    let known = group == part || group.starts_with(&format!("{part}."));
+    let name = match (group, at_root || known) {
+        ("", true) if is_picture(component) => String::new(),
+        ("", true) => component.to_owned(),
+        (group, true) => group.to_owned(),
+        ("", false) => part.to_owned(),
+        (group, false) => format!("{part}.{group}"),
+    };
+    (name, component.to_owned())
+}
+
+fn is_picture(component: &str) -> bool {
+    ["R", "G", "B", "A", "Y", "r", "g", "b", "a", "red", "green", "blue", "alpha"].contains(&component)
+}
+
+/// Order of components within a layer: by meaning, then by name.
+fn rank(component: &str) -> (usize, String) {
+    let letter = component.chars().next().map_or(' ', |c| c.to_ascii_uppercase());
+    ("RGBAXYZWUV".find(letter).unwrap_or(usize::MAX), component.to_owned())
+}
+
+fn attributes(headers: &[Header]) -> Attributes {
+    let mut found = Attributes::default();
+    for header in headers {
+        for (name, value) in header.own_attributes.other.iter().chain(&header.shared_attributes.other) {
+            if let AttributeValue::Text(text) = value {
+                found.0.entry(name.to_string()).or_insert_with(|| text.to_string());
+            }
+        }
+    }
+    found
+}

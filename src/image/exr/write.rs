@@ -1,0 +1,155 @@
+//! Layers to an EXR.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use exr::block::writer::ChunksWriter;
+use exr::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
+use exr::meta::attribute::{AttributeValue, ChannelDescription, LineOrder, SampleType, Text};
+use exr::meta::header::{Header, LayerAttributes};
+use exr::prelude::{SmallVec, f16};
+use rayon::prelude::*;
+
+use super::{Attributes, header};
+use crate::error::{Error, Kind, Result};
+use crate::film::{LayerSet, Naming, Plane, Sample, check};
+use crate::image::atomic;
+
+/// How pixels are packed; all of these are lossless.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Compression {
+    /// zlib over 16 lines: small and widely read.
+    #[default]
+    Zip,
+    /// zlib over single lines: the quickest for programs that read lines.
+    Zips,
+    /// Wavelets and Huffman codes: smaller on noise.
+    Piz,
+    /// As they are.
+    None,
+}
+
+/// How a file is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Options {
+    /// How pixels are packed.
+    pub compression: Compression,
+    /// How channels are called.
+    pub naming: Naming,
+}
+
+/// Writes all layers and attributes to `path`, atomically (see [`atomic::write`]). Compresses on the current rayon pool; the bytes do not depend on
+/// its size.
+///
+/// Errors: a picture without pixels or channels, a channel name that other programs cannot read, an attribute that is not ASCII, the
+/// file system.
+pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Options) -> Result<()> {
+    check(set, options.naming).map_err(|error| error.within(path.display()))?;
+    let mut planes: Vec<(String, &Plane)> = Vec::new();
+    for layer in &set.layers {
+        planes.extend(layer.planes.iter().map(|plane| (options.naming.channel(&layer.name, &plane.component), plane)));
+    }
+    if planes.is_empty() || set.pixels() == 0 {
+        let cause = format!("{} channels of {} x {} pixels are no picture", planes.len(), set.width, set.height);
+        return Err(Error::new(Kind::Image, path.display(), cause));
+    }
+    planes.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let header = header(set, &planes, attributes, options).map_err(|error| error.within(path.display()))?;
+    let planes: Vec<&Plane> = planes.into_iter().map(|(_, plane)| plane).collect();
+    atomic::write(path, |file| {
+        write_chunks(file, set.width, &planes, header).map_err(|error| failure(path, error))?;
+        sort(file).map_err(|error| atomic::failure(path, &error))
+    })
+}
+
+fn sort(file: &mut BufWriter<&mut File>) -> std::io::Result<()> {
+    file.flush()?;
+    header::sort_attributes(*file.get_mut())
+}
+
+fn failure(path: &Path, error: exr::error::Error) -> Error {
+    match error {
+        exr::error::Error::Io(cause) => atomic::failure(path, &cause),
+        other => Error::new(Kind::Image, path.display(), other),
+    }
+}
+
+fn header(set: &LayerSet, planes: &[(String, &Plane)], attributes: &Attributes, options: Options) -> Result<Header> {
+    use exr::meta::BlockDescription::ScanLines;
+    use exr::meta::attribute::Compression as Packing;
+    let channels: SmallVec<[ChannelDescription; 5]> = planes
+        .iter()
+        .map(|(name, plane)| {
+            let sample = if plane.sample == Sample::Half { SampleType::F16 } else { SampleType::F32 };
+            ChannelDescription::named(name.as_str(), sample)
+        })
+        .collect();
+    let compression = match options.compression {
+        Compression::Zip => Packing::ZIP16,
+        Compression::Zips => Packing::ZIP1,
+        Compression::Piz => Packing::PIZ,
+        Compression::None => Packing::Uncompressed,
+    };
+    let mut other = HashMap::new();
+    for (name, value) in &attributes.0 {
+        let error = |cause| Error::new(Kind::Image, format!("attribute \"{name}\""), cause);
+        let key = Text::new_or_none(name).ok_or_else(|| error("its name is not ASCII"))?;
+        let text =
+            Text::new_or_none(value).filter(|_| value.is_ascii()).ok_or_else(|| error("its text is not ASCII"))?;
+        other.insert(key, AttributeValue::Text(text));
+    }
+    Ok(Header::new(Text::default(), (set.width, set.height), channels)
+        .with_encoding(compression, ScanLines, LineOrder::Increasing)
+        .with_attributes(LayerAttributes { other, ..LayerAttributes::default() }))
+}
+
+/// Compresses batches of blocks in parallel and writes them in order.
+fn write_chunks(
+    file: &mut BufWriter<&mut File>,
+    width: usize,
+    planes: &[&Plane],
+    header: Header,
+) -> exr::error::UnitResult {
+    let headers: exr::meta::Headers = std::iter::once(header).collect();
+    exr::block::write(file, headers, true, |meta, chunks| {
+        let blocks: Vec<_> = enumerate_ordered_header_block_indices(&meta.headers).collect();
+        // A few blocks a thread keep all busy; what is held beside the layers stays small.
+        for batch in blocks.chunks(4 * rayon::current_num_threads()) {
+            let compressed: Vec<_> = batch
+                .par_iter()
+                .map(|&(_, index)| {
+                    let channels = &meta.headers[0].channels;
+                    let block = UncompressedBlock::from_lines(channels, index, |line| {
+                        let at = line.location;
+                        let plane = planes[at.channel];
+                        let start = at.position.y() * width + at.position.x();
+                        fill(line.value, &plane.values[start..start + at.sample_count], plane.sample);
+                    });
+                    block.compress_to_chunk(&meta.headers)
+                })
+                .collect();
+            for (&(index, _), chunk) in batch.iter().zip(compressed) {
+                chunks.write_chunk(index, chunk?)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Samples of one line in the machine's byte order.
+fn fill(bytes: &mut [u8], values: &[f32], sample: Sample) {
+    match sample {
+        Sample::Float => {
+            for (out, value) in bytes.chunks_exact_mut(4).zip(values) {
+                out.copy_from_slice(&value.to_ne_bytes());
+            }
+        }
+        Sample::Half => {
+            for (out, &value) in bytes.chunks_exact_mut(2).zip(values) {
+                out.copy_from_slice(&f16::from_f32(value).to_ne_bytes());
+            }
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! FLIP: how much two pictures differ to an observer who flips between them, 0 (equal) to 1.
+//!
+//! LDR-FLIP: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for Alternating Images", HPG
+//! 2020 (below: FLIP 2020). HDR-FLIP, the largest LDR-FLIP over exposures: Andersson, Nilsson, Shirley, Akenine-Moller, "Visualizing Errors in
+//! Rendered High Dynamic Range Images", Eurographics 2021 (below: HDR-FLIP 2021). With the authors' standard observer: a screen 0.7 m wide of
+//! 3840 pixels, 0.7 m away.
+
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+
+use super::tonemap::aces;
+use crate::math::{Rgb, luminance};
+
+/// Pixels a degree of the standard observer.
+const PIXELS_PER_DEGREE: f32 = 3840.0 * std::f32::consts::PI / 180.0;
+
+/// Compressive exponent of colour differences, FLIP 2020 section 4.1.3.
+const COLOUR_EXPONENT: f32 = 0.7;
+/// The share of the largest colour difference that maps to `KNEE_TO`, FLIP 2020 section 4.1.3.
+const KNEE_FROM: f32 = 0.4;
+/// See `KNEE_FROM`.
+const KNEE_TO: f32 = 0.95;
+/// Width of the edge and point detectors in degrees, FLIP 2020 section 4.2.
+const DETECTOR_WIDTH: f32 = 0.082;
+/// Exponent of feature differences, FLIP 2020 section 4.2.
+const FEATURE_EXPONENT: f32 = 0.5;
+
+/// HDR-FLIP of `test` against `reference` per pixel, both scene-linear Rec. 709, `width * height` finite pixels each. Negative
+/// channels count as zero.
+///
+/// Exposures go from the one that brings the reference's brightest pixel to 0.85 of the display to the one that does so with its
+/// median luminance (HDR-FLIP 2021 section 3.1), in steps of at most about one stop. Two cases the paper leaves open: if the median is zero, that of the luminances
+/// above zero takes its place; a black reference is looked at as it is.
+pub fn hdr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
+    let (first, last) = exposures(reference);
+    let count = (last - first).ceil().max(2.0) as usize;
+    let step = (last - first) / (count - 1) as f32;
+    let detector = Detector::new();
+    let mut map = vec![0.0f32; width * height];
+    for i in 0..count {
+        let scale = (first + i as f32 * step).exp2();
+        let expose = |c: &Rgb| Vec3::from_array((c.max(Vec3::ZERO) * scale).to_array().map(|v| aces(0.6 * v)));
+        let tonemapped = |image: &[Rgb]| image.par_iter().map(expose).collect::<Vec<_>>();
+        let ldr = detector.ldr(&tonemapped(reference), &tonemapped(test), width, height);
+        map.par_iter_mut().zip(ldr).for_each(|(worst, value)| *worst = worst.max(value));
+        if step == 0.0 {
+            break;
+        }
+    }
+    map
+}
+
+/// LDR-FLIP of `test` against `reference` per pixel, both display-linear Rec. 709 from 0 to 1.
+pub fn ldr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
+    let clamped = |image: &[Rgb]| image.iter().map(|c| c.clamp(Vec3::ZERO, Vec3::ONE)).collect::<Vec<_>>();
+    Detector::new().ldr(&clamped(reference), &clamped(test), width, height)
+}
+
+/// First and last exposure in stops, HDR-FLIP 2021 section 3.1.
+fn exposures(reference: &[Rgb]) -> (f32, f32) {
+    let mut luminances: Vec<f32> = reference.iter().map(|c| luminance(c.max(Vec3::ZERO))).collect();
+    luminances.sort_unstable_by(f32::total_cmp);
+    let brightest = luminances.last().copied().unwrap_or(0.0);
+    if brightest <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let mut median = luminances[luminances.len() / 2];
+    if median <= 0.0 {
+        let positive = &luminances[luminances.partition_point(|&y| y <= 0.0)..];
+        median = positive[positive.len() / 2];
+    }
+    // The x with aces(0.6 x) = 0.85: the positive root of a quadratic.
+    let (a, b, c) = (0.36 * (2.51 - 0.85 * 2.43), 0.6 * (0.03 - 0.85 * 0.59), -0.85 * 0.14);
+    let bright = (-b + f32::sqrt(b * b - 4.0 * a * c)) / (2.0 * a);
+    ((bright / brightest).log2(), (bright / median).log2())
+}
+
+/// The filters, which depend on the observer only.
+struct Detector {
+    /// Contrast sensitivity of the achromatic channel.
+    achromatic: Vec<f32>,
+    red_green: Vec<f32>,
+    /// That of blue and yellow is a sum of two Gaussians, each separable.
+    blue_yellow: [Vec<f32>; 2],
+    /// Gaussian and its first and second derivative.
+    smooth: Vec<f32>,
+    edge: Vec<f32>,
+    point: Vec<f32>,
+    /// Largest colour difference, that of green and blue.
+    largest: f32,
+    /// CIE XYZ to linear Rec. 709.
+    from_xyz: Mat3,
+}
+
+impl Detector {
+    fn new() -> Self {
+        use std::f32::consts::PI;
+        // FLIP 2020 table 1: a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees.
+        let widest = 0.04f32;
+        let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
+        let gaussian = |a: f32, b: f32| -> Vec<f32> {
+            let at = |i: i32| (i as f32 / PIXELS_PER_DEGREE).powi(2);
+            (-radius..=radius).map(|i| (a * (PI / b).sqrt()).sqrt() * (-PI * PI * at(i) / b).exp()).collect()
+        };
+        let scaled = |values: Vec<f32>, by: f32| -> Vec<f32> { values.into_iter().map(|v| v * by).collect() };
+        let normalised = |values: Vec<f32>| {
+            let sum: f32 = values.iter().sum();
+            scaled(values, 1.0 / sum)
+        };
+        // Two-dimensional weights are products of one-dimensional ones, so these sum to one together: s1^2 + s2^2 = 1.
+        let (wide, narrow) = (gaussian(34.1, 0.04), gaussian(13.5, 0.025));
+        let total = f32::hypot(wide.iter().sum(), narrow.iter().sum());
+
+        let deviation = 0.5 * DETECTOR_WIDTH * PIXELS_PER_DEGREE;
+        let reach = (3.0 * deviation).ceil() as i32;
+        let g = |x: f32| (-x * x / (2.0 * deviation * deviation)).exp();
+        let taps = |f: &dyn Fn(f32) -> f32| -> Vec<f32> { (-reach..=reach).map(|i| f(i as f32)).collect() };
+        // Positive weights of a derivative sum to one, negative ones to minus one.
+        let balanced = |values: Vec<f32>| -> Vec<f32> {
+            let positive: f32 = values.iter().filter(|&&v| v > 0.0).sum();
+            let negative: f32 = -values.iter().filter(|&&v| v < 0.0).sum::<f32>();
+            values.into_iter().map(|v| if v > 0.0 { v / positive } else { v / negative }).collect()
+        };
+        Detector {
+            achromatic: normalised(gaussian(1.0, 0.0047)),
+            red_green: normalised(gaussian(1.0, 0.0053)),
+            blue_yellow: [scaled(wide, 1.0 / total), scaled(narrow, 1.0 / total)],
+            smooth: normalised(taps(&g)),
+            edge: balanced(taps(&|x| -x * g(x))),
+            point: balanced(taps(&|x| (x * x / (deviation * deviation) - 1.0) * g(x))),
+            largest: colour_distance(hunt(lab(Vec3::Y)), hunt(lab(Vec3::Z))).powf(COLOUR_EXPONENT),
+            from_xyz: TO_XYZ.inverse(),
+        }
+    }
+
+    fn ldr(&self, reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
+        let a = self.perceive(reference, width, height);
+        let b = self.perceive(test, width, height);
+        let knee = KNEE_FROM * self.largest;
+        let pixel = |i: usize| {
+            let difference = colour_distance(a.colour[i], b.colour[i]).powf(COLOUR_EXPONENT);
+            let colour = if difference < knee {
+                difference * KNEE_TO / knee
+            } else {
+                KNEE_TO + (difference - knee) / (self.largest - knee) * (1.0 - KNEE_TO)
+            };
+            let feature = (a.edge[i] - b.edge[i]).abs().max((a.point[i] - b.point[i]).abs());
+            let feature = (feature * std::f32::consts::FRAC_1_SQRT_2).powf(FEATURE_EXPONENT);
+            colour.powf(1.0 - feature)
+        };
+        (0..width * height).into_par_iter().map(pixel).collect()
+    }
+
+    /// What the eye makes of display-linear `image`: colours after its contrast sensitivity, edges and points.
+    fn perceive(&self, image: &[Rgb], width: usize, height: usize) -> Percept {
+        let separable = |plane: &[f32], x: &[f32], y: &[f32]| vertical(&horizontal(plane, x, width), y, width, height);
+        let opponent: Vec<Vec3> = image.par_iter().map(|&c| ycxcz(c)).collect();
+        let [y, cx, cz] = std::array::from_fn(|c| opponent.iter().map(|v| v[c]).collect::<Vec<f32>>());
+        let fy = separable(&y, &self.achromatic, &self.achromatic);
+        let fx = separable(&cx, &self.red_green, &self.red_green);
+        let [wide, narrow] = [0, 1].map(|i| separable(&cz, &self.blue_yellow[i], &self.blue_yellow[i]));
+        let colour = |i: usize| {
+            let filtered = Vec3::new(fy[i], fx[i], wide[i] + narrow[i]);
+            hunt(lab((self.from_xyz * xyz(filtered)).clamp(Vec3::ZERO, Vec3::ONE)))
+        };
+        let colour = (0..width * height).into_par_iter().map(colour).collect();
+
+        let grey: Vec<f32> = y.iter().map(|y| (y + 16.0) / 116.0).collect();
+        let magnitude = |filter: &[f32]| -> Vec<f32> {
+            let x = separable(&grey, filter, &self.smooth);
+            let y = separable(&grey, &self.smooth, filter);
+            x.iter().zip(&y).map(|(x, y)| (x * x + y * y).sqrt()).collect()
+        };
+        Percept { colour, edge: magnitude(&self.edge), point: magnitude(&self.point) }
+    }
+}
+
+struct Percept {
+    /// Hunt-adjusted CIELAB.
+    colour: Vec<Vec3>,
+    edge: Vec<f32>,
+    point: Vec<f32>,
+}
+
+/// Correlation of every row with `taps`; edge pixels repeat outwards.
+fn horizontal(plane: &[f32], taps: &[f32], width: usize) -> Vec<f32> {
+    let radius = taps.len() / 2;
+    let mut out = vec![0.0; plane.len()];
+    out.par_chunks_mut(width).zip(plane.par_chunks(width)).for_each(|(out, row)| {
+        let mut padded = vec![row[0]; radius];
+        padded.extend(row);
+        padded.resize(width + 2 * radius, row[width - 1]);
+        for (tap, shifted) in taps.iter().zip(padded.windows(width)) {
+            out.iter_mut().zip(shifted).for_each(|(out, value)| *out += tap * value);
+        }
+    });
+    out
+}
+
+/// Correlation of every column with `taps`; edge pixels repeat outwards.
+fn vertical(plane: &[f32], taps: &[f32], width: usize, height: usize) -> Vec<f32> {
+    let radius = taps.len() / 2;
+    let mut out = vec![0.0; plane.len()];
+    out.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
+        for (i, tap) in taps.iter().enumerate() {
+            let from = (y + i).saturating_sub(radius).min(height - 1) * width;
+            out.iter_mut().zip(&plane[from..from + width]).for_each(|(out, value)| *out += tap * value);
+        }
+    });
+    out
+}
+
+/// White of the colour spaces, D65.
+const WHITE: Vec3 = Vec3::new(0.950_428_55, 1.0, 1.088_900_4);
+
+/// Linear Rec. 709 to CIE XYZ over the white, from the primaries' chromaticities.
+const TO_XYZ: Mat3 = Mat3::from_cols_array(&[
+    10_135_552.0 / 24_577_794.0,
+    2_613_072.0 / 12_288_897.0,
+    1_425_312.0 / 73_733_382.0,
+    8_788_810.0 / 24_577_794.0,
+    8_788_810.0 / 12_288_897.0,
+    8_788_810.0 / 73_733_382.0,
+    4_435_075.0 / 24_577_794.0,
+    887_015.0 / 12_288_897.0,
+    70_074_185.0 / 73_733_382.0,
+]);
+
+/// Linear Rec. 709 to YCxCz, a linear opponent space (FLIP 2020 section 4.1.1).
+fn ycxcz(rgb: Rgb) -> Vec3 {
+    let v = TO_XYZ * rgb / WHITE;
+    Vec3::new(116.0 * v.y - 16.0, 500.0 * (v.x - v.y), 200.0 * (v.y - v.z))
+}
+
+/// YCxCz to CIE XYZ.
+fn xyz(c: Vec3) -> Vec3 {
+    let y = (c.x + 16.0) / 116.0;
+    Vec3::new(y + c.y / 500.0, y, y - c.z / 200.0) * WHITE
+}
+
+/// Linear Rec. 709 to CIELAB (CIE 15).
+fn lab(rgb: Rgb) -> Vec3 {
+    const DELTA: f32 = 6.0 / 29.0;
+    let f = |t: f32| if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
+    let [x, y, z] = (TO_XYZ * rgb / WHITE).to_array().map(f);
+    Vec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+}
+
+/// Colours look paler in the dark: Hunt's effect, FLIP 2020 section 4.1.2.
+fn hunt(lab: Vec3) -> Vec3 {
+    Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
+}
+
+/// City block in lightness, Euclidean in hue (HyAB, FLIP 2020 section 4.1.2).
+fn colour_distance(a: Vec3, b: Vec3) -> f32 {
+    let d = a - b;
+    d.x.abs() + (d.y * d.y + d.z * d.z).sqrt()
+}

@@ -1,0 +1,91 @@
+//! The error of a picture against a reference.
+
+use serde::Serialize;
+
+use super::flip;
+use crate::error::{Error, Kind, Result};
+use crate::film::LayerSet;
+use crate::math::Rgb;
+
+/// The error of a picture A against a reference B of the same size, over all pixels that are finite in both.
+///
+/// Serialises as `compare --json` shows it. All sums are in `f64` and in the order of pixels.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Mean over pixels of [`relative_squared_error`], the papers' relMSE.
+    pub relmse: f64,
+    /// The same without the worst 0.1 % of pixels (rounded down).
+    pub relmse_trimmed: f64,
+    /// Mean over pixels and channels of the squared difference.
+    pub mse: f64,
+    /// Mean of A over mean of B, over pixels and channels; `null` for a black reference.
+    pub mean_ratio: Option<f64>,
+    /// Mean over pixels of HDR-FLIP, see [`flip::hdr`].
+    pub flip: f64,
+    /// Pixels with a channel that is not finite, in either picture.
+    pub pixels_not_finite: u64,
+    /// HDR-FLIP per pixel, rows from the top; 1 where a pixel is not finite.
+    #[serde(skip)]
+    pub flip_map: Vec<f32>,
+}
+
+/// Mean over RGB of (x - r)^2, over (mean of r over RGB)^2 + 0.01.
+pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
+    let mean = r.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+    squared_error(x, r) / (mean * mean + 0.01)
+}
+
+/// Mean over RGB of (x - r)^2.
+pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
+    (0..3).map(|c| (f64::from(x[c]) - f64::from(r[c])).powi(2)).sum::<f64>() / 3.0
+}
+
+/// Compares the pictures (see [`LayerSet::beauty`]) of two files, `b` being the reference.
+///
+/// Errors: sizes that differ, a file without a picture, no pixel that is finite in both.
+pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
+    if (a.width, a.height) != (b.width, b.height) {
+        let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
+        return Err(Error::new(Kind::Image, "", cause).hint("render both with the same --width and --height"));
+    }
+    compare_pixels(&a.beauty()?, &b.beauty()?, a.width, a.height)
+}
+
+/// Compares `a` with the reference `b`, `width * height` scene-linear pixels each, see [`compare`].
+pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<Comparison> {
+    if a.len() != width * height || b.len() != width * height {
+        let cause = format!("{} and {} values for {width} x {height} pixels", a.len(), b.len());
+        return Err(Error::new(Kind::Image, "", cause));
+    }
+    let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
+    let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
+    if pixels.is_empty() {
+        return Err(Error::new(Kind::Image, "", "the pictures have no pixel with finite values in common"));
+    }
+    let n = pixels.len() as f64;
+    let mut relative: Vec<f64> = pixels.iter().map(|&i| relative_squared_error(a[i], b[i])).collect();
+    let relmse = relative.iter().sum::<f64>() / n;
+    relative.sort_unstable_by(f64::total_cmp);
+    relative.truncate(pixels.len() - pixels.len() / 1000);
+    let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
+    let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
+    let total = |image: &[[f32; 3]]| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
+    let (sum_a, sum_b) = (total(a), total(b));
+
+    // FLIP filters over neighbours, so that a hole needs a value; black in both looks equal.
+    let filled = |image: &[[f32; 3]]| -> Vec<Rgb> {
+        (0..image.len()).map(|i| if finite(i) { Rgb::from_array(image[i]) } else { Rgb::ZERO }).collect()
+    };
+    let mut flip_map = flip::hdr(&filled(b), &filled(a), width, height);
+    let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / n;
+    (0..a.len()).filter(|&i| !finite(i)).for_each(|i| flip_map[i] = 1.0);
+    Ok(Comparison {
+        relmse,
+        relmse_trimmed,
+        mse,
+        mean_ratio: (sum_b != 0.0).then(|| sum_a / sum_b),
+        flip,
+        pixels_not_finite: (a.len() - pixels.len()) as u64,
+        flip_map,
+    })
+}

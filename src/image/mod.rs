@@ -1,0 +1,11 @@
+//! Pictures in files: EXR in and out, PNG, tone mapping, error metrics.
+
+pub mod atomic;
+pub mod exr;
+pub mod flip;
+pub mod heat;
+pub mod metrics;
+pub mod png;
+pub mod tonemap;
+
+pub use metrics::{Comparison, compare};

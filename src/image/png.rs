@@ -1,0 +1,38 @@
+//! 8-bit sRGB pictures to look at.
+
+use std::path::Path;
+
+use crate::error::{Error, Kind, Result};
+use crate::image::atomic;
+use crate::image::tonemap::ToneMap;
+use crate::math::Rgb;
+
+/// Writes `pixels`, display values from 0 to 1, rows from the top, as an 8-bit RGB PNG, atomically (see [`atomic::write`]). What is not a number is black.
+///
+/// Errors: a number of pixels that is not `width * height`, or none; the file system.
+pub fn write(path: &Path, width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>) -> Result<()> {
+    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+    let bytes: Vec<u8> = pixels.into_iter().flat_map(|rgb| rgb.to_array().map(byte)).collect();
+    let size = u32::try_from(width).ok().zip(u32::try_from(height).ok()).filter(|&(w, h)| w > 0 && h > 0);
+    let picture = size.and_then(|(w, h)| image::RgbImage::from_raw(w, h, bytes));
+    let picture = picture
+        .filter(|picture| picture.as_raw().len() == 3 * width * height)
+        .ok_or_else(|| Error::new(Kind::Image, path.display(), format!("no picture of {width} x {height} pixels")))?;
+    let mut encoded = std::io::Cursor::new(Vec::new());
+    picture
+        .write_to(&mut encoded, image::ImageFormat::Png)
+        .map_err(|cause| Error::new(Kind::Image, path.display(), cause))?;
+    atomic::write_bytes(path, encoded.get_ref())
+}
+
+/// Writes scene-linear Rec. 709 `pixels` after an exposure of `ev` stops and a tone curve, see [`write()`].
+pub fn write_tonemapped(
+    path: &Path,
+    width: usize,
+    height: usize,
+    pixels: &[[f32; 3]],
+    ev: f32,
+    curve: ToneMap,
+) -> Result<()> {
+    write(path, width, height, pixels.iter().map(|&rgb| curve.display(rgb.into(), ev)))
+}

@@ -1,0 +1,171 @@
+//! From scene-linear light to a display: exposure, then a curve, then sRGB's encoding.
+
+use glam::{Mat3, Vec3};
+
+use crate::math::Rgb;
+
+/// The curve between scene and display.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum ToneMap {
+    /// AgX: bright colours fade to white as film does.
+    #[default]
+    Agx,
+    /// A filmic curve on each channel: more contrast, bright colours keep their hue and clip.
+    Filmic,
+    /// No curve: clipped at one.
+    Srgb,
+}
+
+impl ToneMap {
+    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A channel that is
+    /// not a number is black; infinity is as bright as light gets.
+    pub fn display(self, colour: Rgb, ev: f32) -> Rgb {
+        // f32::max and clamp would let NaN through; Vec3's max does not.
+        let clean = colour.to_array().map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1e30) });
+        let exposed = (Vec3::from_array(clean) * ev.exp2()).min(Vec3::splat(1e30));
+        let linear = match self {
+            ToneMap::Agx => agx(exposed),
+            ToneMap::Filmic => Vec3::from_array(exposed.to_array().map(|v| aces(v * PRE_EXPOSURE))),
+            ToneMap::Srgb => exposed,
+        };
+        Vec3::from_array(linear.to_array().map(srgb_encode))
+    }
+}
+
+/// sRGB's transfer function, clipped to 0 to 1 (IEC 61966-2-1).
+pub fn srgb_encode(linear: f32) -> f32 {
+    let v = linear.clamp(0.0, 1.0);
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Its inverse.
+pub fn srgb_decode(encoded: f32) -> f32 {
+    let v = encoded.clamp(0.0, 1.0);
+    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Narkowicz's curve takes 1 for a colour brighter than a scene's white; he advises 0.6 before it.
+const PRE_EXPOSURE: f32 = 0.6;
+
+/// Rational fit to ACES' reference rendering and output transforms (Narkowicz 2015, "ACES Filmic Tone Mapping Curve").
+pub(super) fn aces(x: f32) -> f32 {
+    // Beyond this the squares would overflow; the curve is past one there.
+    let x = x.min(1e6);
+    (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).clamp(0.0, 1.0)
+}
+
+/// AgX, the base look as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.
+///
+/// In Rec. 2020: an inset moves the primaries towards white, log2 of 16.5 stops around middle grey 0.18 goes through a sigmoid, its power
+/// of 2.4 is undone, hues that the curve turned go three fifths of the way back, and an outset restores colourfulness. After T. Sobotka
+/// (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen, whose "mix percent" is 40); matrices rounded as Filament has them. Blender's
+/// guard against colours outside Rec. 709 is left out: channels clip instead.
+fn agx(colour: Rgb) -> Rgb {
+    /// Rows of Rec. 709 to Rec. 2020 (ITU-R BT.2087).
+    const TO_2020: [[f32; 3]; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];
+    const INSET: [[f32; 3]; 3] = [
+        [0.856_627_15, 0.095_121_24, 0.048_251_61],
+        [0.137_319, 0.761_242, 0.101_439_04],
+        [0.111_898_21, 0.076_799_42, 0.811_302_37],
+    ];
+    const OUTSET: [[f32; 3]; 3] = [
+        [1.127_100_6, -0.110_606_64, -0.016_493_94],
+        [-0.141_329_76, 1.157_823_7, -0.016_493_94],
+        [-0.141_329_76, -0.110_606_64, 1.251_936_4],
+    ];
+    /// Stops below and above middle grey: log2(0.18) - 10 and log2(0.18) + 6.5.
+    const MIN_EV: f32 = -12.473_93;
+    const MAX_EV: f32 = 4.026_069;
+
+    let rows = |m: &[[f32; 3]; 3]| Mat3::from_cols_array_2d(m).transpose();
+    let to_2020 = rows(&TO_2020);
+    let inset = (rows(&INSET) * to_2020 * colour).max(Vec3::splat(1e-10));
+    let curved = inset.to_array().map(|v| sigmoid((v.log2() - MIN_EV) / (MAX_EV - MIN_EV)));
+    let linear = curved.map(|v| v.powf(2.4));
+    let (before, after) = (hue(inset.to_array()), hue(linear));
+    // The shorter way around the circle.
+    let turned = (after - before + 9.0).rem_euclid(6.0) - 3.0;
+    let restored = with_hue(linear, before + 0.4 * turned);
+    to_2020.inverse() * (rows(&OUTSET) * restored)
+}
+
+/// Hue of the hexagonal model (HSV) in sixths of a turn, red 0, green 2, blue 4; of grey, 0.
+fn hue([r, g, b]: [f32; 3]) -> f32 {
+    let (high, low) = (r.max(g).max(b), r.min(g).min(b));
+    let chroma = high - low;
+    if chroma <= 0.0 {
+        0.0
+    } else if high == r {
+        (g - b) / chroma
+    } else if high == g {
+        2.0 + (b - r) / chroma
+    } else {
+        4.0 + (r - g) / chroma
+    }
+}
+
+/// The colour of another hue with the same largest and smallest channel.
+fn with_hue([r, g, b]: [f32; 3], hue: f32) -> Rgb {
+    let (high, low) = (r.max(g).max(b), r.min(g).min(b));
+    // A channel is high within a sixth of its own hue, low beyond a third, and changes evenly between.
+    let channel = |own: f32| {
+        let away = ((hue - own + 9.0).rem_euclid(6.0) - 3.0).abs();
+        low + (high - low) * (2.0 - away).clamp(0.0, 1.0)
+    };
+    Vec3::new(channel(0.0), channel(2.0), channel(4.0))
+}
+
+/// AgX's default contrast: two power curves that meet in the pivot with slope 2.4 and reach 0 and 1 at the ends
+/// (Sobotka, AgX `equation_full_curve`: x pivot 10 / 16.5, y pivot 0.18^(1/2.4), powers of toe and shoulder 1.5).
+fn sigmoid(x: f32) -> f32 {
+    const SLOPE: f32 = 2.4;
+    const POWER: f32 = 1.5;
+    let pivot = 10.0 / 16.5;
+    let middle = 0.18f32.powf(1.0 / 2.4);
+    let x = x.clamp(0.0, 1.0);
+    // Room the curve has on its side of the pivot: the scale makes it arrive at 0 or 1 exactly.
+    let (room_x, room_y) = if x < pivot { (pivot, middle) } else { (1.0 - pivot, 1.0 - middle) };
+    let scale = ((SLOPE * room_x).powf(-POWER) * ((SLOPE * room_x / room_y).powf(POWER) - 1.0)).powf(-1.0 / POWER);
+    let t = SLOPE * (x - pivot).abs() / scale;
+    let step = scale * t / (1.0 + t.powf(POWER)).powf(1.0 / POWER);
+    if x < pivot { middle - step } else { middle + step }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agx_curve_passes_its_anchors() {
+        assert!(sigmoid(0.0).abs() < 1e-4);
+        assert!((sigmoid(1.0) - 1.0).abs() < 1e-4);
+        let pivot = 10.0 / 16.5;
+        assert!((sigmoid(pivot) - 0.18f32.powf(1.0 / 2.4)).abs() < 1e-6);
+        let slope = (sigmoid(pivot + 1e-3) - sigmoid(pivot - 1e-3)) / 2e-3;
+        assert!((slope - 2.4).abs() < 0.02, "{slope}");
+        let mut last = -1.0;
+        for i in 0..=1000 {
+            let y = sigmoid(i as f32 / 1000.0);
+            assert!(y > last);
+            last = y;
+        }
+    }
+
+    #[test]
+    fn hues_round_trip() {
+        for i in 0..60 {
+            let angle = i as f32 / 10.0;
+            let colour = with_hue([0.2, 0.9, 0.5], angle);
+            assert!((hue(colour.to_array()).rem_euclid(6.0) - angle).abs() < 1e-5, "{angle}: {colour}");
+            assert_eq!((colour.max_element(), colour.min_element()), (0.9, 0.2));
+        }
+    }
+
+    #[test]
+    fn srgb_round_trips() {
+        for i in 0..=255 {
+            let v = i as f32 / 255.0;
+            assert!((srgb_encode(srgb_decode(v)) - v).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Two methods that share little must agree: photons against path tracing, tile by tile, on scenes that path tracing can do.
+//!
+//! Standard errors come from independent passes (photons correlate pixels); the family-wise error rate is 0.1 % a scene (Sidak over tiles). A planted bug,
+//! one tile brighter by a stated share, must be rejected.
+
+mod support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::Material;
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::random::{Domain, Stream};
+use caustique::render::{Control, Levels, Settings, sppm};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+use caustique::scene::{Description, Scene};
+use caustique::transport::{Eye, Interior, path_radiance};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
+use support::stats::{mean_and_error, t_critical};
+
+const SIZE: u32 = 32;
+const TILE: u32 = 8;
+const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
+
+/// Tile means of one image given per-pixel values.
+fn tiles(value: impl Fn(u32, u32) -> f64) -> Vec<f64> {
+    let mut sums = vec![0.0; TILES];
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            sums[(y / TILE * (SIZE / TILE) + x / TILE) as usize] += value(x, y) / f64::from(TILE * TILE);
+        }
+    }
+    sums
+}
+
+fn mean(c: Rgb) -> f64 {
+    f64::from(c.element_sum()) / 3.0
+}
+
+fn by_photons(scene: &Scene, photons: u32, radius: f32, iterations: u64, seeds: u64) -> Vec<Vec<f64>> {
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    (0..seeds)
+        .map(|seed| {
+            let settings = Settings {
+                seed,
+                photons,
+                initial: InitialBandwidth::Fixed(radius),
+                levels: Levels::new(1),
+                iterations: Some(iterations),
+                ..Settings::default()
+            };
+            let rendered = sppm(scene, &camera, &settings, |_, _| Control::Continue);
+            assert_eq!(rendered.rejected(), 0);
+            tiles(|x, y| rendered.pixels[(y * SIZE + x) as usize].levels[0].mean.element_sum() / 3.0)
+        })
+        .collect()
+}
+
+fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let interior = Interior::at(scene, camera.position());
+    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX };
+    (0..seeds)
+        .map(|seed| {
+            tiles(|x, y| {
+                let index = u64::from(y * SIZE + x);
+                let path = |pass| mean(path_radiance(&eye, (x, y), Stream::new(seed, pass, Domain::Test, index)));
+                (0..paths).map(path).sum::<f64>() / paths as f64
+            })
+        })
+        .collect()
+}
+
+/// Tiles in which two sets of seeds differ by more than chance and `bias` (relative) allow.
+fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
+    let critical = t_critical(1e-3, TILES, (a.len().min(b.len()) - 1) as f64);
+    (0..TILES)
+        .filter_map(|tile| {
+            let (mean_a, error_a) = mean_and_error(&a.iter().map(|s| s[tile]).collect::<Vec<_>>());
+            let (mean_b, error_b) = mean_and_error(&b.iter().map(|s| s[tile]).collect::<Vec<_>>());
+            let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
+            ((mean_a - mean_b).abs() > allowed)
+                .then(|| format!("tile {tile}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}"))
+        })
+        .collect()
+}
+
+fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, planted: f64) {
+    let average = |s: &[Vec<f64>]| s.iter().flatten().sum::<f64>() / (s.len() * TILES) as f64;
+    println!("{what}: photons {:.5}, paths {:.5}", average(photons), average(paths));
+    let found = disagreeing(photons, paths, bias);
+    assert!(found.is_empty(), "{what}: {found:#?}");
+    // The bug: one tile brighter, as when its light counts twice in part.
+    let mut wrong = photons.to_vec();
+    for seed in &mut wrong {
+        seed[5] *= 1.0 + planted;
+    }
+    assert!(!disagreeing(&wrong, paths, bias).is_empty(), "{what}: a tile brighter by {planted} goes unnoticed");
+}
+
+fn room(walls: Material) -> Description {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), walls);
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    description
+}
+
+/// Plastic and rough metal in a room: layered lobes that gather and go on, wide and narrow.
+#[test]
+fn glossy_room() {
+    let plastic = Material { base_color: [0.6, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
+    let mut description = room(plastic);
+    let metal =
+        |roughness| Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness, ..Material::default() };
+    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
+    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
+    let scene = build(description);
+    check("glossy room", &by_photons(&scene, 20_000, 0.05, 8, 10), &by_paths(&scene, 64, 10), 0.015, 0.15);
+}
+
+/// Smooth and rough glass under a large lamp, which path tracing can run into.
+#[test]
+fn glass_room() {
+    let mut description = room(matte(0.5, 0.0));
+    add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
+    let rough = Material { roughness: 0.4, ..glass(1.4) };
+    add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
+    let scene = build(description);
+    check("glass room", &by_photons(&scene, 40_000, 0.04, 8, 10), &by_paths(&scene, 128, 10), 0.02, 0.2);
+}
+
+/// Everything lit from outside by a bright patch of sky, with a glass pane in the open.
+#[test]
+fn under_the_sky() {
+    let mut description = Description::default();
+    let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
+    add(&mut description, "floor", floor, matte(0.5, 0.0));
+    add(
+        &mut description,
+        "block",
+        cuboid(Vec3::new(-0.6, 0.0, -0.6), Vec3::new(-0.1, 0.7, -0.1), false),
+        matte(0.6, 0.0),
+    );
+    add(&mut description, "pane", cuboid(Vec3::new(0.1, 0.05, 0.0), Vec3::new(0.8, 0.6, 0.08), false), glass(1.5));
+    let (width, height) = (32, 16);
+    let mut texels = vec![[0.3, 0.4, 0.6]; (width * height) as usize];
+    for y in 2..6 {
+        for x in 3..9 {
+            texels[y * width as usize + x] = [12.0, 10.0, 8.0];
+        }
+    }
+    let source = EnvironmentSource::Image { width, height, texels };
+    description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
+    description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
+    let scene = build(description);
+    check("sky", &by_photons(&scene, 60_000, 0.04, 8, 16), &by_paths(&scene, 128, 16), 0.02, 0.2);
+}

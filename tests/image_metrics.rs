@@ -1,0 +1,223 @@
+//! Error metrics against closed forms and against the reference implementation of FLIP; tone curves against published values.
+
+use caustique::film::{Layer, LayerSet};
+use caustique::image::tonemap::{ToneMap, srgb_decode};
+use caustique::image::{compare, flip, heat, metrics};
+use caustique::math::Rgb;
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 64;
+
+/// Edges in every direction and a bright square, then noise on each channel; `scale` is 1 for HDR and 1/2 for LDR.
+///
+/// The expected FLIP values come from the authors' implementation, PyPI flip-evaluator 1.7, on the same pixels:
+/// `flip_evaluator.evaluate(reference, test, "HDR", inputsRGB=False, applyMagma=False)`, and `"LDR"` on halved and clipped ones.
+fn fixture(scale: f32) -> (Vec<Rgb>, Vec<Rgb>) {
+    let (mut reference, mut test) = (Vec::new(), Vec::new());
+    for y in 0..HEIGHT {
+        for x in 0..WIDTH {
+            let lit = (20..30).contains(&x) && (10..20).contains(&y);
+            let base =
+                |c: usize| if lit { 20.0 } else { (0.05 + ((x * (c + 1) * 7 + y * 13) % 64) as f64 / 64.0) as f32 };
+            let noise = |c: usize| ((x * 73_856_093) ^ (y * 19_349_663) ^ (c * 83_492_791)) % 256;
+            let factor = |c: usize| (0.75 + 0.5 * noise(c) as f64 / 255.0) as f32;
+            reference.push(Rgb::from_array([0, 1, 2].map(base)) * scale);
+            test.push(Rgb::from_array([0, 1, 2].map(|c| base(c) * factor(c))) * scale);
+        }
+    }
+    (reference, test)
+}
+
+fn check_flip(map: &[f32], mean: f64, pixels: [(usize, usize, f32); 4]) {
+    let found = map.iter().map(|&v| f64::from(v)).sum::<f64>() / map.len() as f64;
+    assert!((found - mean).abs() < 1e-4, "mean {found}, expected {mean}");
+    for (x, y, value) in pixels {
+        let found = map[y * WIDTH + x];
+        assert!((found - value).abs() < 1e-3, "({x}, {y}): {found}, expected {value}");
+    }
+}
+
+#[test]
+fn hdr_flip_agrees_with_the_authors() {
+    let (reference, test) = fixture(1.0);
+    let map = flip::hdr(&reference, &test, WIDTH, HEIGHT);
+    check_flip(&map, 0.074_488, [(0, 0, 0.093_322), (25, 15, 0.026_383), (70, 40, 0.070_447), (95, 63, 0.203_080)]);
+}
+
+#[test]
+fn ldr_flip_agrees_with_the_authors() {
+    let (reference, test) = fixture(0.5);
+    let map = flip::ldr(&reference, &test, WIDTH, HEIGHT);
+    check_flip(&map, 0.073_109, [(0, 0, 0.024_880), (25, 15, 0.002_049), (70, 40, 0.069_052), (95, 63, 0.205_435)]);
+}
+
+#[test]
+fn flip_of_odd_pictures() {
+    // Equal pictures do not differ, whatever their size; a picture against black differs.
+    for (width, height) in [(1, 1), (3, 2), (1, 40)] {
+        let picture: Vec<Rgb> = (0..width * height).map(|i| Rgb::splat(i as f32)).collect();
+        assert!(flip::hdr(&picture, &picture, width, height).iter().all(|&v| v == 0.0));
+        let black = vec![Rgb::ZERO; picture.len()];
+        for (a, b) in [(&picture, &black), (&black, &picture)] {
+            let map = flip::hdr(a, b, width, height);
+            assert!(map.iter().all(|v| (0.0..=1.0).contains(v)), "{map:?}");
+        }
+    }
+    // A caustic on a black floor: the median luminance is zero, and the difference must still show.
+    let mut reference = vec![Rgb::ZERO; 100];
+    reference[55] = Rgb::splat(4.0);
+    let map = flip::hdr(&reference, &vec![Rgb::ZERO; 100], 10, 10);
+    assert!(map[55] > 0.3 && map[0] == 0.0, "{} {}", map[55], map[0]);
+}
+
+fn picture(width: usize, height: usize, pixel: impl Fn(usize) -> [f32; 3]) -> LayerSet {
+    let mut set = LayerSet::new(width, height);
+    set.push(Layer::interleaved("", "RGB", (0..width * height).map(pixel))).unwrap();
+    set
+}
+
+#[test]
+fn metrics_in_closed_form() {
+    // Reference 1, 2, 3 everywhere; half the pixels off by 0.3 in one channel.
+    let b = picture(40, 50, |_| [1.0, 2.0, 3.0]);
+    let a = picture(40, 50, |i| if i % 2 == 0 { [1.3, 2.0, 3.0] } else { [1.0, 2.0, 3.0] });
+    let result = compare(&a, &b).unwrap();
+    let pixel = 0.3f64.powi(2) / 3.0;
+    assert!((result.mse - pixel / 2.0).abs() < 1e-8);
+    assert!((result.relmse - pixel / (4.0 + 0.01) / 2.0).abs() < 1e-8);
+    // Two of 2000 pixels are left out, both among the wrong ones.
+    assert!((result.relmse_trimmed - pixel / 4.01 * 998.0 / 1998.0).abs() < 1e-8);
+    assert!((result.mean_ratio.unwrap() - (6.0 + 0.15) / 6.0).abs() < 1e-6);
+    assert_eq!(result.pixels_not_finite, 0);
+    assert!(result.flip > 0.0);
+
+    let equal = compare(&b, &b).unwrap();
+    assert_eq!((equal.relmse, equal.relmse_trimmed, equal.mse, equal.flip), (0.0, 0.0, 0.0, 0.0));
+    assert_eq!(equal.mean_ratio, Some(1.0));
+}
+
+#[test]
+fn trimming_leaves_out_the_worst_thousandth() {
+    let b = picture(100, 20, |_| [1.0; 3]);
+    let a = picture(100, 20, |i| if i == 7 || i == 1234 { [1e4; 3] } else { [1.1; 3] });
+    let result = compare(&a, &b).unwrap();
+    assert!((result.relmse_trimmed - 0.01 / 1.01).abs() < 1e-6, "{}", result.relmse_trimmed);
+    assert!(result.relmse > 1e4);
+}
+
+#[test]
+fn pixels_that_are_not_finite_are_counted_and_left_out() {
+    let b = picture(10, 10, |i| if i == 3 { [0.0, f32::INFINITY, 0.0] } else { [1.0; 3] });
+    let a = picture(10, 10, |i| if i == 4 { [f32::NAN; 3] } else { [1.0; 3] });
+    let result = compare(&a, &b).unwrap();
+    assert_eq!((result.pixels_not_finite, result.relmse, result.flip), (2, 0.0, 0.0));
+    assert_eq!((result.flip_map[3], result.flip_map[4], result.flip_map[5]), (1.0, 1.0, 0.0));
+    let error = compare(&picture(2, 2, |_| [f32::NAN; 3]), &picture(2, 2, |_| [1.0; 3])).unwrap_err();
+    assert!(error.cause.contains("no pixel"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_compared_is_an_error() {
+    let error = compare(&picture(4, 2, |_| [0.0; 3]), &picture(2, 4, |_| [0.0; 3])).unwrap_err();
+    assert_eq!(error.cause, "pictures of 4 x 2 and 2 x 4 pixels");
+    let mut empty = LayerSet::new(4, 2);
+    empty.push(Layer::interleaved("depth", "Z", [[0.0]; 8])).unwrap();
+    let error = compare(&empty, &picture(4, 2, |_| [0.0; 3])).unwrap_err();
+    assert!(error.cause.contains("no picture among the layers (depth)"), "{error}");
+    assert!(metrics::compare_pixels(&[[0.0; 3]; 4], &[[0.0; 3]; 3], 2, 2).is_err());
+}
+
+#[test]
+fn the_json_has_the_promised_keys() {
+    let b = picture(2, 2, |_| [0.0; 3]);
+    let json = serde_json::to_value(compare(&b, &b).unwrap()).unwrap();
+    let keys: Vec<&str> = json.as_object().unwrap().keys().map(String::as_str).collect();
+    let mut expected = ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "pixels_not_finite"];
+    expected.sort_unstable();
+    let mut found = keys.clone();
+    found.sort_unstable();
+    assert_eq!(found, expected);
+    assert!(json["mean_ratio"].is_null());
+}
+
+#[test]
+fn results_do_not_depend_on_threads() {
+    let (reference, test) = fixture(1.0);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| flip::hdr(&reference, &test, WIDTH, HEIGHT))
+    };
+    let first = with(1);
+    assert!(with(2) == first && with(3) == first);
+}
+
+#[test]
+fn heat_grows_lighter() {
+    let light = |v: f32| caustique::math::luminance(Rgb::from_array(heat::magma(v).to_array().map(srgb_decode)));
+    let mut last = -1.0;
+    for i in 0..=1000 {
+        let now = light(i as f32 / 1000.0);
+        assert!(now >= last, "at {i}");
+        last = now;
+    }
+    assert_eq!(heat::magma(f32::NAN), heat::magma(1.0));
+    assert_eq!(heat::magma(-3.0), heat::magma(0.0));
+}
+
+/// What Blender 4.5 makes of scene-linear colours: view transform AgX, no look, display sRGB.
+const BLENDER_AGX: [([f32; 3], [f32; 3]); 8] = [
+    ([0.18, 0.18, 0.18], [0.4614, 0.4613, 0.4613]),
+    ([1.0, 1.0, 1.0], [0.771, 0.771, 0.771]),
+    ([0.5, 0.1, 0.05], [0.6973, 0.3518, 0.2416]),
+    ([4.0, 0.2, 0.1], [0.9908, 0.6461, 0.594]),
+    ([0.02, 0.3, 2.0], [0.4532, 0.6269, 0.8934]),
+    ([10.0, 10.0, 10.0], [0.9746, 0.9746, 0.9746]),
+    ([0.001, 0.002, 0.004], [0.0025, 0.0114, 0.0255]),
+    ([0.0, 1.0, 0.0], [0.4325, 0.7726, 0.3184]),
+];
+
+#[test]
+fn agx_looks_like_blenders() {
+    for (scene, display) in BLENDER_AGX {
+        let found = ToneMap::Agx.display(Rgb::from_array(scene), 0.0);
+        for c in 0..3 {
+            assert!((found[c] - display[c]).abs() < 0.006, "{scene:?}: {found}, expected {display:?}");
+        }
+    }
+}
+
+#[test]
+fn every_curve_keeps_order_and_bounds() {
+    for curve in [ToneMap::Agx, ToneMap::Filmic, ToneMap::Srgb] {
+        assert!(curve.display(Rgb::ZERO, 0.0).max_element() < 0.003, "{curve:?}");
+        let mut last = -1.0;
+        for i in -40..=40 {
+            let shown = curve.display(Rgb::splat((i as f32 / 2.0).exp2()), 0.0);
+            assert!(shown.min_element() >= 0.0 && shown.max_element() <= 1.0);
+            assert!(shown.x >= last, "{curve:?} at {i}");
+            last = shown.x;
+        }
+        assert!(last > 0.99, "{curve:?}: {last}");
+        // A stop of exposure doubles the light.
+        let (a, b) = (curve.display(Rgb::new(0.2, 0.1, 0.4), 1.0), curve.display(Rgb::new(0.4, 0.2, 0.8), 0.0));
+        assert!((a - b).abs().max_element() < 1e-6);
+        for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0] {
+            for ev in [-200.0, 0.0, 200.0] {
+                let shown = curve.display(Rgb::new(wild, 0.5, wild), ev);
+                assert!(
+                    shown.is_finite() && shown.min_element() >= 0.0 && shown.max_element() <= 1.0,
+                    "{curve:?} {wild}"
+                );
+            }
+        }
+        assert!(curve.display(Rgb::NAN, 0.0).max_element() < 0.003);
+    }
+}
+
+#[test]
+fn filmic_is_the_published_curve() {
+    // Narkowicz's fit at 0.6: (0.6 (2.51 0.6 + 0.03)) / (0.6 (2.43 0.6 + 0.59) + 0.14), sRGB-encoded.
+    let linear = 0.6 * (2.51 * 0.6 + 0.03) / (0.6 * (2.43 * 0.6 + 0.59) + 0.14);
+    let shown = ToneMap::Filmic.display(Rgb::ONE, 0.0).x;
+    assert!((srgb_decode(shown) - linear).abs() < 1e-5);
+}

@@ -1,0 +1,5 @@
+"""Tests of the program from outside, run by scripts/test.sh.
+
+`test_*.py` run in .venv (numpy, OpenEXR, flip-evaluator), `blender_*.py` in .venv-bpy (bpy, numpy). Both find the
+program and scratch space through `support`.
+"""

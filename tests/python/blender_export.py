@@ -1,0 +1,335 @@
+"""scripts/blender/export.py against Cycles and against numbers: what the glTF exporter drops must arrive. Needs bpy."""
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
+import bpy  # noqa: E402
+import export  # noqa: E402
+import glb  # noqa: E402
+import lighting  # noqa: E402
+import numpy  # noqa: E402
+from contextlib import ExitStack  # noqa: E402
+
+
+def node_material(name, *shaders, mix=None, volume=None, **values):
+    """A material whose surface is one shader node, or a mix or sum of two; `values` set inputs of all that have them."""
+    material = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    made = [tree.nodes.new(kind) for kind in shaders]
+    if mix:
+        mixer = tree.nodes.new(mix)
+        sockets = [s for s in mixer.inputs if s.type == "SHADER"]
+        for node, socket in zip(made, sockets):
+            tree.links.new(node.outputs[0], socket)
+        tree.links.new(mixer.outputs[0], output.inputs["Surface"])
+    elif made:
+        tree.links.new(made[0].outputs[0], output.inputs["Surface"])
+    if volume:
+        made.append(tree.nodes.new(volume))
+        tree.links.new(made[-1].outputs[0], output.inputs["Volume"])
+    for node in made:
+        for key, value in values.items():
+            socket = node.inputs.get(key.replace("_", " "))
+            if socket is not None:
+                socket.default_value = value
+    return material
+
+
+def cube(material, sides=6):
+    corners = [(x, y, z) for x in (0, 2) for y in (0, 2) for z in (0, 0.5)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)][:sides]
+    mesh = bpy.data.meshes.new("cube")
+    mesh.from_pydata(corners, [], faces)
+    mesh.materials.append(material)
+    body = bpy.data.objects.new("cube", mesh)
+    bpy.context.scene.collection.objects.link(body)
+    return body
+
+
+def place(name, data, at=(0, 0, 0)):
+    body = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(body)
+    body.location = at
+    return body
+
+
+def pixels(path):
+    picture = bpy.data.images.load(path)
+    width, height = picture.size
+    values = numpy.empty(width * height * 4, numpy.float32)
+    picture.pixels.foreach_get(values)
+    bpy.data.images.remove(picture)
+    return values.reshape(height, width, 4)[..., :3]
+
+
+class Export(unittest.TestCase):
+    def setUp(self):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = os.path.join(self.folder.name, "scene.glb")
+
+    def write(self):
+        warnings = export.write(self.path)
+        return glb.read(self.path)[0], warnings
+
+    def material(self, material, sides=6):
+        cube(material, sides)
+        document, warnings = self.write()
+        return document["materials"][0], warnings
+
+    def render(self):
+        scene = bpy.context.scene
+        scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 256, False
+        scene.render.resolution_x = scene.render.resolution_y = 16
+        settings = scene.render.image_settings
+        if hasattr(settings, "media_type"):
+            settings.media_type = "IMAGE"
+        settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+        scene.render.filepath = os.path.join(self.folder.name, "render.exr")
+        bpy.ops.render.render(write_still=True)
+        return pixels(scene.render.filepath)
+
+    def test_glass_shader_becomes_solid(self):
+        entry, warnings = self.material(node_material("g", "ShaderNodeBsdfGlass", Color=(0.9, 0.8, 0.7, 1), IOR=1.4, Roughness=0.25))
+        self.assertEqual(warnings, [])
+        self.assertEqual(entry["extensions"]["KHR_materials_transmission"], {"transmissionFactor": 1})
+        self.assertEqual(entry["extensions"]["KHR_materials_volume"], {"thicknessFactor": 0.5})
+        self.assertAlmostEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1.4, 5)
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.25, 5)
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.9, 0.8, 0.7, 1), rtol=1e-5)
+
+    def test_principled_glass_tints_once(self):
+        entry, _ = self.material(node_material("g", "ShaderNodeBsdfPrincipled", Base_Color=(0.81, 0.64, 0.25, 1), Transmission_Weight=1.0))
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.9, 0.8, 0.5, 1), rtol=1e-5)
+
+    def test_fresnel_mix_of_refraction_and_glossy_is_glass(self):
+        material = node_material("g", "ShaderNodeBsdfRefraction", "ShaderNodeBsdfGlossy", mix="ShaderNodeMixShader", Color=(1, 1, 1, 1), IOR=1.33, Roughness=0.0)
+        entry, warnings = self.material(material)
+        self.assertEqual(warnings, [])
+        self.assertAlmostEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1.33, 5)
+        self.assertIn("KHR_materials_volume", entry["extensions"])
+
+    def test_open_glass_stays_thin_and_says_so(self):
+        entry, warnings = self.material(node_material("pane", "ShaderNodeBsdfGlass"), sides=5)
+        self.assertNotIn("KHR_materials_volume", entry["extensions"])
+        self.assertEqual(warnings, ['material "pane": transmissive, but on a mesh that is not closed: it stays a thin sheet that bends no light'])
+
+    def test_diffuse_and_glossy(self):
+        entry, _ = self.material(node_material("d", "ShaderNodeBsdfDiffuse", Color=(0.1, 0.2, 0.3, 1)))
+        self.assertEqual(entry["extensions"]["KHR_materials_specular"], {"specularFactor": 0})
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.1, 0.2, 0.3, 1), rtol=1e-5)
+        self.setUp()
+        entry, _ = self.material(node_material("m", "ShaderNodeBsdfGlossy", Color=(0.1, 0.2, 0.3, 1), Roughness=0.4))
+        self.assertEqual(entry["pbrMetallicRoughness"].get("metallicFactor", 1), 1)
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.4, 5)
+
+    def test_sum_with_emission(self):
+        material = node_material("e", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", mix="ShaderNodeAddShader", Color=(0.5, 0.25, 0.1, 1), Strength=8.0)
+        entry, _ = self.material(material)
+        strength = entry["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"]
+        numpy.testing.assert_allclose([strength * e for e in entry["emissiveFactor"]], (4, 2, 0.8), rtol=1e-5)
+
+    def test_absorption_keeps_the_coefficients_of_cycles(self):
+        entry, _ = self.material(node_material("w", "ShaderNodeBsdfGlass", volume="ShaderNodeVolumeAbsorption", Color=(0.5, 0.75, 1, 1), Density=4.0))
+        volume = entry["extensions"]["KHR_materials_volume"]
+        sigma = [-math.log(c) / volume["attenuationDistance"] for c in volume["attenuationColor"]]
+        numpy.testing.assert_allclose(sigma, (2, 1, 0), atol=1e-6)
+
+    def test_scattering_volume_without_surface(self):
+        entry, _ = self.material(node_material("fog", volume="ShaderNodeVolumeScatter", Color=(0.5, 0.25, 0.1, 1), Density=4.0, Anisotropy=0.3))
+        medium = entry["extras"]["caustique"]["medium"]
+        numpy.testing.assert_allclose(medium["sigma_s"], (2, 1, 0.4), rtol=1e-6)
+        self.assertEqual(medium["sigma_a"], [0, 0, 0])
+        self.assertAlmostEqual(medium["g"], 0.3, 6)
+        self.assertEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1)
+        self.assertIn("KHR_materials_volume", entry["extensions"])
+
+    def test_abbe_number(self):
+        material = node_material("flint", "ShaderNodeBsdfGlass")
+        material["abbe"] = 40.0
+        entry, _ = self.material(material)
+        self.assertEqual(entry["extensions"]["KHR_materials_dispersion"], {"dispersion": 0.5})
+
+    def test_procedural_texture_is_named(self):
+        material = node_material("n", "ShaderNodeBsdfPrincipled")
+        tree = material.node_tree
+        noise, shader = tree.nodes.new("ShaderNodeTexNoise"), next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        tree.links.new(noise.outputs[0], shader.inputs["Base Color"])
+        _, warnings = self.material(material)
+        self.assertEqual(warnings, ['material "n": Base Color comes from a Noise Texture node: bake it to an image to carry it'])
+
+    def test_camera(self):
+        focus = place("focus", None, (0, 3, 4))
+        for name, at in (("other", (1, 0, 0)), ("eye", (0, 0, 10))):
+            data = bpy.data.cameras.new(name)
+            data.lens, data.dof.use_dof, data.dof.aperture_fstop = 80, name == "eye", 2.0
+            data.dof.focus_object = focus
+            place(name, data, at)
+        bpy.context.scene.camera = bpy.data.objects["eye"]
+        bpy.context.view_layer.update()
+        document, _ = self.write()
+        self.assertEqual([c["name"] for c in document["cameras"]], ["eye", "other"])
+        said = document["cameras"][0]["extras"]["caustique"]
+        self.assertAlmostEqual(said["aperture_radius"], 0.02, 6)
+        self.assertAlmostEqual(said["focus_distance"], 6, 5)
+        first = document["nodes"][document["scenes"][0]["nodes"][0]]
+        self.assertEqual((first["name"], first["camera"]), ("eye", 0))
+
+    def test_lamps(self):
+        for name, kind in (("p", "POINT"), ("s", "SUN")):
+            data = bpy.data.lights.new(name, kind)
+            place(name, data)
+        bpy.data.lights["p"].energy, bpy.data.lights["p"].shadow_soft_size = 4 * math.pi, 0.25
+        bpy.data.lights["s"].energy, bpy.data.lights["s"].angle = 2, math.radians(3)
+        document, _ = self.write()
+        lamps = {light["name"]: light["intensity"] for light in document["extensions"]["KHR_lights_punctual"]["lights"]}
+        self.assertAlmostEqual(lamps["p"], 683, 2)
+        self.assertAlmostEqual(lamps["s"], 2 * 683, 2)
+        said = {node["name"]: node["extras"]["caustique"] for node in document["nodes"]}
+        self.assertEqual(said["p"], {"radius": 0.25})
+        self.assertAlmostEqual(said["s"]["angle_deg"], 3, 5)
+
+    def test_lamp_nodes_multiply(self):
+        data = bpy.data.lights.new("p", "POINT")
+        data.energy, data.color = 4 * math.pi, (1, 0.5, 0.5)
+        if bpy.app.version < (5, 0, 0):
+            data.use_nodes = True
+        node = lighting.emission_node(data)
+        if node is None:
+            tree = data.node_tree
+            node = tree.nodes.new("ShaderNodeEmission")
+            tree.links.new(node.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
+        node.inputs["Strength"].default_value, node.inputs["Color"].default_value = 3, (0.5, 1, 0.5, 1)
+        place("p", data)
+        document, _ = self.write()
+        light = document["extensions"]["KHR_lights_punctual"]["lights"][0]
+        numpy.testing.assert_allclose([c * light["intensity"] / 683 for c in light["color"]], (1.5, 1.5, 0.75), rtol=1e-5)
+
+    def test_area_lights_light_as_in_cycles(self):
+        plane = node_material("white", "ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1))
+        mesh = bpy.data.meshes.new("plane")
+        mesh.from_pydata([(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)], [], [(0, 1, 2, 3)])
+        mesh.materials.append(plane)
+        place("plane", mesh)
+        eye = bpy.data.cameras.new("eye")
+        eye.type, eye.ortho_scale = "ORTHO", 0.2
+        bpy.context.scene.camera = place("eye", eye, (0, 0, 1))
+        for shape in ("SQUARE", "RECTANGLE", "DISK", "ELLIPSE"):
+            data = bpy.data.lights.new(shape, "AREA")
+            data.shape, data.size, data.size_y, data.energy, data.color = shape, 1.2, 0.6, 40, (1, 0.5, 0.25)
+            lamp = place(shape, data, (1, 0.5, 3))
+            lamp.rotation_euler = (0.2, 0.3, 0.4)
+            bpy.context.view_layer.update()
+            by_lamp = self.render().mean((0, 1))
+            lamp.hide_render = True
+            with ExitStack() as undo:
+                lighting.area_mesh(lamp, undo, self.fail)
+                by_mesh = self.render().mean((0, 1))
+            numpy.testing.assert_allclose(by_mesh, by_lamp, rtol=0.01, err_msg=shape)
+
+    def test_area_light_in_the_file(self):
+        data = bpy.data.lights.new("panel", "AREA")
+        data.size, data.energy = 2, 8 * math.pi
+        place("panel", data)
+        before = len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.materials)
+        document, _ = self.write()
+        entry = document["materials"][0]
+        self.assertEqual(entry["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"], 2)
+        self.assertFalse(entry.get("doubleSided", False))
+        self.assertEqual(before, (len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.materials)))
+
+    def test_nothing_is_left_behind(self):
+        material = node_material("g", "ShaderNodeBsdfGlass", "ShaderNodeEmission", mix="ShaderNodeAddShader")
+        body = cube(material)
+        modifier = body.modifiers.new("smooth", "SUBSURF")
+        modifier.levels, modifier.render_levels = 0, 3
+        links = [(l.from_node.name, l.to_node.name, l.to_socket.identifier) for l in material.node_tree.links]
+        document, _ = self.write()
+        self.assertEqual(document["accessors"][document["meshes"][0]["primitives"][0]["indices"]]["count"], 6 * 4 ** 3 * 6)
+        self.assertEqual(modifier.levels, 0)
+        self.assertEqual(sorted(links), sorted((l.from_node.name, l.to_node.name, l.to_socket.identifier) for l in material.node_tree.links))
+        self.assertEqual(len(material.node_tree.nodes), 4)
+
+    def world(self, image, turn=None, strength=1.0):
+        world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        bpy.context.scene.world = world
+        tree = world.node_tree
+        background = next(n for n in tree.nodes if n.type == "BACKGROUND")
+        texture = tree.nodes.new("ShaderNodeTexEnvironment")
+        texture.image = image
+        tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+        background.inputs["Strength"].default_value = strength
+        if turn is not None:
+            mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+            mapping.vector_type = turn[0]
+            mapping.inputs["Rotation"].default_value = (0, 0, math.radians(turn[1]))
+            tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+            tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+
+    def gradient(self, turn_deg=0):
+        """A smooth lat-long image f(u + turn) that differs everywhere: 64 x 32, first row at the bottom."""
+        v, u = (numpy.mgrid[0:32, 0:64] + 0.5) / [[[32]], [[64]]]
+        u = 2 * math.pi * (u + turn_deg / 360)
+        return numpy.stack([1 + 0.5 * numpy.cos(u), 1 + 0.5 * numpy.sin(u), 0.2 + v, 1 + 0 * v], -1).astype(numpy.float32)
+
+    def image(self):
+        picture = bpy.data.images.new("sky", 64, 32, float_buffer=True)
+        picture.pixels.foreach_set(self.gradient().ravel())
+        return picture
+
+    def test_environment_image_is_turned_as_in_cycles(self):
+        for kind, degrees in (("POINT", 50), ("TEXTURE", 50), ("POINT", -20)):
+            self.world(self.image(), (kind, degrees), 2.0)
+            document, warnings = self.write()
+            self.assertEqual(warnings, [])
+            said = document["scenes"][0]["extras"]["caustique"]["environment"]
+            self.assertEqual((said["file"], said["strength"]), ("scene.environment.exr", 2))
+            numpy.testing.assert_allclose(pixels(os.path.join(self.folder.name, said["file"])), self.gradient()[..., :3], atol=1e-3)
+            # What Cycles sees around it, in the layout of the interface: the image turned by rotation_deg about +Y.
+            lighting._baked(bpy.context.scene, self.path, 64)
+            seen = pixels(os.path.join(self.folder.name, "scene.environment.exr")) / 2
+            numpy.testing.assert_allclose(seen[1:-1], self.gradient(said["rotation_deg"])[1:-1, :, :3], atol=0.03, err_msg=f"{kind} {degrees}")
+
+    def test_procedural_world_is_baked(self):
+        self.world(self.image())
+        tree = bpy.context.scene.world.node_tree
+        gamma, background = tree.nodes.new("ShaderNodeGamma"), next(n for n in tree.nodes if n.type == "BACKGROUND")
+        gamma.inputs["Gamma"].default_value = 2
+        texture = next(n for n in tree.nodes if n.type == "TEX_ENVIRONMENT")
+        tree.links.new(texture.outputs["Color"], gamma.inputs["Color"])
+        tree.links.new(gamma.outputs[0], background.inputs["Color"])
+        document, warnings = self.write()
+        self.assertEqual(warnings, ['world "world": its nodes are baked to scene.environment.exr'])
+        seen = pixels(os.path.join(self.folder.name, document["scenes"][0]["extras"]["caustique"]["environment"]["file"]))
+        self.assertEqual(seen.shape, (512, 1024, 3))
+        numpy.testing.assert_allclose(seen.reshape(32, 16, 64, 16, 3).mean((1, 3))[1:-1], self.gradient()[1:-1, :, :3] ** 2, atol=0.08)
+
+    def test_command_line(self):
+        cube(node_material("g", "ShaderNodeBsdfGlass"))
+        blend = os.path.join(self.folder.name, "in.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=blend)
+        script = os.path.join(ROOT, "scripts", "blender", "export.py")
+        done = subprocess.run([sys.executable, script, blend, self.path], capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("KHR_materials_volume", glb.read(self.path)[0]["extensionsUsed"])
+        done = subprocess.run([sys.executable, script, blend + "x", self.path], capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("in.blendx", done.stderr)
+        self.assertEqual(subprocess.run([sys.executable, script], capture_output=True, timeout=120).returncode, 2)
+
+
+if __name__ == "__main__":
+    unittest.main()
