@@ -148,7 +148,7 @@ fn white_furnace() {
     let failures: Vec<String> = white()
         .par_iter()
         .map(|(name, p)| (name, furnace_error(p)))
-        .filter(|(_, error)| !(*error < 0.005))
+        .filter(|(_, error)| *error >= 0.005 || error.is_nan())
         .map(|(name, error)| format!("{name}: off by {error}"))
         .collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
@@ -265,7 +265,7 @@ fn directions_follow_their_density() {
     let mut cases = vec![];
     for (name, p) in triads() {
         let bsdf = Bsdf::new(&p, &TABLES);
-        for mu in [0.95, 0.04, -0.4f32] {
+        for mu in [0.9, 0.04, -0.4f32] {
             for set in [LobeSet::ALL, LobeSet::BROAD, LobeSet::SHARP, LobeSet::SHARP | LobeSet::DELTA] {
                 // A set that holds the same lobes as ALL says nothing new.
                 if bsdf.lobes().has(set) && (set == LobeSet::ALL || bsdf.lobes() & set != bsdf.lobes()) {
