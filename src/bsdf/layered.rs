@@ -151,7 +151,10 @@ impl<'a> Layered<'a> {
         // A lobe that is narrow along one axis only is still sampled as a lobe.
         let ggx = Ggx { alpha_x: p.alpha_x.max(DELTA_ALPHA), alpha_y: p.alpha_y.max(DELTA_ALPHA) };
         let rough = class != LobeSet::DELTA;
-        let alpha = Position::new(if rough { (ggx.alpha_x * ggx.alpha_y).sqrt() } else { 0.0 });
+        // The tables are isotropic: a stretched lobe takes what one of the same mean square slope loses. At normal incidence that
+        // is right within 3 %; at grazing angles a metal stretched fourfold is off by up to -18 % across and +6 % along.
+        let mean_square = 0.5 * (sqr(ggx.alpha_x) + sqr(ggx.alpha_y));
+        let alpha = Position::new(if rough { mean_square.sqrt() } else { 0.0 });
         let metal = p.metallic;
         let glass = (1.0 - metal) * p.transmission;
         let matte = 1.0 - metal - glass;
