@@ -1,11 +1,15 @@
 //! All lights of a scene: choosing one by power, sampling it from a point, sampling emission, and the densities for MIS.
 
+use super::aim::Targets;
 use super::cdf::Cdf;
 use super::emitter::{Emitter, Sky, spot_falloff};
 use crate::geometry::{Shapes, Surface};
 use crate::material::Materials;
 use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
 use std::f32::consts::{PI, TAU};
+
+/// Share of the choices that all lights get alike; the rest goes by power.
+const EQUAL_SHARE: f64 = 0.05;
 
 /// A light seen from a point.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +39,8 @@ pub struct EmissionSample {
     pub light: u32,
     /// The light cannot be hit by a ray.
     pub delta: bool,
+    /// The light is at infinity.
+    pub infinite: bool,
 }
 
 /// The lights of a scene.
@@ -49,6 +55,7 @@ pub struct Lights {
     suns: Vec<u32>,
     environment: Option<u32>,
     sky: Sky,
+    targets: Targets,
 }
 
 impl Lights {
@@ -75,9 +82,9 @@ impl Lights {
                         radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
                     }
                 }
-                if material.emission_texture.is_some() || material.base_color_texture.is_some() {
+                if material.unlit || material.emission_texture.is_some() || !mesh.colors.is_empty() {
                     // No texel may be impossible to choose: keep a tenth of the brightest.
-                    radiance = radiance.max(material.emission * 0.1);
+                    radiance = radiance.max(material.brightest_emission() * 0.1);
                 }
                 if !(area > 0.0 && area.is_finite()) || radiance.max_element() <= 0.0 {
                     relative[i].push(u32::MAX);
@@ -97,8 +104,12 @@ impl Lights {
         let suns = (0..emitters.len() as u32)
             .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
             .collect();
-        let choice = Cdf::new(emitters.iter().map(|e| e.power(&sky)));
-        Lights { emitters, choice, first, relative, suns, environment, sky }
+        let powers: Vec<f64> = emitters.iter().map(|e| e.power(&sky)).collect();
+        // A lamp beside the sun is weak as seen from the whole scene, and the brightest thing on its own table: a share of the paths goes
+        // to all lights alike. It also keeps every probability above the resolution of the random numbers.
+        let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
+        let choice = Cdf::new(powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 }));
+        Lights { emitters, choice, first, relative, suns, environment, sky, targets: Targets::new(shapes, materials) }
     }
 
     /// No light gives any light.
@@ -138,7 +149,10 @@ impl Lights {
                 if cos == 0.0 || (cos < 0.0 && !two_sided) {
                     return None;
                 }
-                let radiance = materials.list[light.material as usize].emitted(&light, &materials.textures);
+                let material = &materials.list[light.material as usize];
+                // A cut-out part gives no light: rays pass it, so samples must, too.
+                let radiance =
+                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 Some(DirectSample { wi, target: Some(light.spawn(-wi)), radiance, pdf_w, delta: false })
             }
@@ -245,7 +259,9 @@ impl Lights {
                 let back = *two_sided && rest < 0.5;
                 let frame = Frame::from_normal(if back { -light.ng } else { light.ng });
                 let d = frame.to_world(warp::hemisphere_cosine(direction));
-                let radiance = materials.list[light.material as usize].emitted(&light, &materials.textures);
+                let material = &materials.list[light.material as usize];
+                let radiance =
+                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
                 (light.spawn(d), d, radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 }))
             }
             Emitter::Point { p, intensity } => (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU)),
@@ -284,7 +300,16 @@ impl Lights {
             flux,
             light: index as u32,
             delta: emitter.is_delta(),
+            infinite: emitter.is_infinite(),
         })
+    }
+
+    /// Aims the start of a path from infinity at what can make caustics (see [`Targets::aim`]); others stay as they are.
+    #[inline]
+    pub fn aim(&self, emission: &mut EmissionSample, u: f32, point: Vec2) {
+        if emission.infinite {
+            self.targets.aim(&self.sky, emission, u, point);
+        }
     }
 
     /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.
