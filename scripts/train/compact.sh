@@ -21,7 +21,7 @@ $data --variants 2 --renders 4 --iterations 4 16 32 8 --reference-iterations 160
 # On one core; a loaded one did the steps that ../../src/combine/models/compact.txt tells in these minutes.
 $python train.py --data "$folder/synthetic" --out "$folder/pre" --batch 4 --side 48 --rate 1e-3 --threads "$threads" --minutes 12
 $python train.py --data "$folder/data" "$folder/synthetic" --init "$folder/pre/last.pt" --out "$folder/run" --squared 0.5 \
-    --batch 6 --side 56 --rate 1e-3 --threads "$threads" --minutes 12
+    --batch 4 --side 56 --rate 1e-3 --threads "$threads" --minutes 11
 $python evaluate.py --checkpoint "$folder/run/last.pt" --data "$folder/data"
 $python export.py --checkpoint "$folder/run/last.pt" -o ../../src/combine/models/compact.onnx
 $python fixture.py --checkpoint "$folder/run/last.pt"
