@@ -71,8 +71,8 @@ impl Shading<'_> {
     pub fn gathering(&self, wo: Vec3, set: LobeSet) -> Gathering<'_> {
         let kind = match self.local(wo) {
             None => Kind::Nothing,
-            Some((o, cos)) => match self.bsdf.diffuse_from(o, set) {
-                Some((factor, through)) => Kind::Diffuse { factor, through, cos },
+            Some((o, _)) => match self.bsdf.diffuse_from(o, set) {
+                Some((factor, through)) => Kind::Diffuse { factor, through, side: o.z.signum() },
                 None => Kind::Any,
             },
         };
@@ -117,8 +117,8 @@ enum Kind<'a> {
     Diffuse {
         factor: Rgb,
         through: Option<&'a Profile<'a>>,
-        /// Cosine of `wo` with the geometric normal: photons on its side count.
-        cos: f32,
+        /// 1 in front, -1 behind: photons on the side of `wo` count.
+        side: f32,
     },
     Any,
 }
@@ -130,8 +130,7 @@ impl Gathering<'_> {
         match &self.kind {
             Kind::Nothing => Rgb::ZERO,
             Kind::Any => self.shading.gather(self.wo, wi, self.set),
-            Kind::Diffuse { factor, through, cos } => {
-                let side = cos.signum();
+            Kind::Diffuse { factor, through, side } => {
                 let (cos_s, cos_g) = (wi.dot(self.shading.frame.n) * side, wi.dot(self.shading.ng) * side);
                 if cos_s < LEAST_COSINE || cos_g <= 0.0 {
                     return Rgb::ZERO;
