@@ -8,4 +8,4 @@ mod lights;
 pub use cdf::Cdf;
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
-pub use lights::{DirectSample, EmissionSample, Lights};
+pub use lights::{DirectSample, EmissionDensity, EmissionSample, Lights};
