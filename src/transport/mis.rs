@@ -47,7 +47,8 @@ impl Ratios {
     /// Weight of any strategy but merging \[(37), the balance heuristic\].
     #[inline]
     pub fn weight(self, eta: Eta) -> f32 {
-        1.0 / (self.plain + eta.0 * self.merged)
+        // Without the test a path that cannot be merged would weigh 0 * infinity under MERGE_ONLY.
+        1.0 / if self.merged > 0.0 { self.plain + eta.0 * self.merged } else { self.plain }
     }
 
     /// Weight of merging; eta above 0.
