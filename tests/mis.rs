@@ -9,14 +9,13 @@ mod support;
 
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
-use caustique::light::EmissionDensity;
+use caustique::light::{EmissionDensity, Emitter};
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::photon::PhotonMap;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use caustique::trace::Ray;
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
     Bidirectional, Eye, Left, LightPass, Meets, MergeLevels, Next, PathStart, Record, Scattered, Strategies,
@@ -407,11 +406,14 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                             EmissionDensity { direct: 1.0, onward, cos: 1.0, infinite: false, delta: true }
                         }
                         Some(target) => {
-                            let origin = target - sample.wi * 1e-3;
-                            let ray = Ray { origin, direction: sample.wi, tmax: f32::INFINITY, token: 0 };
-                            let hit = scene.tracer.intersect(&ray).expect("the lamp");
-                            let lamp = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
-                            let lamp = lamp.expect("a triangle with area");
+                            // The lamp is flat and of one brightness: any of its triangles will do.
+                            let lamp = scene.lights.emitters().iter().find_map(|emitter| match emitter {
+                                Emitter::Triangle { instance, primitive, .. } => {
+                                    scene.shapes.surface(*instance, *primitive, [0.3, 0.3])
+                                }
+                                _ => None,
+                            });
+                            let lamp = lamp.expect("a lamp");
                             // Shadow rays end a little off the lamp: back along its normal.
                             let p = target - lamp.ng * (target - lamp.p).dot(lamp.ng);
                             distance2 = f64::from(p.distance_squared(met.p));

@@ -347,7 +347,7 @@ impl Lights {
         let infinite = matches!(emitter, Emitter::Sun { .. } | Emitter::Environment);
         let delta = emitter.is_delta();
         let density = EmissionDensity { direct: direct * probability, onward, cos, infinite, delta };
-        (flux.is_finite() && flux.max_element() > 0.0).then(|| EmissionSample {
+        (flux.is_finite() && flux.max_element() > 0.0).then_some(EmissionSample {
             origin,
             direction: d,
             flux,
