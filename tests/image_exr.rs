@@ -346,6 +346,34 @@ fn malformed_files_are_errors() {
     assert!(failed > 300 && read > 100, "{failed} failed, {read} read: the mutants test nothing");
 }
 
+/// The decoder allocates what a DWA chunk says of its sections: a number among them that is too large must stop the reader before.
+#[test]
+fn dwa_sections_larger_than_their_block_are_an_error() {
+    use ::exr::prelude::*;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dwa.exr");
+    let values: Vec<f32> = (0..64 * 64).map(|i| (i as f32 / 50.0).sin() + 2.0).collect();
+    let encoding =
+        Encoding { compression: Compression::DWAA(None), blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let channels = vec![foreign::channel("R", FlatSamples::F32(values.clone()))];
+    Image::from_layer(foreign::part("a", (64, 64), (0, 0), encoding, channels)).write().to_file(&path).unwrap();
+    let (set, _) = exr::read(&path).unwrap();
+    let plane = &set.get("").unwrap().planes[0].values;
+    assert!(plane.iter().zip(&values).all(|(a, b)| (a - b).abs() < 0.05), "DWA is lossy, but not that much");
+
+    let good = fs::read(&path).unwrap();
+    // Two chunks of 32 lines; the offset table stands right before the first, whose sections follow its y and size.
+    let table = (0..good.len() - 16).find(|&i| good[i..i + 8] == ((i + 16) as u64).to_le_bytes()).unwrap();
+    for number in 0..11 {
+        let mut bytes = good.clone();
+        let at = table + 16 + 8 + 8 * number;
+        bytes[at..at + 8].copy_from_slice(&(1u64 << 47).to_le_bytes());
+        fs::write(&path, bytes).unwrap();
+        let error = exr::read(&path).unwrap_err();
+        assert!(error.cause.contains("section"), "{error}");
+    }
+}
+
 fn entries(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
 }
@@ -362,7 +390,7 @@ fn a_failed_write_leaves_nothing_and_an_older_file_alone() {
     });
     assert!(error.is_err());
     assert_eq!(fs::read(&path).unwrap(), b"older");
-    assert_eq!(entries(folder.path()), [path.clone()]);
+    assert_eq!(entries(folder.path()).len(), 1);
     atomic::write_bytes(&path, b"newer").unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"newer");
     assert_eq!(entries(folder.path()), [path]);

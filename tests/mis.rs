@@ -7,7 +7,7 @@
 
 mod support;
 
-use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
+use caustique::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
 use caustique::light::{EmissionDensity, Emitter};
 use caustique::material::Material;
@@ -28,10 +28,10 @@ const TOLERANCE: f64 = 1e-4;
 
 /// A vertex as a walk has met it.
 #[derive(Clone, Copy)]
-struct Met {
+struct Met<'s> {
     p: Vec3,
     ng: Vec3,
-    shading: Shading,
+    shading: Shading<'s>,
     /// Back along the walk.
     wo: Vec3,
     distance: f32,
@@ -43,7 +43,7 @@ struct Met {
 /// Writes down a walk.
 struct Notes<'a> {
     scene: &'a Scene,
-    met: Vec<Met>,
+    met: Vec<Met<'a>>,
     escaped: Option<Vec3>,
 }
 
@@ -53,7 +53,7 @@ impl Visitor for Notes<'_> {
         self.met.push(Met {
             p: v.surface.p,
             ng: v.surface.ng,
-            shading: *v.shading,
+            shading: Shading { bsdf: Bsdf::new(v.parameters, &self.scene.tables), ..*v.shading },
             wo: v.wo,
             distance: v.distance,
             onward: None,
@@ -81,8 +81,8 @@ fn notes<'a>(scene: &'a Scene, start: PathStart, stream: Stream, transport: Tran
 
 /// A surface vertex of a whole path.
 #[derive(Clone, Copy)]
-struct Node {
-    shading: Shading,
+struct Node<'s> {
+    shading: Shading<'s>,
     to_light: Vec3,
     to_eye: Vec3,
     /// Cosines for arrivals from the light's and from the eye's side (two surfaces where a photon is merged).
@@ -94,9 +94,9 @@ struct Node {
 }
 
 /// A whole path, from the light to the eye.
-struct Whole {
+struct Whole<'s> {
     light: EmissionDensity,
-    nodes: Vec<Node>,
+    nodes: Vec<Node<'s>>,
     /// Squared lengths: `distance2[j]` is that of the segment before node `j`; one more to the camera.
     distance2: Vec<f64>,
     /// Density per solid angle of the rays of one pixel.
@@ -114,7 +114,18 @@ enum Strategy {
     Merge(usize),
 }
 
-impl Whole {
+impl<'s> Whole<'s> {
+    /// Appends vertices of a walk, in the order from the light to the eye, each with the segment that the walk came by.
+    fn append<'m>(&mut self, met: impl Iterator<Item = &'m Met<'s>>, eye_side: bool)
+    where
+        's: 'm,
+    {
+        for met in met {
+            self.nodes.push(passed(met, eye_side));
+            self.distance2.push(f64::from(met.distance) * f64::from(met.distance));
+        }
+    }
+
     fn strategies(&self) -> Vec<Strategy> {
         let k = self.nodes.len();
         let mut all = vec![Strategy::Hit, Strategy::NextEvent];
@@ -293,14 +304,14 @@ impl Record for Said {
 }
 
 /// The node that a walk has gone through.
-fn passed(met: &Met, eye_side: bool) -> Node {
+fn passed<'s>(met: &Met<'s>, eye_side: bool) -> Node<'s> {
     let (onward, delta, pdf) = met.onward.unwrap_or((Vec3::ZERO, false, 0.0));
     let (to_light, to_eye) = if eye_side { (onward, met.wo) } else { (met.wo, onward) };
     Node { delta, drawn: Some((eye_side, pdf)), ..node(met, met, to_light, to_eye) }
 }
 
 /// A node whose light side was met as `light` and whose eye side as `eye`, which scatters.
-fn node(light: &Met, eye: &Met, to_light: Vec3, to_eye: Vec3) -> Node {
+fn node<'s>(light: &Met<'s>, eye: &Met<'s>, to_light: Vec3, to_eye: Vec3) -> Node<'s> {
     let cos = |w: Vec3, met: &Met| f64::from(w.dot(met.ng).abs());
     Node {
         shading: eye.shading,
@@ -351,24 +362,11 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         let from_eye = &eye_notes.met[..];
         let camera_pdf_w = f64::from(camera.pdf_w(start.direction) * pixels);
         let square = |d: f32| f64::from(d) * f64::from(d);
-        // The eye's half, nodes t to 1.
-        let eye_half = |whole: &mut Whole, t: usize| {
-            for met in from_eye[..t].iter().rev() {
-                whole.nodes.push(passed(met, true));
-                whole.distance2.push(square(met.distance));
-            }
-        };
         for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
             let density = emitted.as_ref().map(|e| e.density);
             let infinity = EmissionDensity { direct: 0.0, onward: 0.0, cos: 1.0, infinite: true, delta: false };
             let mut whole =
                 Whole { light: density.unwrap_or(infinity), nodes: vec![], distance2: vec![], camera_pdf_w };
-            let light_half = |whole: &mut Whole, s: usize| {
-                for met in &from_light[..s] {
-                    whole.nodes.push(passed(met, false));
-                    whole.distance2.push(square(met.distance));
-                }
-            };
             let (name, strategy) = match technique {
                 Technique::Hit { eye: 1 } => continue,
                 Technique::Hit { eye: 0 } => {
@@ -379,14 +377,14 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(), ..infinity };
                     scene.lights.escape(direction, |_, pdf| whole.light.direct = pdf);
                     whole.distance2.push(1.0);
-                    eye_half(&mut whole, from_eye.len());
+                    whole.append(from_eye[..from_eye.len()].iter().rev(), true);
                     ("hit", Strategy::Hit)
                 }
                 Technique::Hit { eye: t } => {
                     let t = t as usize;
                     whole.light = from_eye[t - 1].emitted.expect("a lamp");
                     whole.distance2.push(square(from_eye[t - 1].distance));
-                    eye_half(&mut whole, t - 1);
+                    whole.append(from_eye[..t - 1].iter().rev(), true);
                     ("hit", Strategy::Hit)
                 }
                 Technique::NextEvent { eye: t } => {
@@ -423,7 +421,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     };
                     assert_eq!(from, sample.target.unwrap_or(sample.wi));
                     whole.distance2.push(distance2);
-                    eye_half(&mut whole, t as usize);
+                    whole.append(from_eye[..t as usize].iter().rev(), true);
                     whole.nodes[0] = node(met, met, sample.wi, met.wo);
                     ("next event", Strategy::NextEvent)
                 }
@@ -431,10 +429,10 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let (s, t) = (s as usize, t as usize);
                     let (a, b) = (&from_light[s - 1], &from_eye[t - 1]);
                     let d = (b.p - a.p).normalize();
-                    light_half(&mut whole, s);
+                    whole.append(from_light[..s].iter(), false);
                     whole.nodes[s - 1] = node(a, a, a.wo, d);
                     whole.distance2.push(f64::from(b.p.distance_squared(a.p)));
-                    eye_half(&mut whole, t);
+                    whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s] = node(b, b, -d, b.wo);
                     ("connect", Strategy::Connect(s))
                 }
@@ -442,7 +440,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let s = s as usize;
                     let met = &from_light[s - 1];
                     let d = (from - met.p).normalize();
-                    light_half(&mut whole, s);
+                    whole.append(from_light[..s].iter(), false);
                     whole.nodes[s - 1] = node(met, met, met.wo, d);
                     whole.distance2.push(f64::from(from.distance_squared(met.p)));
                     whole.camera_pdf_w = f64::from(camera.pdf_w(-d) * pixels);
@@ -452,10 +450,10 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let (s, t) = (s as usize, t as usize);
                     let (a, b) = (&from_light[s - 1], &from_eye[t - 1]);
                     assert_eq!(a.p, from);
-                    light_half(&mut whole, s);
+                    whole.append(from_light[..s].iter(), false);
                     whole.nodes.pop();
                     let merged = node(a, b, a.wo, b.wo);
-                    eye_half(&mut whole, t);
+                    whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s - 1] = merged;
                     ("merge", Strategy::Merge(s - 1))
                 }

@@ -1,103 +1,28 @@
-//! Directional albedos of the microfacet lobes, tabulated, so that what single scattering loses can be given back
-//! \[Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"\].
-//!
-//! A table is a grid over the square roots of the cosine and of alpha, which puts nodes where the albedos bend: at grazing angles of
-//! nearly smooth surfaces. Interpolation is linear, and averages integrate the interpolant exactly, so that compensation
-//! gives back what the tables say is missing, no more and no less.
+//! Directional albedos of the lobes, tabulated, so that what single scattering loses can be given back
+//! \[Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"\], and layers share light.
 
 use super::fresnel::{grazing_weight, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
-use crate::math::{Vec2, Vec3};
+use super::profile::{Grid, NODES, Position, Profile, node};
+use super::sheen;
+use crate::math::{Vec2, Vec3, Vec4, sqr};
 use rayon::prelude::*;
 
-/// Nodes along each axis.
-const NODES: usize = 32;
+/// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands have
+/// kinks along curves, at the horizon and the critical angle, where product rules converge slowly).
+const LATTICE: (usize, usize) = (987, 610);
 
-/// Points of the quadrature over visible normals: along the azimuth (a half of it: the rest is its mirror image) and across.
-const QUADRATURE: (usize, usize) = (8, 24);
+/// Index of refraction of clear coats (KHR_materials_clearcoat).
+pub(super) const COAT_ETA: f32 = 1.5;
 
-/// A function of the cosine in `[0, 1]`: values at the nodes.
-#[derive(Clone, Copy, Debug)]
-pub struct Row(pub [f32; NODES]);
-
-/// Weights of the nodes in `2 integral f(mu) mu dmu` for `f` linear in `sqrt(mu)` between them.
-const AVERAGE: [f32; NODES] = {
-    let mut weights = [0.0f64; NODES];
-    let h = 1.0 / (NODES - 1) as f64;
-    let mut i = 0;
-    while i + 1 < NODES {
-        let (a, b) = (i as f64 * h, (i + 1) as f64 * h);
-        let fourth = b * b * b * b - a * a * a * a;
-        let fifth = 0.8 * (b * b * b * b * b - a * a * a * a * a);
-        weights[i] += (b * fourth - fifth) / h;
-        weights[i + 1] += (fifth - a * fourth) / h;
-        i += 1;
-    }
-    let mut result = [0.0f32; NODES];
-    let mut i = 0;
-    while i < NODES {
-        result[i] = weights[i] as f32;
-        i += 1;
-    }
-    result
-};
-
-impl Row {
-    /// Zero everywhere.
-    pub const ZERO: Row = Row([0.0; NODES]);
-    /// One everywhere.
-    pub const ONE: Row = Row([1.0; NODES]);
-
-    /// A row from a function of the node.
-    #[inline]
-    pub fn from_fn(f: impl FnMut(usize) -> f32) -> Row {
-        Row(std::array::from_fn(f))
-    }
-
-    /// The value at cosine `mu`.
-    #[inline]
-    pub fn at(&self, mu: f32) -> f32 {
-        let x = mu.clamp(0.0, 1.0).sqrt() * (NODES - 1) as f32;
-        let i = (x as usize).min(NODES - 2);
-        let t = x - i as f32;
-        self.0[i] + (self.0[i + 1] - self.0[i]) * t
-    }
-
-    /// Its cosine-weighted average over the hemisphere.
-    #[inline]
-    pub fn average(&self) -> f32 {
-        self.0.iter().zip(&AVERAGE).map(|(v, w)| v * w).sum()
-    }
-}
-
-/// A function of the cosine and of alpha: rows at the nodes of `sqrt(alpha)`.
-#[derive(Clone, Debug)]
-pub struct Table(Vec<Row>);
-
-impl Table {
-    /// The row at `alpha`.
-    #[inline]
-    pub fn row(&self, alpha: f32) -> Row {
-        let x = alpha.clamp(0.0, 1.0).sqrt() * (NODES - 1) as f32;
-        let i = (x as usize).min(NODES - 2);
-        let t = x - i as f32;
-        let (a, b) = (&self.0[i].0, &self.0[i + 1].0);
-        Row::from_fn(|j| a[j] + (b[j] - a[j]) * t)
-    }
-}
-
-/// Albedos of single scattering at one side of a rough dielectric, split so that the reflectances at normal and at grazing
+/// Albedos of single scattering at one side of a rough dielectric, split so that the reflectances F0 at normal and F90 at grazing
 /// incidence can be chosen later: everything is linear in them.
 #[derive(Clone, Debug)]
-pub struct SideTables {
-    /// Reflection where it is not total, as if all were reflected.
-    pub reflected: Table,
-    /// The same, weighted by [`grazing_weight`].
-    pub reflected_grazing: Table,
-    /// Transmission, as if all were transmitted.
-    pub transmitted: Table,
-    /// The same, weighted by [`grazing_weight`].
-    pub transmitted_grazing: Table,
+pub(super) struct SideTables {
+    /// Reflection: of a perfect reflector, of total reflection, of the rest per F0, per F90.
+    pub reflected: Grid,
+    /// Both: constant, per F0, per F90; the fourth is unused.
+    pub scattered: Grid,
     /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of [`grazing_weight`].
     pub average_total: f32,
     /// See `average_total`.
@@ -106,90 +31,108 @@ pub struct SideTables {
 
 /// Tables of one pair of media.
 #[derive(Clone, Debug)]
-pub struct InterfaceTables {
-    /// Index of the far medium over the near one, at least 1.
-    pub eta: f32,
-    /// Seen from the medium of the lower index.
-    pub thin: SideTables,
-    /// Seen from the medium of the higher index.
-    pub dense: SideTables,
+struct InterfaceTables {
+    /// Index of the denser medium over the thinner one.
+    eta: f32,
+    thin: SideTables,
+    dense: SideTables,
+}
+
+/// What facets lose below a coat or a sheen, beyond its transmittance at `wo`: see [`EnergyTables::covered_loss`].
+#[derive(Clone, Debug)]
+struct CoverTables([Grid; 3]);
+
+/// Nodes of a cover's roughness, four to a grid, the ends shared.
+const COVER_NODES: usize = 10;
+
+/// What may lie on top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Covering {
+    /// A clear coat.
+    Coat,
+    /// Sheen.
+    Sheen,
 }
 
 /// Everything tabulated for a scene; immutable, looked up without locks.
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
-    /// Albedo of the reflecting lobe of a perfect reflector.
-    pub(super) white: Table,
-    /// The same, weighted by Schlick's weight of F90.
-    pub(super) schlick: Table,
     interfaces: Vec<InterfaceTables>,
+    sheen: Option<Grid>,
+    below_coat: Option<CoverTables>,
+    below_sheen: Option<CoverTables>,
 }
 
-/// Cosine and alpha of a node, kept off zero: the limits are approached, not reached.
-fn cosine(node: usize) -> f32 {
-    let t = node as f32 / (NODES - 1) as f32;
-    (t * t).max(1e-5)
+/// Which coverings a scene has: their tables cost time to make.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coverings {
+    /// Some surface has a clear coat.
+    pub coat: bool,
+    /// Some surface has sheen.
+    pub sheen: bool,
 }
 
-fn alpha(node: usize) -> f32 {
-    let t = node as f32 / (NODES - 1) as f32;
-    (t * t).max(1e-6)
-}
-
-/// Tabulates `N` functions at once: `f` gives, for a lobe, the direction towards the viewer, Lambda of it and a visible normal,
-/// the terms of their sums.
-fn tabulate<const N: usize>(f: impl Fn(&Ggx, Vec3, f32, Vec3) -> [f32; N] + Sync) -> [Table; N] {
-    let rows: Vec<[Row; N]> = (0..NODES)
+/// Tabulates functions of alpha and cosine: `f` is given a lobe, the direction towards the viewer, Lambda of it, a visible normal and
+/// its weight in the quadrature.
+fn tabulate<T: Send>(
+    zero: impl Fn() -> T + Sync,
+    f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3, f32) + Sync,
+) -> Vec<Vec<T>> {
+    (0..NODES)
         .into_par_iter()
         .map(|i| {
-            let ggx = Ggx { alpha_x: alpha(i), alpha_y: alpha(i) };
-            let mut rows = [Row::ZERO; N];
-            for j in 0..NODES {
-                let mu = cosine(j);
+            let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
+            let cosines = (0..NODES).map(|j| {
+                let mu = node(j);
                 let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
                 let lambda_o = ggx.lambda(wo);
-                let mut sums = [0.0f32; N];
-                for a in 0..QUADRATURE.0 {
-                    for b in 0..QUADRATURE.1 {
-                        let u = Vec2::new(
-                            0.5 * (a as f32 + 0.5) / QUADRATURE.0 as f32,
-                            (b as f32 + 0.5) / QUADRATURE.1 as f32,
-                        );
-                        let terms = f(&ggx, wo, lambda_o, ggx.sample_visible(wo, u));
-                        for (sum, term) in sums.iter_mut().zip(terms) {
-                            *sum += term;
-                        }
-                    }
+                let mut sum = zero();
+                for k in 0..LATTICE.0 {
+                    // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
+                    // reflections are the ones that are lost.
+                    let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
+                    let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
+                    let weight = 2.0 * rest / LATTICE.0 as f32;
+                    let h = ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest));
+                    f(&mut sum, &ggx, wo, lambda_o, h, weight);
                 }
-                for (row, sum) in rows.iter_mut().zip(sums) {
-                    row.0[j] = sum / (QUADRATURE.0 * QUADRATURE.1) as f32;
-                }
-            }
-            rows
+                sum
+            });
+            cosines.collect()
         })
-        .collect();
-    std::array::from_fn(|n| Table(rows.iter().map(|r| r[n]).collect()))
+        .collect()
 }
 
-/// G2 over G1 of the reflected direction; zero below the horizon.
-fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> f32 {
+fn grid<T>(table: &[Vec<T>], f: impl Fn(&T) -> Vec4) -> Grid {
+    Grid::new(table.iter().map(|row| std::array::from_fn(|j| f(&row[j]))))
+}
+
+/// The reflected direction, and G2 over G1 of it; zero below the horizon.
+fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
     let wi = reflect(wo, h);
-    if wi.z <= 0.0 {
-        return 0.0;
-    }
-    g2_reflection(lambda_o, ggx.lambda(wi)) / g1(lambda_o)
+    (wi, if wi.z > 0.0 { g2_reflection(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 })
 }
 
 impl SideTables {
     fn new(eta: f32) -> SideTables {
-        let [reflected, reflected_grazing, transmitted, transmitted_grazing] = tabulate(|ggx, wo, lambda_o, h| {
-            let cos = wo.dot(h).clamp(0.0, 1.0);
-            let Some((grazing, cos_t)) = grazing_weight(cos, eta) else { return [0.0; 4] };
-            let r = reflected_share(ggx, wo, lambda_o, h);
-            let wi = refract(wo, h, eta, cos_t);
-            let t = if wi.z < 0.0 { g2_transmission(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 };
-            [r, r * grazing, t, t * grazing]
-        });
+        // Total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and weighted.
+        let table = tabulate(
+            || [0.0f32; 5],
+            |sums, ggx, wo, lambda_o, h, weight| {
+                let cos = wo.dot(h).clamp(0.0, 1.0);
+                let r = weight * reflected_share(ggx, wo, lambda_o, h).1;
+                let Some((grazing, cos_t)) = grazing_weight(cos, eta) else {
+                    sums[0] += r;
+                    return;
+                };
+                let wi = refract(wo, h, eta, cos_t);
+                let t =
+                    if wi.z < 0.0 { weight * g2_transmission(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 };
+                for (sum, term) in sums[1..].iter_mut().zip([r, r * grazing, t, t * grazing]) {
+                    *sum += term;
+                }
+            },
+        );
         // Midpoints in mu^2: the cosine-weighted measure.
         let n = 4096;
         let (mut total, mut grazing) = (0.0f64, 0.0f64);
@@ -201,38 +144,105 @@ impl SideTables {
             }
         }
         SideTables {
-            reflected,
-            reflected_grazing,
-            transmitted,
-            transmitted_grazing,
+            reflected: grid(&table, |&[total, r, rg, ..]| Vec4::new(total + r, total, r - rg, rg)),
+            // Transmitted is what F leaves: t (1 - F0) - tg (F90 - F0).
+            scattered: grid(&table, |&[total, r, rg, t, tg]| Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0)),
             average_total: (total / f64::from(n)) as f32,
             average_grazing: (grazing / f64::from(n)) as f32,
         }
+    }
+
+    /// Share of what arrives that the facets of a perfect reflector scatter less than all of: what compensation gives back.
+    #[inline]
+    pub fn white_loss(&self, alpha: Position) -> Profile<'_> {
+        Profile::new(&self.reflected, alpha, 1.0, -Vec4::X)
+    }
+
+    /// Albedo of reflection.
+    #[inline]
+    pub fn reflection(&self, alpha: Position, f0: f32, f90: f32) -> Profile<'_> {
+        Profile::new(&self.reflected, alpha, 0.0, Vec4::new(0.0, 1.0, f0, f90))
+    }
+
+    /// What neither reflection nor compensation by `multiple` of the white loss reflects.
+    #[inline]
+    pub fn let_through(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile<'_> {
+        Profile::new(&self.reflected, alpha, 1.0 - multiple, Vec4::new(multiple, -1.0, -f0, -f90))
+    }
+
+    /// What reflection and transmission together lose.
+    #[inline]
+    pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile<'_> {
+        Profile::new(&self.scattered, alpha, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
+    }
+
+    /// Average reflectance of the smooth interface.
+    #[inline]
+    pub fn average_reflectance(&self, f0: f32, f90: f32) -> f32 {
+        f0 * (1.0 - self.average_total - self.average_grazing) + f90 * self.average_grazing + self.average_total
+    }
+}
+
+impl CoverTables {
+    /// `cover(k)` is the albedo of the covering at node `k` of its roughness.
+    fn new<'a>(cover: impl Fn(usize) -> Profile<'a>) -> CoverTables {
+        let profiles: [Profile; COVER_NODES] = std::array::from_fn(&cover);
+        let table = tabulate(
+            || [0.0f32; COVER_NODES],
+            |sums, ggx, wo, lambda_o, h, weight| {
+                let (wi, share) = reflected_share(ggx, wo, lambda_o, h);
+                if share > 0.0 {
+                    let (o, i) = (Position::new(wo.z), Position::new(wi.z));
+                    for (sum, profile) in sums.iter_mut().zip(&profiles) {
+                        *sum += weight * share * (profile.at(i) - profile.at(o)).max(0.0);
+                    }
+                }
+            },
+        );
+        CoverTables([0, 3, 6].map(|k| grid(&table, |s| Vec4::new(s[k], s[k + 1], s[k + 2], s[k + 3]))))
+    }
+
+    fn profile(&self, alpha: Position, cover_alpha: f32) -> Profile<'_> {
+        let x = cover_alpha.clamp(0.0, 1.0).sqrt() * (COVER_NODES - 1) as f32;
+        let group = ((x / 3.0) as usize).min(2);
+        let x = x - 3.0 * group as f32;
+        let hat = |k: f32| (1.0 - (x - k).abs()).max(0.0);
+        Profile::new(&self.0[group], alpha, 0.0, Vec4::new(hat(0.0), hat(1.0), hat(2.0), hat(3.0)))
     }
 }
 
 impl EnergyTables {
     /// Tables for interfaces of the relative indices `etas` (an index and its inverse share one), and for 1.5; others use the nearest.
-    pub fn for_etas(etas: impl IntoIterator<Item = f32>) -> EnergyTables {
-        let mut etas: Vec<f32> =
-            etas.into_iter().chain([1.5]).filter(|e| *e > 0.0).map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
+    pub fn new(etas: impl IntoIterator<Item = f32>, coverings: Coverings) -> EnergyTables {
+        let mut etas: Vec<f32> = etas
+            .into_iter()
+            .chain([COAT_ETA])
+            .filter(|e| *e > 0.0)
+            .map(|e| if e < 1.0 { 1.0 / e } else { e })
+            .collect();
         etas.sort_by(f32::total_cmp);
         // Nearer ones than this differ by less than the tables' own error.
         etas.dedup_by(|a, b| *a - *b < 1e-3 * *b || (a.is_infinite() && b.is_infinite()));
         etas.retain(|e| !is_matched(*e));
-        let [white, schlick] = tabulate(|ggx, wo, lambda_o, h| {
-            let r = reflected_share(ggx, wo, lambda_o, h);
-            [r, r * super::fresnel::schlick_weight(wo.dot(h).clamp(0.0, 1.0))]
-        });
         let interfaces = etas
             .into_iter()
             .map(|eta| InterfaceTables { eta, thin: SideTables::new(eta), dense: SideTables::new(1.0 / eta) })
             .collect();
-        EnergyTables { white, schlick, interfaces }
+        let mut tables = EnergyTables { interfaces, sheen: None, below_coat: None, below_sheen: None };
+        let alpha = |k: usize| Position::new(sqr(k as f32 / (COVER_NODES - 1) as f32));
+        if coverings.coat {
+            tables.below_coat = Some(CoverTables::new(|k| tables.coat_albedo(alpha(k))));
+        }
+        if coverings.sheen {
+            let rows = |i: usize| std::array::from_fn(|j| Vec4::X * sheen::albedo(node(i), node(j)));
+            tables.sheen = Some(Grid::new((0..NODES).map(rows)));
+            tables.below_sheen = Some(CoverTables::new(|k| tables.sheen_albedo(alpha(k))));
+        }
+        tables
     }
 
     /// Tables of the sides of an interface of relative index `eta`: the one seen from above, the one seen from below.
-    /// `None` if none were made, or if the interface does nothing.
+    /// `None` if the interface does nothing.
     #[inline]
     pub(super) fn sides(&self, eta: f32) -> Option<[&SideTables; 2]> {
         if is_matched(eta) {
@@ -240,17 +250,43 @@ impl EnergyTables {
         }
         let wanted = if eta < 1.0 { 1.0 / eta } else { eta };
         let after = self.interfaces.partition_point(|t| t.eta < wanted);
-        let nearest = match (after.checked_sub(1).and_then(|i| self.interfaces.get(i)), self.interfaces.get(after)) {
-            (Some(a), Some(b)) => {
-                if wanted - a.eta < b.eta - wanted {
-                    a
-                } else {
-                    b
-                }
-            }
-            (Some(a), None) | (None, Some(a)) => a,
+        let before = after.checked_sub(1).and_then(|i| self.interfaces.get(i));
+        let nearest = match (before, self.interfaces.get(after)) {
+            (Some(a), Some(b)) if wanted - a.eta < b.eta - wanted => a,
+            (_, Some(b)) => b,
+            (Some(a), None) => a,
             (None, None) => return None,
         };
         Some(if eta < 1.0 { [&nearest.dense, &nearest.thin] } else { [&nearest.thin, &nearest.dense] })
+    }
+
+    /// Share of what arrives that facets lose even if they reflect perfectly.
+    #[inline]
+    pub(super) fn white_loss(&self, alpha: Position) -> Profile<'_> {
+        self.interfaces.first().map_or(Profile::constant(0.0), |t| t.thin.white_loss(alpha))
+    }
+
+    /// Albedo of a clear coat.
+    #[inline]
+    pub(super) fn coat_albedo(&self, alpha: Position) -> Profile<'_> {
+        let f0 = super::fresnel::normal_incidence(COAT_ETA);
+        self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.reflection(alpha, f0, 1.0))
+    }
+
+    /// Albedo of white sheen.
+    #[inline]
+    pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile<'_> {
+        self.sheen.as_ref().map_or(Profile::constant(0.0), |grid| Profile::new(grid, alpha, 0.0, Vec4::X))
+    }
+
+    /// Facets below a covering of albedo E are seen through `1 - max(E(o), E(i))`, which is exact for mirrors and keeps the exchange of
+    /// directions. Rough ones then lose `integral f max(E(i) - E(o), 0) cos` of what `1 - E(o)` would let them keep: this profile.
+    #[inline]
+    pub(super) fn covered_loss(&self, covering: Covering, alpha: Position, cover_alpha: f32) -> Profile<'_> {
+        let tables = match covering {
+            Covering::Coat => &self.below_coat,
+            Covering::Sheen => &self.below_sheen,
+        };
+        tables.as_ref().map_or(Profile::constant(0.0), |t| t.profile(alpha, cover_alpha))
     }
 }

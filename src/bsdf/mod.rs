@@ -1,13 +1,16 @@
 //! The scattering model: one closed set of lobes that agrees with the glTF specification and conserves energy.
 
+mod cover;
 mod energy;
 mod fresnel;
 mod layered;
 mod microfacet;
 mod parameters;
+mod profile;
 mod shading;
+mod sheen;
 
-pub use energy::EnergyTables;
+pub use energy::{Coverings, EnergyTables};
 pub use layered::Layered;
 pub use parameters::Parameters;
 pub use shading::Shading;
@@ -94,21 +97,21 @@ pub struct BsdfSample {
 }
 
 /// How a surface scatters at one point, in its shading frame: z is the shading normal, directions point away from the
-/// surface, z > 0 is its front. Built per vertex; no table is needed afterwards.
+/// surface, z > 0 is its front. Built per vertex; looks values up in the scene's tables.
 // Boxing the large variant would allocate once per vertex.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
-pub enum Bsdf {
+pub enum Bsdf<'a> {
     /// Lambert's reflection of some colour on both sides.
     Matte(Rgb),
     /// Everything else.
-    Layered(Layered),
+    Layered(Layered<'a>),
 }
 
-impl Bsdf {
+impl<'a> Bsdf<'a> {
     /// The BSDF of `parameters`. `tables` were made for their refractive index (the nearest one is used).
     #[inline]
-    pub fn new(parameters: &Parameters, tables: &EnergyTables) -> Bsdf {
+    pub fn new(parameters: &Parameters, tables: &'a EnergyTables) -> Bsdf<'a> {
         if parameters.is_matte() {
             Bsdf::Matte(parameters.base_color)
         } else {
@@ -149,7 +152,10 @@ impl Bsdf {
     /// The first part of [`Bsdf::evaluate`].
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
-        self.evaluate(wo, wi, transport, set).0
+        match self {
+            Bsdf::Matte(_) => self.evaluate(wo, wi, transport, set).0,
+            Bsdf::Layered(layered) => layered.eval(wo, wi, transport, set),
+        }
     }
 
     /// The second part of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.

@@ -9,16 +9,16 @@ use crate::math::{Frame, Rgb, Vec2, Vec3};
 
 /// A BSDF standing in the world.
 #[derive(Clone, Copy, Debug)]
-pub struct Shading {
+pub struct Shading<'a> {
     /// Shading frame.
     pub frame: Frame,
     /// Unit geometric normal.
     pub ng: Vec3,
     /// Scattering in the frame.
-    pub bsdf: Bsdf,
+    pub bsdf: Bsdf<'a>,
 }
 
-impl Shading {
+impl Shading<'_> {
     /// `w` in the frame, and its cosine with the geometric normal; `None` where the two normals disagree about its side.
     #[inline]
     fn local(&self, w: Vec3) -> Option<(Vec3, f32)> {

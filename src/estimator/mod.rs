@@ -1,8 +1,12 @@
 //! From what eye paths measure to estimates: the state per pixel and level, and the rules for bandwidths.
 
 pub mod bandwidth;
+mod coverage;
+mod error;
 mod pixel;
 pub mod rule;
 
 pub use bandwidth::InitialBandwidth;
+pub use coverage::{Coverage, RANKS};
+pub use error::SquaredError;
 pub use pixel::{Parts, Pixel};

@@ -1,5 +1,6 @@
 //! The state of a pixel: plain numbers that can be saved and merged.
 
+use super::Coverage;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::stat::Welford;
 use crate::transport::{EyeMeasure, MAX_LEVELS};
@@ -31,10 +32,14 @@ pub struct Pixel {
     pub albedo: DVec3,
     /// See `albedo`.
     pub normal: DVec3,
-    /// See `albedo`.
+    /// Sum over those paths that have such a hit.
     pub depth: f64,
     /// Eye paths whose measure was finite.
     pub features: u32,
+    /// Those of them with a hit that is not a perfect mirror or clear glass.
+    pub depths: u32,
+    /// First hits of all eye paths.
+    pub coverage: Coverage,
     /// Iterations counted.
     pub iterations: u32,
     /// Iterations rejected as not finite.
@@ -84,12 +89,14 @@ impl Pixel {
         self.parts.caustic += measure.caustic_photons[level].as_dvec3();
         self.parts.indirect += (measure.indirect + measure.indirect_photons[level]).as_dvec3();
         for measure in std::iter::once(independent).chain(correlated) {
+            self.coverage.add(measure.first.map(|first| first.instance));
             let features = measure.features;
             if features.albedo.is_finite() && features.normal.is_finite() && features.depth.is_finite() {
                 self.albedo += features.albedo.as_dvec3();
                 self.normal += features.normal.as_dvec3();
                 self.depth += f64::from(features.depth);
                 self.features += 1;
+                self.depths += u32::from(features.depth > 0.0);
             }
         }
     }

@@ -4,6 +4,7 @@ mod ascii;
 pub mod cryptomatte;
 mod layers;
 mod naming;
+pub mod output;
 
 pub use ascii::ascii_json;
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};

@@ -1,8 +1,8 @@
 //! FLIP: how much two pictures differ to an observer who flips between them, 0 (equal) to 1.
 //!
 //! LDR-FLIP: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for Alternating Images", HPG
-//! 2020 ([2020]). HDR-FLIP, the largest LDR-FLIP over exposures: Andersson, Nilsson, Shirley, Akenine-Moller, "Visualizing Errors in
-//! Rendered High Dynamic Range Images", Eurographics 2021 ([2021]). With the authors' standard observer: a screen 0.7 m wide of
+//! 2020 (below: FLIP 2020). HDR-FLIP, the largest LDR-FLIP over exposures: Andersson, Nilsson, Shirley, Akenine-Moller, "Visualizing Errors in
+//! Rendered High Dynamic Range Images", Eurographics 2021 (below: HDR-FLIP 2021). With the authors' standard observer: a screen 0.7 m wide of
 //! 3840 pixels, 0.7 m away.
 
 use glam::{Mat3, Vec3};
@@ -14,22 +14,22 @@ use crate::math::{Rgb, luminance};
 /// Pixels a degree of the standard observer.
 const PIXELS_PER_DEGREE: f32 = 3840.0 * std::f32::consts::PI / 180.0;
 
-/// Compressive exponent of colour differences, [2020] section 4.1.3.
+/// Compressive exponent of colour differences, FLIP 2020 section 4.1.3.
 const COLOUR_EXPONENT: f32 = 0.7;
-/// The share of the largest colour difference that maps to `KNEE_TO`, [2020] section 4.1.3.
+/// The share of the largest colour difference that maps to `KNEE_TO`, FLIP 2020 section 4.1.3.
 const KNEE_FROM: f32 = 0.4;
 /// See `KNEE_FROM`.
 const KNEE_TO: f32 = 0.95;
-/// Width of the edge and point detectors in degrees, [2020] section 4.2.
+/// Width of the edge and point detectors in degrees, FLIP 2020 section 4.2.
 const DETECTOR_WIDTH: f32 = 0.082;
-/// Exponent of feature differences, [2020] section 4.2.
+/// Exponent of feature differences, FLIP 2020 section 4.2.
 const FEATURE_EXPONENT: f32 = 0.5;
 
 /// HDR-FLIP of `test` against `reference` per pixel, both scene-linear Rec. 709, `width * height` finite pixels each. Negative
 /// channels count as zero.
 ///
 /// Exposures go from the one that brings the reference's brightest pixel to 0.85 of the display to the one that does so with its
-/// median luminance ([2021] section 3.1), in steps of at most about one stop. Two cases the paper leaves open: if the median is zero, that of the luminances
+/// median luminance (HDR-FLIP 2021 section 3.1), in steps of at most about one stop. Two cases the paper leaves open: if the median is zero, that of the luminances
 /// above zero takes its place; a black reference is looked at as it is.
 pub fn hdr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
     let (first, last) = exposures(reference);
@@ -56,7 +56,7 @@ pub fn ldr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<
     Detector::new().ldr(&clamped(reference), &clamped(test), width, height)
 }
 
-/// First and last exposure in stops, [2021] section 3.1.
+/// First and last exposure in stops, HDR-FLIP 2021 section 3.1.
 fn exposures(reference: &[Rgb]) -> (f32, f32) {
     let mut luminances: Vec<f32> = reference.iter().map(|c| luminance(c.max(Vec3::ZERO))).collect();
     luminances.sort_unstable_by(f32::total_cmp);
@@ -95,7 +95,7 @@ struct Detector {
 impl Detector {
     fn new() -> Self {
         use std::f32::consts::PI;
-        // [2020] table 1: a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees.
+        // FLIP 2020 table 1: a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees.
         let widest = 0.04f32;
         let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
         let gaussian = |a: f32, b: f32| -> Vec<f32> {
@@ -226,7 +226,7 @@ const TO_XYZ: Mat3 = Mat3::from_cols_array(&[
     70_074_185.0 / 73_733_382.0,
 ]);
 
-/// Linear Rec. 709 to YCxCz, a linear opponent space ([2020] section 4.1.1).
+/// Linear Rec. 709 to YCxCz, a linear opponent space (FLIP 2020 section 4.1.1).
 fn ycxcz(rgb: Rgb) -> Vec3 {
     let v = TO_XYZ * rgb / WHITE;
     Vec3::new(116.0 * v.y - 16.0, 500.0 * (v.x - v.y), 200.0 * (v.y - v.z))
@@ -246,12 +246,12 @@ fn lab(rgb: Rgb) -> Vec3 {
     Vec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 
-/// Colours look paler in the dark: Hunt's effect, [2020] section 4.1.2.
+/// Colours look paler in the dark: Hunt's effect, FLIP 2020 section 4.1.2.
 fn hunt(lab: Vec3) -> Vec3 {
     Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
 }
 
-/// City block in lightness, Euclidean in hue (HyAB, [2020] section 4.1.2).
+/// City block in lightness, Euclidean in hue (HyAB, FLIP 2020 section 4.1.2).
 fn colour_distance(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + (d.y * d.y + d.z * d.z).sqrt()

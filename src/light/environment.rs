@@ -185,12 +185,13 @@ mod tests {
         let environment = image(0.7);
         let n = 200_000u64;
         let (mut by_importance, mut squares, mut by_uniform, mut uniform_squares) = (0.0, 0.0, 0.0, 0.0);
+        let mut astray = 0;
         for i in 0..n {
             let u = Stream::new(1, 0, Domain::Test, i).vertex(0).two(Purpose::LightPoint);
             let (d, pdf) = environment.sample(u);
             assert!((d.length() - 1.0).abs() < 1e-4);
             let again = environment.pdf_w(d);
-            assert!((pdf - again).abs() < 2e-2 * pdf || u.y.fract() < 1e-3, "{pdf} {again}");
+            astray += u32::from((pdf - again).abs() > 1e-2 * pdf);
             let x = f64::from(luminance(environment.radiance(d)) / pdf);
             by_importance += x;
             squares += x * x;
@@ -199,6 +200,8 @@ mod tests {
             by_uniform += x;
             uniform_squares += x * x;
         }
+        // Rounding may carry a direction over the edge of its cell, but hardly ever.
+        assert!(astray < 200, "{astray} of {n} directions have another density than they were drawn with");
         let n = n as f64;
         let (a, b) = (by_importance / n, by_uniform / n);
         let variance = (squares / n - a * a) / n + (uniform_squares / n - b * b) / n;

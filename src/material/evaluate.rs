@@ -1,7 +1,7 @@
 //! Materials at a surface: textures looked up, in the order the glTF specification multiplies them.
 
 use super::Material;
-use crate::bsdf::{EnergyTables, Parameters};
+use crate::bsdf::{Coverings, EnergyTables, Parameters};
 use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, sqr};
 use crate::texture::{Texture, TextureRef};
@@ -155,6 +155,10 @@ impl EnergyTables {
         for material in materials {
             etas.extend(around.iter().map(|n| material.ior / n));
         }
-        EnergyTables::for_etas(etas)
+        let coverings = Coverings {
+            coat: materials.iter().any(|m| m.clearcoat > 0.0),
+            sheen: materials.iter().any(|m| m.sheen_color.max_element() > 0.0),
+        };
+        EnergyTables::new(etas, coverings)
     }
 }

@@ -40,7 +40,7 @@ pub struct Progress {
     pub light_paths: u64,
     /// Photons of the last map.
     pub photons: usize,
-    /// Estimated relative error of the method's own image (root of relMSE; standard error only), when two iterations are done.
+    /// Estimated relative error of the method's own image (root of relMSE, bias included), when two iterations are done.
     pub error: Option<f64>,
 }
 

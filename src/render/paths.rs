@@ -44,7 +44,8 @@ pub fn paths(
         vec![Pixel::new(0.0); width as usize * height as usize]
     };
     let mut passes = Passes::new(scene, camera, settings, &surroundings, method);
-    let mut phases = Phases { pilot: clock.seconds(), ..Phases::default() };
+    let mut phases = Phases { pilot: cpu_seconds() - cpu_start, ..Phases::default() };
+    let pilot_seconds = clock.seconds();
 
     let mut history = Vec::new();
     let mut next_record = 1u64;
@@ -54,7 +55,8 @@ pub fn paths(
     while settings.iterations.is_none_or(|n| iteration < n) {
         let (walked, photons) = passes.iterate(iteration + 1, &mut pixels);
         let seconds = clock.seconds();
-        phases.eye = seconds - phases.pilot;
+        // Light and eye paths take turns within a pixel.
+        phases.eye = cpu_seconds() - cpu_start - phases.pilot;
         done += 1;
         light_paths += walked;
         iteration += settings.shard.count;
@@ -62,13 +64,13 @@ pub fn paths(
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
         let wanted = record || settings.target_error.is_some();
-        let error = if wanted { relative_error(&pixels, settings.levels.own()) } else { None };
+        let error = if wanted { relative_error(&pixels, settings.levels) } else { None };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
             history.push(History { seconds, cpu_seconds, iterations: done, light_paths, error });
         }
-        let by_count = total.map(|n| (n - done) as f64 * phases.eye / done as f64);
+        let by_count = total.map(|n| (n - done) as f64 * (seconds - pilot_seconds) / done as f64);
         let by_time = settings.time.map(|t| (t - seconds).max(0.0));
         let remaining = match (by_count, by_time) {
             (Some(a), Some(b)) => Some(a.min(b)),
@@ -91,7 +93,7 @@ pub fn paths(
     }
     let seconds = clock.seconds();
     if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels.own());
+        let error = relative_error(&pixels, settings.levels);
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
     Rendered {

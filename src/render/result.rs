@@ -1,11 +1,11 @@
 //! What a render leaves behind.
 
 use super::control::{History, StopReason};
-use super::settings::Settings;
-use crate::estimator::Pixel;
+use super::settings::{Levels, Settings};
+use crate::estimator::{Pixel, SquaredError};
 use serde::Serialize;
 
-/// Processor-independent record of where the time went, wall seconds per phase.
+/// Where the time went: core-seconds (processor time of the whole process) per phase.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Phases {
     /// Pilot pass and initial bandwidths.
@@ -43,11 +43,11 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Estimated relative error of the method's own image: root of the mean over pixels of the mean over RGB of the variance
-    /// of the mean over (luminance-like mean^2 + 0.01), the papers' relMSE with the variance in place of the squared difference. `None` before
-    /// two iterations.
+    /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over RGB of
+    /// the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + 0.01), the papers' relMSE with the estimate in place of the
+    /// squared difference. `None` before two iterations.
     pub fn relative_error(&self) -> Option<f64> {
-        relative_error(&self.pixels, self.settings.levels.own())
+        relative_error(&self.pixels, self.settings.levels)
     }
 
     /// Samples rejected as not finite.
@@ -57,18 +57,16 @@ impl Rendered {
 }
 
 /// See [`Rendered::relative_error`].
-pub(super) fn relative_error(pixels: &[Pixel], level: usize) -> Option<f64> {
-    let mut sum = 0.0;
+pub(super) fn relative_error(pixels: &[Pixel], levels: Levels) -> Option<f64> {
+    let (mut variance, mut squared_bias) = (0.0, 0.0);
     let mut count = 0u64;
     for pixel in pixels {
-        let n = f64::from(pixel.iterations);
-        if n < 2.0 {
-            continue;
-        }
-        let welford = &pixel.levels[level];
-        let mean = welford.mean.element_sum() / 3.0;
-        sum += welford.variance_of_mean(n).element_sum() / 3.0 / (mean * mean + 0.01);
+        let Some(error) = SquaredError::of(pixel, levels.own(), levels.count) else { continue };
+        let mean = pixel.levels[levels.own()].mean.element_sum() / 3.0;
+        let scale = 1.0 / (3.0 * (mean * mean + 0.01));
+        variance += error.variance.element_sum() * scale;
+        squared_bias += error.squared_bias.element_sum() * scale;
         count += 1;
     }
-    (count > 0).then(|| (sum / count as f64).sqrt())
+    (count > 0).then(|| ((variance + squared_bias.max(0.0)) / count as f64).sqrt())
 }

@@ -105,26 +105,27 @@ pub fn sppm(
     let bandwidths = initial_bandwidths(&eye, settings.initial, settings.seed, &pilot);
     drop(pilot);
     let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
-    phases.pilot = clock.seconds();
+    phases.pilot = cpu_seconds() - cpu_start;
+    let pilot_seconds = clock.seconds();
 
     let mut history = Vec::new();
     let mut next_record = 1u64;
     let (mut done, mut light_paths, mut stop) = (0u64, 0u64, StopReason::Iterations);
     let mut iteration = settings.shard.index;
     while settings.iterations.is_none_or(|n| iteration < n) {
-        let t0 = clock.seconds();
+        let t0 = cpu_seconds();
         // Iterations count from 1; pass 0 is the pilot's.
         let i = iteration + 1;
         let pass = LightPass::new(settings.seed, i, Domain::Light, settings.photons, settings.max_depth);
         let photons = trace_photons(scene, &surroundings, &pass);
-        let t1 = clock.seconds();
+        let t1 = cpu_seconds();
         let map = PhotonMap::build(photons);
-        let t2 = clock.seconds();
+        let t2 = cpu_seconds();
         eye_pass(&eye, settings, i, &map, &mut pixels);
         let seconds = clock.seconds();
         phases.light += t1 - t0;
         phases.map += t2 - t1;
-        phases.eye += seconds - t2;
+        phases.eye += cpu_seconds() - t2;
         done += 1;
         light_paths += u64::from(settings.photons);
         iteration += settings.shard.count;
@@ -132,17 +133,14 @@ pub fn sppm(
         let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
-        let error = if record || settings.target_error.is_some() {
-            relative_error(&pixels, settings.levels.own())
-        } else {
-            None
-        };
+        let error =
+            if record || settings.target_error.is_some() { relative_error(&pixels, settings.levels) } else { None };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
             history.push(History { seconds, cpu_seconds, iterations: done, light_paths, error });
         }
-        let per_iteration = (seconds - phases.pilot) / done as f64;
+        let per_iteration = (seconds - pilot_seconds) / done as f64;
         let by_count = total.map(|n| (n - done) as f64 * per_iteration);
         let by_time = settings.time.map(|t| (t - seconds).max(0.0));
         let remaining = match (by_count, by_time) {
@@ -174,7 +172,7 @@ pub fn sppm(
     }
     let seconds = clock.seconds();
     if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels.own());
+        let error = relative_error(&pixels, settings.levels);
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
     Rendered {

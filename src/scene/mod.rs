@@ -2,6 +2,8 @@
 
 mod build;
 pub mod description;
+pub mod environment_file;
+pub mod gltf;
 mod survey;
 mod view;
 

@@ -123,11 +123,11 @@ impl Record for () {}
 
 /// A light path's vertex that eye vertices can be connected to.
 #[derive(Clone, Copy, Debug)]
-pub struct LightVertex {
+pub struct LightVertex<'s> {
     /// The surface.
     pub surface: Surface,
     /// How it scatters.
-    pub shading: Shading,
+    pub shading: Shading<'s>,
     /// Unit direction towards where the light came from.
     pub wo: Vec3,
     /// Flux (W) of the path as if it were the only one.

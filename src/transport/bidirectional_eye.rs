@@ -17,7 +17,7 @@ use crate::scene::Scene;
 /// What an eye path meets.
 pub struct Meets<'a> {
     /// Vertices of its light path.
-    pub vertices: &'a [LightVertex],
+    pub vertices: &'a [LightVertex<'a>],
     /// Photons of the pass before; `None` in the first pass, whose etas must be [`mis::Eta::NONE`].
     pub photons: Option<&'a PhotonMap<MergePhoton>>,
     /// Its bandwidths.
@@ -113,7 +113,7 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn connect(&mut self, vertex: &Vertex<'_>, light: &LightVertex) {
+    fn connect(&mut self, vertex: &Vertex<'_>, light: &LightVertex<'_>) {
         let Bidirectional { eye, strategies, .. } = self.shared;
         let to = light.surface.p - vertex.surface.p;
         let distance2 = to.length_squared();

@@ -7,7 +7,7 @@ use super::light::LightPass;
 use super::mis::{self, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
-use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
 use crate::math::Rgb;
 use crate::random::Purpose;
 
@@ -49,26 +49,26 @@ pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, part: Part, va
 
 /// What light paths leave behind. `vertices` are those of the last path alone.
 #[derive(Default)]
-pub struct Left {
+pub struct Left<'s> {
     /// For the eye path it belongs to.
-    pub vertices: Vec<LightVertex>,
+    pub vertices: Vec<LightVertex<'s>>,
     /// For the film, of all paths so far.
     pub splats: Vec<Splat>,
     /// For the next pass, of all paths so far.
     pub photons: Vec<MergePhoton>,
 }
 
-struct LightWalk<'a, R> {
-    shared: &'a Bidirectional<'a>,
+struct LightWalk<'a, 's, R> {
+    shared: &'a Bidirectional<'s>,
     mis: MisState,
     infinite: bool,
     caustic: bool,
     photons_only: bool,
-    left: &'a mut Left,
+    left: &'a mut Left<'s>,
     record: &'a mut R,
 }
 
-impl<R: Record> LightWalk<'_, R> {
+impl<R: Record> LightWalk<'_, '_, R> {
     fn connect_camera(&mut self, vertex: &Vertex<'_>) {
         let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
         let Vertex { surface, shading, wo, draws, .. } = vertex;
@@ -103,7 +103,7 @@ impl<R: Record> LightWalk<'_, R> {
     }
 }
 
-impl<R: Record> Visitor for LightWalk<'_, R> {
+impl<R: Record> Visitor for LightWalk<'_, '_, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, merged_paths, .. } = self.shared;
@@ -123,7 +123,7 @@ impl<R: Record> Visitor for LightWalk<'_, R> {
                 if strategies.connect {
                     self.left.vertices.push(LightVertex {
                         surface: *vertex.surface,
-                        shading: *vertex.shading,
+                        shading: Shading { bsdf: Bsdf::new(vertex.parameters, &eye.scene.tables), ..*vertex.shading },
                         wo: vertex.wo,
                         throughput: vertex.throughput,
                         depth: vertex.depth,
@@ -163,7 +163,7 @@ pub(super) fn scatter(
     mis.scatter(cos, sample.pdf_w, vertex.shading.pdf(sample.wi, vertex.wo, back, LobeSet::ALL), merges)
 }
 
-impl Bidirectional<'_> {
+impl<'s> Bidirectional<'s> {
     /// Walks light path `index` of `pass`; with `photons_only` it leaves nothing else.
     #[inline]
     pub fn light_path<R: Record>(
@@ -171,7 +171,7 @@ impl Bidirectional<'_> {
         pass: &LightPass,
         index: u32,
         photons_only: bool,
-        left: &mut Left,
+        left: &mut Left<'s>,
         record: &mut R,
     ) {
         left.vertices.clear();

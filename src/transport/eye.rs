@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use std::f32::consts::FRAC_1_PI;
 
 /// Most bandwidth levels of one eye path.
-pub const MAX_LEVELS: usize = 8;
+pub const MAX_LEVELS: usize = 5;
 
 /// Photons of a surface whose normal turns further than this (cosine) from the gathering point's are not its own.
 const NORMAL_COSINE: f32 = 0.7;

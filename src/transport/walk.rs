@@ -3,7 +3,7 @@
 
 use super::interior::Interior;
 use super::segment::{Arrival, End, next_surface};
-use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
+use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Parameters, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::random::{Draws, Purpose, Stream};
@@ -35,7 +35,9 @@ pub struct Vertex<'a> {
     /// The surface.
     pub surface: &'a Surface,
     /// How it scatters.
-    pub shading: &'a Shading,
+    pub shading: &'a Shading<'a>,
+    /// What it scatters by, from which its BSDF can be made again to outlive the walk.
+    pub parameters: &'a Parameters,
     /// Unit direction back along the path.
     pub wo: Vec3,
     /// Weight of the path up to here, before this vertex scatters.
@@ -137,6 +139,7 @@ pub fn walk<V: Visitor>(
         let vertex = Vertex {
             surface: &surface,
             shading: &shading,
+            parameters: &parameters,
             wo: -direction,
             throughput,
             depth,

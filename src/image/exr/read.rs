@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use exr::block::UncompressedBlock;
-use exr::block::chunk::Chunk;
-use exr::meta::attribute::{AttributeValue, SampleType, Text};
+use exr::block::chunk::{Chunk, CompressedBlock};
+use exr::meta::attribute::{AttributeValue, Compression, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
         exr::error::Error::Io(_) => Error::new(Kind::Image, path.display(), "the file ends too early")
             .hint("copy or render it again; it is not whole"),
         exr::error::Error::NotSupported(cause) => {
-            Error::new(Kind::Image, path.display(), cause).hint("save it as a flat EXR without subsampling")
+            Error::new(Kind::Image, path.display(), cause).hint("save it as a flat EXR with ZIP compression")
         }
         other => Error::new(Kind::Image, path.display(), format!("not a valid EXR: {other}")),
     })
@@ -64,7 +64,10 @@ fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)>
     while let Some(chunk) = chunks.next() {
         batch.push(chunk?);
         if batch.len() == 4 * rayon::current_num_threads() || chunks.peek().is_none() {
-            let decompress = |chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false);
+            let decompress = |chunk| {
+                check_sections(&chunk, &meta.headers)?;
+                UncompressedBlock::decompress_chunk(chunk, &meta, false)
+            };
             let blocks: Vec<Outcome<UncompressedBlock>> = batch.par_drain(..).map(decompress).collect();
             for block in blocks {
                 canvas.paint(&block?, &meta.headers)?;
@@ -95,6 +98,27 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
         promised += display.max(window(header.layer_size) * header.channels.bytes_per_pixel as u128);
     }
     if promised > u128::from(length) * RATIO { Err(invalid("more pixels than the file can hold")) } else { Ok(()) }
+}
+
+/// A chunk of DWA begins with the sizes of its sections, eleven 64-bit numbers, and the decoder allocates what they say.
+fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
+    let Some(header) = headers.get(chunk.layer_index) else { return Err(invalid("part index")) };
+    let bytes = match &chunk.compressed_block {
+        CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+        CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+        _ => return Err(exr::error::Error::NotSupported("the file is deep".into())),
+    };
+    let size = header.max_block_pixel_size();
+    let whole = size.0.saturating_mul(size.1).saturating_mul(header.channels.bytes_per_pixel) as u64;
+    let packed =
+        matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) && bytes.len() as u64 != whole;
+    // Sections hold the block's samples, in run lengths of at most twice their size, and blocks of 8 x 8 round up.
+    let limit = whole.saturating_mul(4).saturating_add(1 << 16);
+    let number = |eight: &[u8]| eight.iter().rev().fold(0u64, |n, &byte| n << 8 | u64::from(byte));
+    if packed && bytes.chunks_exact(8).take(11).any(|eight| number(eight) > limit) {
+        return Err(invalid("a section larger than its block"));
+    }
+    Ok(())
 }
 
 /// The display window, one plane per channel of every part.

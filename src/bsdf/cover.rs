@@ -1,0 +1,130 @@
+//! What lies on top of the base: sheen, and a clear coat over it.
+//!
+//! Below a covering of albedo E, lobes with facets are seen through `1 - max(E(o), E(i))`, which is exact for mirrors; separable lobes
+//! through `(1 - E(o)) (1 - E(i))`, normalised to keep `1 - E(o)` of their albedo. Both keep the exchange of directions. Both sides of a
+//! surface are covered.
+
+use super::energy::{COAT_ETA, EnergyTables};
+use super::fresnel::{dielectric, reflect};
+use super::layered::class_of;
+use super::microfacet::{Ggx, g1, g2_reflection};
+use super::profile::{Position, Profile};
+use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
+use crate::math::{Rgb, Vec2, Vec3};
+
+/// Sheen and clear coat.
+#[derive(Clone, Copy, Debug)]
+pub struct Cover<'a> {
+    coat: f32,
+    coat_ggx: Ggx,
+    /// Class of the coat's lobe.
+    pub coat_class: LobeSet,
+    coat_albedo: Profile<'a>,
+    sheen: Rgb,
+    sheen_alpha: f32,
+    sheen_albedo: Profile<'a>,
+}
+
+impl<'a> Cover<'a> {
+    /// `None` where nothing lies on top.
+    #[inline]
+    pub fn new(p: &Parameters, tables: &'a EnergyTables) -> Option<Cover<'a>> {
+        if !p.is_covered() {
+            return None;
+        }
+        let coat_class = class_of(p.clearcoat_alpha, p.clearcoat_alpha);
+        let alpha = if coat_class == LobeSet::DELTA { 0.0 } else { p.clearcoat_alpha };
+        Some(Cover {
+            coat: p.clearcoat,
+            coat_ggx: Ggx { alpha_x: alpha.max(DELTA_ALPHA), alpha_y: alpha.max(DELTA_ALPHA) },
+            coat_class,
+            coat_albedo: tables.coat_albedo(Position::new(alpha)),
+            sheen: p.sheen_color,
+            sheen_alpha: p.sheen_alpha,
+            sheen_albedo: tables.sheen_albedo(Position::new(p.sheen_alpha)),
+        })
+    }
+
+    /// Classes of lobes that are there.
+    #[inline]
+    pub fn lobes(&self) -> LobeSet {
+        let mut set = LobeSet::NONE;
+        if self.coat > 0.0 {
+            set = set | self.coat_class;
+        }
+        if self.has_sheen() {
+            set = set | LobeSet::BROAD;
+        }
+        set
+    }
+
+    #[inline]
+    fn has_sheen(&self) -> bool {
+        self.sheen.max_element() > 0.0
+    }
+
+    /// Strengths of the coverings, for what they keep from the base: coat, sheen.
+    #[inline]
+    pub fn strengths(&self) -> [f32; 2] {
+        [self.coat, self.sheen.max_element()]
+    }
+
+    /// What the coverings leave of light in one direction.
+    #[inline]
+    pub fn passes(&self, mu: Position) -> f32 {
+        let [coat, sheen] = self.strengths();
+        (1.0 - coat * self.coat_albedo.at(mu)) * (1.0 - sheen * self.sheen_albedo.at(mu))
+    }
+
+    /// What they leave of light that facets below turn from one direction to another.
+    #[inline]
+    pub fn passes_both(&self, o: Position, i: Position) -> f32 {
+        let [coat, sheen] = self.strengths();
+        (1.0 - coat * self.coat_albedo.at(o).max(self.coat_albedo.at(i)))
+            * (1.0 - sheen * self.sheen_albedo.at(o).max(self.sheen_albedo.at(i)))
+    }
+
+    /// Albedos of coat and sheen.
+    #[inline]
+    pub fn albedos(&self, cos: f32, mu: Position, set: LobeSet) -> [Rgb; 2] {
+        let mut albedos = [Rgb::ZERO; 2];
+        if self.coat > 0.0 && set.has(self.coat_class) {
+            let exact = self.coat_class == LobeSet::DELTA;
+            let albedo = if exact { dielectric(cos, COAT_ETA).0 } else { self.coat_albedo.at(mu) };
+            albedos[0] = Rgb::splat(self.coat * albedo);
+        }
+        if self.has_sheen() && set.has(LobeSet::BROAD) {
+            albedos[1] = self.sheen * (self.sheen_albedo.at(mu) * (1.0 - self.coat * self.coat_albedo.at(mu)));
+        }
+        albedos
+    }
+
+    /// The coat's lobe without cosine, and the density of its facets' reflection; not for delta coats. Both directions above.
+    #[inline]
+    pub fn coat(&self, o: Vec3, i: Vec3) -> (f32, f32) {
+        let Some(h) = (o + i).try_normalize() else { return (0.0, 0.0) };
+        let (lambda_o, lambda_i) = (self.coat_ggx.lambda(o), self.coat_ggx.lambda(i));
+        let d = self.coat_ggx.d(h) / (4.0 * o.z);
+        let f = self.coat * dielectric(o.dot(h).clamp(0.0, 1.0), COAT_ETA).0;
+        (f * d * g2_reflection(lambda_o, lambda_i) / i.z, d * g1(lambda_o))
+    }
+
+    /// A direction reflected by the coat; it may lie below.
+    #[inline]
+    pub fn sample_coat(&self, o: Vec3, u: Vec2) -> Vec3 {
+        let smooth = self.coat_class == LobeSet::DELTA;
+        reflect(o, if smooth { Vec3::Z } else { self.coat_ggx.sample_visible(o, u) })
+    }
+
+    /// The sheen lobe without cosine. Both directions above.
+    #[inline]
+    pub fn sheen(&self, o: Vec3, i: Vec3, at_o: Position, at_i: Position) -> Rgb {
+        let Some(h) = (o + i).try_normalize() else { return Rgb::ZERO };
+        let coat = if self.coat > 0.0 {
+            1.0 - self.coat * self.coat_albedo.at(at_o).max(self.coat_albedo.at(at_i))
+        } else {
+            1.0
+        };
+        self.sheen * (sheen::eval(o.z, i.z, h.z.min(1.0), self.sheen_alpha) * coat)
+    }
+}

@@ -1,0 +1,188 @@
+//! Tabulated functions of a cosine and a roughness, and the lobes whose angular profile they are.
+//!
+//! A grid runs over the fourth roots of the cosine and of alpha, which puts nodes where albedos bend: at cosines near alpha, down to
+//! nearly smooth surfaces. Interpolation is linear; averages integrate the interpolant exactly, so that a lobe normalised by
+//! them gives back what the table says is missing, no more and no less.
+
+use crate::math::{Vec2, Vec3, Vec4};
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+/// Nodes along each axis.
+pub const NODES: usize = 32;
+
+/// Weights of the nodes in `2 integral f(mu) mu dmu` for `f` linear in the fourth root of mu, t, between them:
+/// `2 mu dmu = 8 t^7 dt`.
+const AVERAGE: [f32; NODES] = {
+    let mut weights = [0.0f64; NODES];
+    let h = 1.0 / (NODES - 1) as f64;
+    let mut i = 0;
+    while i + 1 < NODES {
+        let (a, b) = (i as f64 * h, (i + 1) as f64 * h);
+        let (a8, b8) = (eighth(a), eighth(b));
+        let zeroth = b8 - a8;
+        let first = (b * b8 - a * a8) * 8.0 / 9.0;
+        weights[i] += (b * zeroth - first) / h;
+        weights[i + 1] += (first - a * zeroth) / h;
+        i += 1;
+    }
+    let mut result = [0.0f32; NODES];
+    let mut i = 0;
+    while i < NODES {
+        result[i] = weights[i] as f32;
+        i += 1;
+    }
+    result
+};
+
+/// Squared cosines of the nodes: `t^8`. Uniform numbers between two of them are squares of cosines with density `2 mu`.
+const SQUARES: [f32; NODES] = {
+    let mut squares = [0.0f32; NODES];
+    let mut i = 0;
+    while i < NODES {
+        squares[i] = eighth(i as f64 / (NODES - 1) as f64) as f32;
+        i += 1;
+    }
+    squares
+};
+
+const fn eighth(x: f64) -> f64 {
+    let x2 = x * x;
+    x2 * x2 * x2 * x2
+}
+
+/// Cosine or alpha of a node, kept off zero: the limit is approached, not reached.
+pub fn node(i: usize) -> f32 {
+    let t = i as f32 / (NODES - 1) as f32;
+    (t * t * t * t).max(1e-6)
+}
+
+/// A cosine or an alpha on its axis: index of the node below, and the fraction to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Position {
+    i: usize,
+    t: f32,
+}
+
+impl Position {
+    /// Of a cosine or an alpha.
+    #[inline]
+    pub fn new(x: f32) -> Position {
+        let x = x.clamp(0.0, 1.0).sqrt().sqrt() * (NODES - 1) as f32;
+        let i = (x as usize).min(NODES - 2);
+        Position { i, t: x - i as f32 }
+    }
+}
+
+/// Four functions of the cosine at one alpha.
+#[derive(Clone, Debug)]
+struct Row {
+    values: [Vec4; NODES],
+    /// Cosine-weighted averages.
+    average: Vec4,
+    /// Integrals of the functions made constant between nodes.
+    mass: Vec4,
+}
+
+/// Four functions of the cosine and of alpha.
+#[derive(Clone, Debug)]
+pub struct Grid(Vec<Row>);
+
+impl Grid {
+    /// From values at the nodes: of alpha, then of the cosine.
+    pub fn new(rows: impl Iterator<Item = [Vec4; NODES]>) -> Grid {
+        let row = |values: [Vec4; NODES]| {
+            let average = values.iter().zip(AVERAGE).map(|(&v, w)| v * w).sum();
+            let mass = (0..NODES - 1).map(|i| (values[i] + values[i + 1]) * (SQUARES[i + 1] - SQUARES[i])).sum();
+            Row { values, average, mass }
+        };
+        Grid(rows.map(row).collect())
+    }
+}
+
+/// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe.
+#[derive(Clone, Copy, Debug)]
+pub struct Profile<'a> {
+    rows: Option<(&'a Row, &'a Row)>,
+    alpha: f32,
+    constant: f32,
+    factors: Vec4,
+    /// Cosine-weighted average over the hemisphere.
+    pub average: f32,
+    mass: f32,
+}
+
+impl<'a> Profile<'a> {
+    /// The same everywhere.
+    #[inline]
+    pub fn constant(constant: f32) -> Profile<'a> {
+        Profile { rows: None, alpha: 0.0, constant, factors: Vec4::ZERO, average: constant, mass: 2.0 * constant }
+    }
+
+    /// `constant + factors . grid`.
+    #[inline]
+    pub fn new(grid: &'a Grid, alpha: Position, constant: f32, factors: Vec4) -> Profile<'a> {
+        let Position { i, t } = alpha;
+        let (low, high) = (&grid.0[i], &grid.0[i + 1]);
+        Profile {
+            rows: Some((low, high)),
+            alpha: t,
+            constant,
+            factors,
+            average: (constant + factors.dot(low.average.lerp(high.average, t))).max(0.0),
+            mass: (2.0 * constant + factors.dot(low.mass.lerp(high.mass, t))).max(0.0),
+        }
+    }
+
+    #[inline]
+    fn node(&self, i: usize) -> f32 {
+        match self.rows {
+            None => self.constant,
+            Some((low, high)) => {
+                (self.constant + self.factors.dot(low.values[i].lerp(high.values[i], self.alpha))).max(0.0)
+            }
+        }
+    }
+
+    /// The value at a cosine.
+    #[inline]
+    pub fn at(&self, mu: Position) -> f32 {
+        let (a, b) = (self.node(mu.i), self.node(mu.i + 1));
+        a + (b - a) * mu.t
+    }
+
+    /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which [`Profile::sample`] draws it.
+    #[inline]
+    pub fn at_with_pdf_w(&self, at: Position, mu: f32) -> (f32, f32) {
+        let (a, b) = (self.node(at.i), self.node(at.i + 1));
+        (a + (b - a) * at.t, (a + b) / self.mass.max(f32::MIN_POSITIVE) * mu * FRAC_1_PI)
+    }
+
+    /// A direction of the upper hemisphere, drawn as if the profile were constant between nodes; `None` where the profile is nothing.
+    #[inline]
+    pub fn sample(&self, u: Vec2) -> Option<Vec3> {
+        let mut left = u.x * self.mass;
+        for i in 0..NODES - 1 {
+            let value = self.node(i) + self.node(i + 1);
+            let mass = value * (SQUARES[i + 1] - SQUARES[i]);
+            if left < mass {
+                let square = SQUARES[i] + left / value;
+                let r = (1.0 - square).max(0.0).sqrt();
+                let phi = TAU * u.y;
+                return Some(Vec3::new(r * phi.cos(), r * phi.sin(), square.sqrt()));
+            }
+            left -= mass;
+        }
+        None
+    }
+
+    /// Cosine-weighted average of the profile times another function of the cosine.
+    pub fn average_with(&self, other: impl Fn(Position) -> f32) -> f32 {
+        (0..NODES)
+            .map(|i| {
+                AVERAGE[i]
+                    * self.node(i)
+                    * other(Position { i: i.min(NODES - 2), t: if i == NODES - 1 { 1.0 } else { 0.0 } })
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,70 @@
+//! `caustique compare`: the error of an image against a reference.
+
+use super::{output, print, print_json};
+use caustique::error::{Error, Kind, Result};
+use caustique::film::LayerSet;
+use caustique::image::{Comparison, compare, exr, heat, png};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Measure the error of an image against a reference
+///
+/// relMSE is the mean over pixels of the squared difference over the squared reference plus 0.01; trimmed leaves out the worst 0.1 %
+/// of pixels. FLIP estimates the difference that people see when they switch between the two.
+#[derive(clap::Args)]
+pub struct CompareArgs {
+    /// EXR to judge
+    #[arg(value_name = "A.exr")]
+    image: PathBuf,
+    /// Reference EXR
+    #[arg(value_name = "B.exr")]
+    reference: PathBuf,
+    /// Layer to take from both, such as Noisy or Level1 [default: the picture itself]
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
+    /// Also write a heat map of FLIP: black is no difference, pale yellow a large one
+    #[arg(long, value_name = "FILE.png")]
+    png: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Compares two files.
+pub fn run(args: &CompareArgs) -> Result<()> {
+    if let Some(png) = &args.png {
+        output::check(png, "png")?;
+    }
+    let image = read(&args.image, args.layer.as_deref())?;
+    let reference = read(&args.reference, args.layer.as_deref())?;
+    let comparison = compare(&image, &reference).map_err(|e| e.within(args.image.display()))?;
+    if let Some(path) = &args.png {
+        let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
+        png::write(path, image.width, image.height, colours)?;
+    }
+    if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
+}
+
+/// A file; with a layer named, that layer alone as the picture.
+fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
+    let (mut set, _) = exr::read(path)?;
+    if let Some(name) = layer {
+        let names: Vec<String> = set.layers.iter().map(|layer| layer.name.clone()).collect();
+        set.layers.retain(|layer| layer.name == name);
+        let Some(layer) = set.layers.first_mut() else {
+            let error = Error::new(Kind::Usage, path.display(), format!("there is no layer \"{name}\""));
+            return Err(error.hint(format!("it has {}", names.join(", "))));
+        };
+        layer.name.clear();
+    }
+    Ok(set)
+}
+
+fn text(comparison: &Comparison) -> String {
+    let ratio = comparison.mean_ratio.map_or("the reference is black".into(), |ratio| format!("{ratio:.6}"));
+    format!(
+        "relMSE            {:.6e}\nrelMSE, trimmed   {:.6e}\nMSE               {:.6e}\nmean ratio        {ratio}\n\
+         FLIP              {:.6}\npixels not finite {}\n",
+        comparison.relmse, comparison.relmse_trimmed, comparison.mse, comparison.flip, comparison.pixels_not_finite
+    )
+}

@@ -1,0 +1,88 @@
+//! `caustique doctor`: the libraries that are loaded when the program runs.
+
+use super::{print, print_json};
+use caustique::error::{Error, Kind, Result};
+use caustique_embree as embree;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Say which Embree and ONNX Runtime are found, where, which versions, and what to install if not
+#[derive(clap::Args)]
+pub struct DoctorArgs {
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is known about one library.
+struct Finding {
+    name: &'static str,
+    key: &'static str,
+    needed_for: &'static str,
+    found: std::result::Result<(String, String), (String, Option<String>)>,
+}
+
+/// Looks for the libraries and reports; an error if one is missing.
+pub fn run(args: &DoctorArgs) -> Result<()> {
+    let findings = [embree(), onnxruntime()];
+    if args.json {
+        let mut object = serde_json::Map::new();
+        object.insert("version".into(), env!("CARGO_PKG_VERSION").into());
+        for finding in &findings {
+            object.insert(finding.key.into(), finding.json());
+        }
+        print_json(&Value::Object(object))?;
+    } else {
+        let lines: String = findings.iter().map(Finding::text).collect();
+        print(&format!("caustique {}\n{lines}", env!("CARGO_PKG_VERSION")))?;
+    }
+    let missing: Vec<&Finding> = findings.iter().filter(|f| f.found.is_err()).collect();
+    match missing.first() {
+        None => Ok(()),
+        Some(first) => {
+            let names: Vec<&str> = missing.iter().map(|f| f.name).collect();
+            let mut error = Error::new(Kind::Library, "doctor", format!("cannot use {}", names.join(" and ")));
+            error.hint = first.found.as_ref().err().and_then(|(_, hint)| hint.clone());
+            Err(error)
+        }
+    }
+}
+
+fn embree() -> Finding {
+    let found = match embree::Library::load() {
+        Ok(library) => Ok((library.version().to_string(), show(library.path()))),
+        Err(error) => Err((error.to_string(), error.hint())),
+    };
+    Finding { name: "Embree", key: "embree", needed_for: "render", found }
+}
+
+fn onnxruntime() -> Finding {
+    let found = match caustique::combine::Runtime::find() {
+        Ok(runtime) => Ok((runtime.version().unwrap_or("1.17 or later").to_string(), show(runtime.path()))),
+        Err(error) => Err((error.to_string(), error.hint)),
+    };
+    Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", found }
+}
+
+fn show(path: &Path) -> String {
+    path.display().to_string()
+}
+
+impl Finding {
+    fn json(&self) -> Value {
+        match &self.found {
+            Ok((version, path)) => json!({"found": true, "version": version, "path": path}),
+            Err((cause, hint)) => json!({"found": false, "cause": cause, "hint": hint}),
+        }
+    }
+
+    fn text(&self) -> String {
+        match &self.found {
+            Ok((version, path)) => format!("{:<13} {version:<14} {path}\n", self.name),
+            Err((cause, hint)) => {
+                let hint = hint.as_ref().map(|h| format!("{:<13} {h}\n", "")).unwrap_or_default();
+                format!("{:<13} not usable, needed to {}: {cause}\n{hint}", self.name, self.needed_for)
+            }
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! `caustique info`: what a scene or an EXR holds.
+
+use super::progress::{duration, percent};
+use super::scene::SceneArgs;
+use super::{plot, print, print_json, scene};
+use caustique::error::{Error, Kind, Result};
+use caustique::film::{LayerSet, describe};
+use caustique::image::exr;
+use caustique::light::Emitter;
+use caustique::scene::Scene;
+use serde_json::{Map, Value, json};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// The first bytes of every EXR.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Say what a scene or an EXR holds
+#[derive(clap::Args)]
+pub struct InfoArgs {
+    /// Scene (.glb, .gltf) or EXR
+    file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reports on a file.
+pub fn run(args: &InfoArgs) -> Result<()> {
+    let path = &args.file;
+    if is_exr(path)? {
+        let (set, attributes) = exr::read(path)?;
+        let object = image_object(&set, attributes.object());
+        return if args.json { print_json(&Value::Object(object)) } else { print(&image_text(path, &set, &object)) };
+    }
+    let scene = super::pool(0)?.install(|| scene::read(&SceneArgs::of(path), rayon::current_num_threads()))?;
+    let object = scene_object(path, &scene);
+    if args.json { print_json(&object) } else { print(&scene_text(path, &object)) }
+}
+
+fn is_exr(path: &Path) -> Result<bool> {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut start));
+    read.map_err(|cause| Error::io(path, &cause))?;
+    if start.is_empty() {
+        return Err(Error::new(Kind::Io, path.display(), "the file is empty"));
+    }
+    Ok(start == EXR_MAGIC)
+}
+
+/// The header's object, with what the file itself tells.
+fn image_object(set: &LayerSet, header: Option<Value>) -> Map<String, Value> {
+    let mut object = match header {
+        Some(Value::Object(object)) => object,
+        _ => Map::new(),
+    };
+    let layers = set.layers.iter().map(|layer| {
+        let components: String = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
+        json!({"name": layer.name, "components": components})
+    });
+    object.insert("layers".into(), layers.collect());
+    object.insert("width".into(), set.width.into());
+    object.insert("height".into(), set.height.into());
+    object.entry("history").or_insert_with(|| json!([]));
+    object
+}
+
+fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> String {
+    let mut text = format!("{}: {} x {} pixels, {} layers\n", path.display(), set.width, set.height, set.layers.len());
+    for layer in &set.layers {
+        let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
+        let name = if layer.name.is_empty() { "(beauty)" } else { &layer.name };
+        let known = describe(&layer.name).map(|known| format!("{} [{}]", known.meaning, known.unit));
+        text += format!("  {name:<18} {:<8} {}", components.concat(), known.unwrap_or_default()).trim_end();
+        text.push('\n');
+    }
+    let number = |key: &str| object.get(key).and_then(Value::as_f64);
+    if let (Some(version), Some(iterations)) = (object.get("version").and_then(Value::as_str), number("iterations")) {
+        text += &format!("rendered by caustique {version}: {iterations} iterations");
+        text += &number("light_paths").map(|n| format!(", {n} light paths")).unwrap_or_default();
+        text += &number("seconds").map(|s| format!(", {}", duration(s))).unwrap_or_default();
+        text += &number("error").map(|e| format!(", estimated relative error {}", percent(e))).unwrap_or_default();
+        text.push('\n');
+    }
+    for warning in object.get("warnings").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {
+        text += &format!("warning: {warning}\n");
+    }
+    let history = object.get("history").and_then(Value::as_array).cloned().unwrap_or_default();
+    // A reproducible file has no clock in it.
+    let timed = history.iter().any(|moment| moment.get("seconds").is_some());
+    let (key, name) = if timed { ("seconds", "seconds") } else { ("iterations", "iterations") };
+    let point = |moment: &Value| Some((moment.get(key)?.as_f64()?, moment.get("error")?.as_f64()?));
+    text + &plot::log_log(&history.iter().filter_map(point).collect::<Vec<_>>(), name, "estimated relative error")
+}
+
+fn scene_object(path: &Path, scene: &Scene) -> Value {
+    let shapes = &scene.shapes;
+    let placed: usize = shapes.instances.iter().map(|i| shapes.meshes[i.mesh as usize].triangles.len()).sum();
+    let stored: usize = shapes.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    let materials: Vec<&str> = scene.materials.list.iter().map(|m| m.name.as_str()).collect();
+    let cameras: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+    let mut lights = Map::new();
+    for emitter in scene.lights.emitters() {
+        let kind = kind(emitter);
+        let count = lights.get(kind).and_then(Value::as_u64).unwrap_or(0);
+        lights.insert(kind.into(), (count + 1).into());
+    }
+    json!({
+        "scene": path.display().to_string(),
+        "objects": scene.objects,
+        "meshes": shapes.meshes.len(),
+        "instances": shapes.instances.len(),
+        "triangles": placed,
+        "triangles_stored": stored,
+        "materials": materials,
+        "textures": scene.materials.textures.len(),
+        "lights": lights,
+        "cameras": cameras,
+        "radius": scene.lights.sky().radius,
+        "warnings": scene.warnings,
+    })
+}
+
+fn kind(emitter: &Emitter) -> &'static str {
+    match emitter {
+        Emitter::Point { .. } => "point",
+        Emitter::Spot { .. } => "spot",
+        Emitter::Sun { .. } => "sun",
+        Emitter::Environment => "environment",
+        _ => "emissive triangles",
+    }
+}
+
+fn scene_text(path: &Path, object: &Value) -> String {
+    let names = |key: &str| {
+        let names: Vec<&str> = object[key].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+        if names.is_empty() { "none".to_string() } else { format!("{}: {}", names.len(), names.join(", ")) }
+    };
+    let mut text = format!("{}\n", path.display());
+    text += &format!(
+        "  triangles  {} in {} meshes, placed {} times\n",
+        object["triangles"], object["meshes"], object["instances"]
+    );
+    text += &format!("  objects    {}\n  materials  {}\n", names("objects"), names("materials"));
+    text += &format!("  textures   {}\n", object["textures"]);
+    let lights = object["lights"].as_object().into_iter().flatten();
+    let lights: Vec<String> = lights.map(|(kind, n)| format!("{kind} {n}")).collect();
+    text += &format!("  lights     {}\n", if lights.is_empty() { "none".into() } else { lights.join(", ") });
+    text += &format!("  cameras    {}\n", names("cameras"));
+    for warning in object["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+        text += &format!("warning: {warning}\n");
+    }
+    text
+}

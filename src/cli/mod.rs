@@ -1,0 +1,101 @@
+//! The command line: one file per command. Data goes to stdout, talk to stderr; only this module prints.
+
+mod combine;
+mod compare;
+mod doctor;
+mod info;
+mod number;
+mod output;
+mod plot;
+mod processor;
+mod progress;
+mod render;
+mod scene;
+mod signals;
+mod usage;
+
+use caustique::error::{Error, Kind, Result};
+use clap::{Parser, Subcommand};
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Renders caustics, and caustics seen through glass, water and mirrors, with known error.
+#[derive(Parser)]
+#[command(name = "caustique", version, about, disable_help_subcommand = true, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene to a multichannel EXR, and to a PNG to look at
+    Render(Box<render::RenderArgs>),
+    /// Run the learned combiner on a rendered EXR
+    Combine(combine::CombineArgs),
+    /// Measure the error of an image against a reference
+    Compare(compare::CompareArgs),
+    /// Say what a scene or an EXR holds
+    Info(info::InfoArgs),
+    /// Say which Embree and ONNX Runtime are found, and what to install if not
+    Doctor(doctor::DoctorArgs),
+}
+
+/// Runs the program and returns its exit code.
+pub fn main() -> ExitCode {
+    if let Err(error) = processor::check() {
+        return fail(&error);
+    }
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => match usage::explain(&error) {
+            Some(error) => return fail(&error),
+            None => {
+                // Help and version were asked for: data, on stdout.
+                let shown = error.print();
+                return if shown.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+            }
+        },
+    };
+    let result = match cli.command {
+        Command::Render(args) => render::run(&args),
+        Command::Combine(args) => combine::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&error),
+    }
+}
+
+/// The two lines of an error, and its exit code.
+fn fail(error: &Error) -> ExitCode {
+    eprintln!("{error}");
+    if let Some(hint) = &error.hint {
+        eprintln!("hint: {hint}");
+    }
+    ExitCode::from(error.exit_code())
+}
+
+/// Threads for everything that a command does; 0 takes all cores.
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    builder.build().map_err(|error| Error::new(Kind::Io, "threads", error).hint("ask for fewer with --threads"))
+}
+
+/// Prints data to stdout. A reader that has closed the pipe wants no more: that is no error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::new(Kind::Io, "standard output", error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a JSON object to stdout, indented.
+fn print_json(value: &serde_json::Value) -> Result<()> {
+    print(&format!("{value:#}\n"))
+}

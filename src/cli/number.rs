@@ -1,0 +1,105 @@
+//! Parsers of option values: numbers in a range, lists of numbers, fractions.
+
+use std::ops::Bound::{self, Excluded, Included, Unbounded};
+
+/// A finite number between two bounds.
+pub fn between(low: Bound<f64>, high: Bound<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
+    move |text| {
+        let value: f64 = text.trim().parse().map_err(|_| "it is not a number".to_string())?;
+        if !value.is_finite() {
+            return Err("it is not a finite number".into());
+        }
+        let above = match low {
+            Included(l) => value >= l,
+            Excluded(l) => value > l,
+            Unbounded => true,
+        };
+        let below = match high {
+            Included(h) => value <= h,
+            Excluded(h) => value < h,
+            Unbounded => true,
+        };
+        if above && below { Ok(value) } else { Err(describe(low, high)) }
+    }
+}
+
+/// The range in words: `it must be in (0, 1]`, `it must be above 0`.
+fn describe(low: Bound<f64>, high: Bound<f64>) -> String {
+    match (low, high) {
+        (Included(l), Unbounded) => format!("it must be at least {l}"),
+        (Excluded(l), Unbounded) => format!("it must be above {l}"),
+        (Unbounded, Included(h)) => format!("it must be at most {h}"),
+        (Unbounded, Excluded(h)) => format!("it must be below {h}"),
+        _ => {
+            let left = match low {
+                Included(l) => format!("[{l}"),
+                Excluded(l) => format!("({l}"),
+                Unbounded => "(-inf".into(),
+            };
+            let right = match high {
+                Included(h) => format!("{h}]"),
+                Excluded(h) => format!("{h})"),
+                Unbounded => "inf)".into(),
+            };
+            format!("it must be in {left}, {right}")
+        }
+    }
+}
+
+/// Any finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    between(Unbounded, Unbounded)(text)
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    between(Excluded(0.0), Unbounded)(text)
+}
+
+/// A finite number not below zero.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    between(Included(0.0), Unbounded)(text)
+}
+
+/// A number of threads; 0 is all.
+pub fn threads(text: &str) -> Result<usize, String> {
+    let range = "it must be a whole number from 0 to 1024".to_string();
+    text.parse().ok().filter(|t| (0..=1024).contains(t)).ok_or(range)
+}
+
+/// Three finite numbers not below zero, separated by commas; `None` when the text is no list of numbers at all.
+pub fn rgb(text: &str) -> Option<Result<[f32; 3], String>> {
+    let values: Vec<f64> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
+    let color: Result<[f64; 3], _> = values.try_into();
+    Some(match color {
+        Err(values) => Err(format!("a colour has three numbers R,G,B, not {}", values.len())),
+        Ok(color) if color.iter().all(|c| c.is_finite() && *c >= 0.0) => Ok(color.map(|c| c as f32)),
+        Ok(_) => Err("a colour has three finite numbers of at least 0".into()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_hold_at_their_ends_and_name_themselves() {
+        let alpha = between(Excluded(0.0), Included(1.0));
+        assert_eq!(alpha("1"), Ok(1.0));
+        assert_eq!(alpha("0"), Err("it must be in (0, 1]".into()));
+        assert_eq!(positive("0"), Err("it must be above 0".into()));
+        assert_eq!(not_negative("-1"), Err("it must be at least 0".into()));
+        assert_eq!(finite("nan"), Err("it is not a finite number".into()));
+        assert_eq!(finite("1e999"), Err("it is not a finite number".into()));
+        assert_eq!(finite("one"), Err("it is not a number".into()));
+        assert_eq!(finite("-1.5"), Ok(-1.5));
+    }
+
+    #[test]
+    fn colours_are_told_from_files() {
+        assert_eq!(rgb("1,0.5,0"), Some(Ok([1.0, 0.5, 0.0])));
+        assert_eq!(rgb("sky,1.exr"), None);
+        assert!(rgb("1,2").is_some_and(|r| r.is_err()));
+        assert!(rgb("1,2,-3").is_some_and(|r| r.is_err()));
+    }
+}

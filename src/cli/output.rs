@@ -1,0 +1,132 @@
+//! Options and checks that every command with output files shares.
+
+use super::number::finite;
+use caustique::error::{Error, Kind, Result};
+use caustique::film::LayerSet;
+use caustique::image::png;
+use caustique::image::tonemap::ToneMap;
+use caustique::image::{atomic, exr};
+use clap::ValueEnum;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// From scene-linear light to the PNG's colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Tonemap {
+    /// Soft shoulder, highlights lose colour: what Blender shows
+    Agx,
+    /// A film-like curve per channel
+    Filmic,
+    /// No curve: what is brighter than white is cut off
+    Srgb,
+}
+
+/// Names of the EXR's channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Naming {
+    /// R G B A at the root, the others as Layer.C
+    Plain,
+    /// ViewLayer.Pass.C, as Blender writes and its render engines take
+    Blender,
+}
+
+/// Compression of the EXR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Compression {
+    /// 16 lines at a time: small files
+    Zip,
+    /// One line at a time: quick access
+    Zips,
+    /// Wavelets: small for noisy pictures
+    Piz,
+    /// None: quick and large
+    None,
+}
+
+impl From<Naming> for caustique::film::Naming {
+    fn from(naming: Naming) -> Self {
+        match naming {
+            Naming::Plain => Self::Plain,
+            Naming::Blender => Self::Blender,
+        }
+    }
+}
+
+impl From<Compression> for exr::Compression {
+    fn from(compression: Compression) -> Self {
+        match compression {
+            Compression::Zip => Self::Zip,
+            Compression::Zips => Self::Zips,
+            Compression::Piz => Self::Piz,
+            Compression::None => Self::None,
+        }
+    }
+}
+
+impl From<Tonemap> for ToneMap {
+    fn from(tonemap: Tonemap) -> Self {
+        match tonemap {
+            Tonemap::Agx => Self::Agx,
+            Tonemap::Filmic => Self::Filmic,
+            Tonemap::Srgb => Self::Srgb,
+        }
+    }
+}
+
+/// How files are written.
+#[derive(clap::Args, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[command(next_help_heading = "Output")]
+pub struct PictureArgs {
+    /// Also write a picture to look at
+    #[arg(long, value_name = "FILE.png")]
+    #[serde(skip)]
+    pub png: Option<PathBuf>,
+    /// Exposure of the PNG in stops
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    #[serde(skip)]
+    pub exposure: f64,
+    /// From light to the PNG's colours
+    #[arg(long, value_enum, default_value_t = Tonemap::Agx)]
+    #[serde(skip)]
+    pub tonemap: Tonemap,
+    /// Compression of the EXR; all are lossless
+    #[arg(long, value_enum, default_value_t = Compression::Zip)]
+    pub compression: Compression,
+}
+
+impl PictureArgs {
+    /// Checks that the PNG can be written.
+    pub fn check(&self) -> Result<()> {
+        self.png.as_deref().map_or(Ok(()), |path| check(path, "png"))
+    }
+
+    /// How the EXR is written.
+    pub fn exr_options(&self, naming: caustique::film::Naming) -> exr::Options {
+        exr::Options { compression: self.compression.into(), naming }
+    }
+
+    /// Writes the PNG if one is asked for.
+    pub fn write_png(&self, set: &LayerSet) -> Result<()> {
+        let Some(path) = &self.png else { return Ok(()) };
+        png::write_tonemapped(path, set.width, set.height, &set.beauty()?, self.exposure as f32, self.tonemap.into())
+    }
+}
+
+/// Checks that `path` is a name for a file of this kind and that one can be written there.
+///
+/// # Errors
+/// Another extension, no such folder, or one that takes no files.
+pub fn check(path: &Path, extension: &str) -> Result<()> {
+    // A name without extension, such as /dev/null, is the user's will.
+    if path.extension().is_some_and(|other| !other.eq_ignore_ascii_case(extension)) {
+        let error = Error::new(Kind::Usage, path.display(), format!("the name does not end in .{extension}"));
+        return Err(match extension {
+            "exr" => error.hint("the output is an EXR; --png writes a picture to look at beside it"),
+            _ => error.hint(format!("name it .{extension}")),
+        });
+    }
+    atomic::check_writable(path)
+}

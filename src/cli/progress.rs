@@ -1,0 +1,184 @@
+//! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
+
+use caustique::render::{Progress, Settings};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use std::io::IsTerminal;
+
+/// Form of the progress reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// A bar on a terminal, otherwise plain lines
+    Auto,
+    /// A line every few seconds
+    Plain,
+    /// A JSON object per iteration, a line each
+    Json,
+    /// Progress and status lines of Open Job Description, for render farms
+    Openjd,
+    /// Nothing but warnings and errors
+    None,
+}
+
+impl Form {
+    /// Whether people read it: programs get neither notes nor a summary.
+    pub fn for_people(self) -> bool {
+        matches!(self, Form::Auto | Form::Plain)
+    }
+}
+
+/// Seconds between plain lines.
+const PLAIN_EVERY: f64 = 5.0;
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Reports on one render.
+pub struct Reporter {
+    form: Form,
+    bar: ProgressBar,
+    time: Option<f64>,
+    next_line: f64,
+}
+
+/// `--progress json`: the keys that scripts rely on.
+#[derive(Serialize)]
+struct Line {
+    iteration: u64,
+    iterations: Option<u64>,
+    seconds: f64,
+    remaining: Option<f64>,
+    light_paths: u64,
+    error: Option<f64>,
+}
+
+impl Reporter {
+    /// A reporter for a render with these settings.
+    pub fn new(form: Form, settings: &Settings) -> Reporter {
+        let form = match form {
+            Form::Auto if !std::io::stderr().is_terminal() => Form::Plain,
+            form => form,
+        };
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden());
+        if form == Form::Auto {
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+            if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
+                bar.set_style(style);
+            }
+            bar.set_message("first iteration");
+        }
+        Reporter { form, bar, time: settings.time, next_line: 0.0 }
+    }
+
+    /// Reports the state after an iteration.
+    pub fn report(&mut self, progress: &Progress) {
+        match self.form {
+            Form::Auto => {
+                self.bar.set_position((self.fraction(progress) * STEPS as f64) as u64);
+                self.bar.set_message(sentence(progress));
+            }
+            Form::Plain => {
+                let last = progress.iterations == Some(progress.iteration);
+                if progress.seconds >= self.next_line || last {
+                    self.next_line = progress.seconds + PLAIN_EVERY;
+                    eprintln!("{}", sentence(progress));
+                }
+            }
+            Form::Json => {
+                let Progress { iteration, iterations, seconds, remaining, light_paths, error, .. } = *progress;
+                let line = Line { iteration, iterations, seconds, remaining, light_paths, error };
+                if let Ok(line) = serde_json::to_string(&line) {
+                    eprintln!("{line}");
+                }
+            }
+            Form::Openjd => {
+                eprintln!("openjd_progress: {:.1}", 100.0 * self.fraction(progress));
+                eprintln!("openjd_status: {}", sentence(progress));
+            }
+            Form::None => {}
+        }
+    }
+
+    /// Takes the bar off the terminal.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    /// How much is done, 0 to 1, by whichever limit is nearer.
+    fn fraction(&self, progress: &Progress) -> f64 {
+        let by_count = progress.iterations.map_or(0.0, |n| progress.iteration as f64 / n.max(1) as f64);
+        let by_time = self.time.map_or(0.0, |t| progress.seconds / t);
+        by_count.max(by_time).clamp(0.0, 1.0)
+    }
+}
+
+/// `iteration 12 of 64, 3.1 s, 13 s left, 387000 photons/s, error 3.1 %`.
+fn sentence(progress: &Progress) -> String {
+    let mut text = format!("iteration {}", progress.iteration);
+    if let Some(n) = progress.iterations {
+        text += &format!(" of {n}");
+    }
+    text += &format!(", {}", duration(progress.seconds));
+    if let Some(remaining) = progress.remaining {
+        text += &format!(", {} left", duration(remaining));
+    }
+    text += &format!(", {} photons/s", count(progress.light_paths as f64 / progress.seconds.max(1e-9)));
+    if let Some(error) = progress.error {
+        text += &format!(", error {}", percent(error));
+    }
+    text
+}
+
+/// Seconds for people: `3.1 s`, `4 min 10 s`, `2 h 5 min`.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..=99 if seconds < 99.5 => format!("{seconds:.1} s"),
+        0..=3599 => format!("{} min {} s", whole / 60, whole % 60),
+        _ => format!("{} h {} min", whole / 3600, whole % 3600 / 60),
+    }
+}
+
+/// A large number for people: `950`, `387 k`, `1.25 M`.
+pub fn count(n: f64) -> String {
+    match n {
+        n if n < 1e4 => format!("{n:.0}"),
+        n if n < 1e6 => format!("{:.0} k", n / 1e3),
+        n if n < 1e9 => format!("{:.2} M", n / 1e6),
+        n => format!("{:.2} G", n / 1e9),
+    }
+}
+
+/// A relative error in percent, two digits.
+pub fn percent(x: f64) -> String {
+    let p = 100.0 * x;
+    if p >= 10.0 {
+        format!("{p:.0} %")
+    } else if p >= 1.0 {
+        format!("{p:.1} %")
+    } else {
+        format!("{p:.2} %")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sentences_are_for_people() {
+        let progress = Progress {
+            iteration: 12,
+            iterations: Some(64),
+            seconds: 3.1,
+            remaining: Some(250.0),
+            light_paths: 1_200_000,
+            photons: 1,
+            error: Some(0.031),
+        };
+        assert_eq!(sentence(&progress), "iteration 12 of 64, 3.1 s, 4 min 10 s left, 387 k photons/s, error 3.1 %");
+        assert_eq!(duration(7500.0), "2 h 5 min");
+        assert_eq!(duration(99.7), "1 min 40 s");
+        assert_eq!(count(9_999.0), "9999");
+    }
+}

@@ -1,0 +1,241 @@
+//! Every option of `caustique render`: default, unit, range and help in one place.
+
+use crate::cli::number::{between, positive, threads};
+use crate::cli::output::{Naming, PictureArgs};
+use crate::cli::progress::Form;
+use crate::cli::scene::SceneArgs;
+use caustique::error::{Error, Kind, Result};
+use caustique::estimator::InitialBandwidth;
+use caustique::estimator::rule::memoryless;
+use caustique::render::{self, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_PHOTONS, Levels, Settings, Shard};
+use caustique::scene::{MAX_SIZE, View};
+use caustique::transport::MAX_LEVELS;
+use clap::{ValueEnum, value_parser};
+use serde::Serialize;
+use std::ops::Bound::{Excluded, Included};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Render a scene to a multichannel EXR, and to a PNG to look at.
+///
+/// Without options: 64 iterations of 100000 light paths at 1280 pixels across, seen through the scene's first camera, five
+/// bandwidth levels combined by the learned combiner. Ctrl-C finishes the running iteration and writes what there is.
+#[derive(clap::Args, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[command(next_line_help = true)]
+pub struct RenderArgs {
+    /// EXR to write: the picture and every layer that made it
+    #[arg(short, long, value_name = "OUT.exr")]
+    #[serde(skip)]
+    pub output: PathBuf,
+
+    /// How light is found
+    #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
+    pub method: Method,
+    /// Light paths sent from the lights in each iteration: more give a smoother start, fewer faster iterations
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_PHOTONS, value_parser = value_parser!(u32).range(1..=1_000_000_000), help_heading = "Method")]
+    pub photons: u32,
+    /// Bandwidth levels, 1 to 8, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred, from which
+    /// the combiner makes one. The combiner that comes with the program takes 5
+    #[arg(long, value_name = "M", default_value_t = 5, value_parser = level_count, help_heading = "Method")]
+    pub levels: usize,
+    /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
+    /// pixels, or a length in scene units, the same everywhere
+    #[arg(long, value_name = "knn|footprint|R", default_value = "knn", help_heading = "Method")]
+    pub initial_bandwidth: BandwidthChoice,
+    /// Photons within the largest bandwidth to begin with, 1 to 1024 [default: 20, with one level 10]
+    #[arg(long, value_name = "K", value_parser = value_parser!(u32).range(1..=1024), help_heading = "Method")]
+    pub knn: Option<u32>,
+    /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
+    /// shrinks [default: 2/3]
+    #[arg(long, value_name = "A", default_value_t = memoryless::ALPHA, hide_default_value = true,
+          value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Method")]
+    pub alpha: f64,
+    /// How bandwidths shrink: 'memoryless' by the iteration's number alone
+    #[arg(long, value_enum, default_value_t = RadiusRule::Memoryless, help_heading = "Method")]
+    pub radius_rule: RadiusRule,
+    /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
+    pub max_depth: Option<u32>,
+    /// Seed: another number, other noise; the same number and options, the same picture to the last bit
+    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Method")]
+    pub seed: u64,
+
+    /// Stop after so many iterations [default: 64, if nothing else says when to stop]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=4_000_000_000), help_heading = "When to stop")]
+    pub iterations: Option<u64>,
+    /// Stop after so many seconds of rendering; the running iteration is finished
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
+    pub time: Option<f64>,
+    /// Stop when the estimated relative error (the root of relMSE) is this small; 0.05 is 5 %
+    #[arg(long, value_name = "E", value_parser = positive, help_heading = "When to stop")]
+    pub target_error: Option<f64>,
+    /// Render only the iterations i with i mod N = I, for one of N machines
+    #[arg(long, value_name = "I/N", help_heading = "When to stop")]
+    pub shard: Option<ShardChoice>,
+
+    /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
+    #[arg(long, value_name = "W", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    pub width: Option<u32>,
+    /// Height in pixels; without a width the camera's aspect is kept
+    #[arg(long, value_name = "H", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    pub height: Option<u32>,
+    /// Camera by name [default: the scene's first]
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub scene: SceneArgs,
+
+    /// Leave the levels uncombined: the picture is the usual single-bandwidth image
+    #[arg(long, conflicts_with = "model", help_heading = "Combiner")]
+    pub no_combine: bool,
+    /// Network of the combiner: 'compact' comes with the program; or an ONNX file [default: compact]
+    #[arg(long, value_name = "compact|paper|FILE.onnx", help_heading = "Combiner")]
+    pub model: Option<String>,
+
+    /// Layers of the EXR: 'all', 'beauty', or names separated by commas
+    #[arg(long, value_name = "all|beauty|LIST", default_value = "all", help_heading = "Output")]
+    pub layers: String,
+    /// Names of the EXR's channels: 'blender' writes those that Blender's own renders have
+    #[arg(long, value_enum, default_value_t = Naming::Plain, help_heading = "Output")]
+    pub exr_naming: Naming,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub picture: PictureArgs,
+
+    /// Threads; 0 takes all cores. The picture does not depend on it
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
+    #[serde(skip)]
+    pub threads: usize,
+    /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files
+    #[arg(long, help_heading = "Running")]
+    #[serde(skip)]
+    pub reproducible: bool,
+    /// Reports on stderr
+    #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
+    #[serde(skip)]
+    pub progress: Form,
+}
+
+/// Methods that exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Whatever suits the scene; so far that is sppm
+    Auto,
+    /// Stochastic progressive photon mapping
+    Sppm,
+}
+
+/// Rules by which bandwidths shrink.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RadiusRule {
+    /// By the iteration's number alone
+    Memoryless,
+}
+
+/// `--initial-bandwidth`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BandwidthChoice {
+    /// By neighbours.
+    Knn,
+    /// By pixels.
+    Footprint,
+    /// Scene units.
+    #[serde(untagged)]
+    Length(f64),
+}
+
+impl FromStr for BandwidthChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "knn" => Ok(BandwidthChoice::Knn),
+            "footprint" => Ok(BandwidthChoice::Footprint),
+            length => match length.parse::<f64>() {
+                Ok(r) if r > 0.0 && r < 1e30 && r > 1e-30 => Ok(BandwidthChoice::Length(r)),
+                Ok(_) => Err("a bandwidth must be above 0 and finite".into()),
+                Err(_) => Err("it is neither 'knn' nor 'footprint' nor a length".into()),
+            },
+        }
+    }
+}
+
+/// `--shard I/N`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct ShardChoice {
+    /// Which one, from 0.
+    pub index: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+impl FromStr for ShardChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if index < count && count <= 1_000_000 => Ok(ShardChoice { index, count }),
+            Some((_, 0)) => Err("there is no shard of 0".into()),
+            Some((_, count)) if count <= 1_000_000 => Err(format!("shards of {count} are 0 to {}", count - 1)),
+            Some(_) => Err("there are at most 1000000 shards".into()),
+            None => Err("it must be I/N, such as 0/4".into()),
+        }
+    }
+}
+
+fn level_count(text: &str) -> std::result::Result<usize, String> {
+    let range = format!("it must be a whole number from 1 to {MAX_LEVELS}");
+    text.parse().ok().filter(|m| (1..=MAX_LEVELS).contains(m)).ok_or(range)
+}
+
+impl RenderArgs {
+    /// The picture asked for.
+    pub fn view(&self) -> View {
+        View { camera: self.camera.clone(), width: self.width, height: self.height }
+    }
+
+    /// The render asked for.
+    ///
+    /// # Errors
+    /// Options that contradict each other.
+    pub fn settings(&self) -> Result<Settings> {
+        let levels = Levels::new(self.levels);
+        let initial = match (self.initial_bandwidth, self.knn) {
+            (BandwidthChoice::Knn, k) => {
+                let default = if self.levels > 1 { DEFAULT_KNN.0 } else { DEFAULT_KNN.1 };
+                InitialBandwidth::Nearest(k.map_or(default, |k| k as usize))
+            }
+            (_, Some(_)) => {
+                let error =
+                    Error::new(Kind::Usage, "command line", "--knn has no effect with this --initial-bandwidth");
+                return Err(error.hint("leave one of the two out"));
+            }
+            (BandwidthChoice::Footprint, None) => InitialBandwidth::Footprint,
+            (BandwidthChoice::Length(r), None) => InitialBandwidth::Fixed(r as f32),
+        };
+        let limited = self.time.is_some() || self.target_error.is_some();
+        let iterations = self.iterations.or((!limited).then_some(DEFAULT_ITERATIONS));
+        let shard = self.shard.map_or(Shard { index: 0, count: 1 }, |s| Shard { index: s.index, count: s.count });
+        if let Some(n) = iterations.filter(|n| shard.index >= *n) {
+            let cause = format!("shard {} of {} holds none of {n} iterations", shard.index, shard.count);
+            return Err(Error::new(Kind::Usage, "command line", cause).hint("use fewer shards or more --iterations"));
+        }
+        Ok(render::Settings {
+            seed: self.seed,
+            photons: self.photons,
+            levels,
+            initial,
+            alpha: self.alpha,
+            max_depth: self.max_depth.unwrap_or(u32::MAX),
+            iterations,
+            time: self.time,
+            target_error: self.target_error,
+            shard,
+        })
+    }
+}

@@ -1,0 +1,158 @@
+//! From a scene file and the options about it to a scene, with its warnings told.
+
+use super::number::{finite, not_negative, rgb};
+use caustique::error::{Error, Kind, Result};
+use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
+use caustique::scene::{Scene, environment_file, gltf};
+use clap::ValueEnum;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A scene file and how it is read.
+#[derive(clap::Args, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[command(next_help_heading = "Light and glass")]
+pub struct SceneArgs {
+    /// Scene: .glb or .gltf, as Blender exports it
+    #[arg(value_name = "SCENE", help_heading = None::<&str>)]
+    #[serde(rename = "scene")]
+    pub path: PathBuf,
+    /// Light from all around: a latitude-longitude image (.exr or .hdr), or one colour R,G,B (radiance)
+    #[arg(long, value_name = "FILE|R,G,B")]
+    pub env: Option<EnvironmentChoice>,
+    /// Turn the environment about the vertical, counter-clockwise seen from above (degrees)
+    #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true)]
+    pub env_rotation: Option<f64>,
+    /// Make the environment so many times as bright
+    #[arg(long, value_name = "S", value_parser = not_negative)]
+    pub env_strength: Option<f64>,
+    /// Units of lamps: 'photometric' is what Blender's exporter writes unless told otherwise, 683 lumen to the watt
+    #[arg(long, value_enum, default_value_t = LightUnits::Auto)]
+    pub light_units: LightUnits,
+    /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light, and says so
+    #[arg(long, value_enum, default_value_t = Glass::Auto)]
+    pub glass: Glass,
+    /// Take anything in the scene that is ignored or approximated as an error
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Units of punctual lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LightUnits {
+    /// By the program that wrote the file
+    Auto,
+    /// Watts
+    Radiometric,
+    /// Lumens, 683 to the watt
+    Photometric,
+}
+
+/// What transmissive meshes without a volume are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Glass {
+    /// Solid if closed
+    Auto,
+    /// Solid
+    Solid,
+    /// Thin panes that do not bend light
+    Thin,
+}
+
+/// `--env`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum EnvironmentChoice {
+    /// One radiance from everywhere.
+    Color([f32; 3]),
+    /// An image.
+    File(PathBuf),
+}
+
+impl FromStr for EnvironmentChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match rgb(text) {
+            Some(color) => color.map(EnvironmentChoice::Color),
+            None => Ok(EnvironmentChoice::File(text.into())),
+        }
+    }
+}
+
+/// Reads and builds the scene, with the environment that the options ask for.
+pub fn read(args: &SceneArgs, threads: usize) -> Result<Scene> {
+    let mut description = gltf::read(&args.path, &args.read_options())?;
+    environment(&mut description, args)?;
+    Scene::build(description, threads)
+}
+
+/// `--env`, `--env-rotation`, `--env-strength`: the last two also act on the scene's own environment.
+fn environment(description: &mut Description, args: &SceneArgs) -> Result<()> {
+    if let Some(choice) = &args.env {
+        let source = match choice {
+            EnvironmentChoice::Color(color) => EnvironmentSource::Color((*color).into()),
+            EnvironmentChoice::File(path) => environment_file::read(path, &mut description.warnings)?,
+        };
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+    }
+    let given = [("--env-rotation", args.env_rotation), ("--env-strength", args.env_strength)];
+    let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
+    let Some(environment) = &mut description.environment else {
+        let error = Error::new(Kind::Usage, args.path.display(), format!("{option}: the scene has no environment"));
+        return Err(error.hint("give one with --env"));
+    };
+    if let Some(degrees) = args.env_rotation {
+        environment.rotation_deg = degrees as f32;
+    }
+    if let Some(strength) = args.env_strength {
+        environment.strength = strength as f32;
+    }
+    Ok(())
+}
+
+/// Prints a line for each warning; with `--strict` they are an error that lists them all.
+pub fn tell(args: &SceneArgs, warnings: &[String]) -> Result<()> {
+    for warning in warnings {
+        eprintln!("warning: {}: {warning}", args.path.display());
+    }
+    if !args.strict || warnings.is_empty() {
+        return Ok(());
+    }
+    let things = if warnings.len() == 1 { "1 thing is" } else { &format!("{} things are", warnings.len()) };
+    let cause = format!("{things} ignored or approximated, and --strict forbids it");
+    Err(Error::new(Kind::Scene, args.path.display(), cause)
+        .hint("mend what the warnings above name, or leave --strict out"))
+}
+
+impl SceneArgs {
+    /// A file without any options.
+    pub fn of(path: &Path) -> SceneArgs {
+        SceneArgs {
+            path: path.into(),
+            env: None,
+            env_rotation: None,
+            env_strength: None,
+            light_units: LightUnits::Auto,
+            glass: Glass::Auto,
+            strict: false,
+        }
+    }
+
+    fn read_options(&self) -> gltf::ReadOptions {
+        gltf::ReadOptions {
+            light_units: match self.light_units {
+                LightUnits::Auto => gltf::LightUnits::Auto,
+                LightUnits::Radiometric => gltf::LightUnits::Radiometric,
+                LightUnits::Photometric => gltf::LightUnits::Photometric,
+            },
+            glass: match self.glass {
+                Glass::Auto => gltf::Glass::Auto,
+                Glass::Solid => gltf::Glass::Solid,
+                Glass::Thin => gltf::Glass::Thin,
+            },
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! Ctrl-C and SIGTERM: the first asks for an end after the current iteration, the second ends the program at once.
+
+use caustique::error::{Error, Kind, Result};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether an end was asked for.
+#[derive(Clone, Debug)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// Listens from now on.
+    pub fn listen() -> Result<Interrupt> {
+        let asked = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            // In this order: a signal ends the program if one came before it, and only then is noted itself.
+            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&asked))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&asked)))
+                .map_err(|error| Error::new(Kind::Io, "signals", error))?;
+        }
+        Ok(Interrupt(asked))
+    }
+
+    /// Whether a signal came.
+    pub fn asked(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,240 @@
+//! From the pixels of a render to its layers.
+//!
+//! - Before two iterations no variance is known. `Variance` then holds the square of the mean and `Error` the mean itself: an error
+//!   of the estimate's own size, which is finite and says that nothing is known. The file's header says `"variance_known": false`.
+//! - `A` is the fraction of eye paths that hit a surface; where an environment shines the background is part of the picture,
+//!   and it is 1.
+//! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and `normal` are zero there.
+
+use super::layers::{Layer, LayerSet, Plane, Sample};
+use crate::error::Result;
+use crate::estimator::{Pixel, SquaredError};
+use crate::math::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Depth of the background.
+pub const BACKGROUND: f32 = 1e10;
+/// Pixels that are taken through all layers while they are in the cache.
+const BLOCK: usize = 2048;
+
+/// What the layers of a render depend on besides its pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    /// Bandwidth levels.
+    pub levels: usize,
+    /// The level (from 0) that is the method's own image.
+    pub own: usize,
+    /// Squared bandwidth of the last iteration over that of the first.
+    pub radius2_factor: f64,
+    /// Whether an environment light can be seen.
+    pub environment: bool,
+}
+
+/// Values of one layer at one pixel, as many as it has components.
+type Get = Box<dyn Fn(&Pixel) -> [f32; 4] + Sync>;
+
+/// A layer to be made.
+struct Column {
+    name: String,
+    components: &'static str,
+    get: Get,
+}
+
+impl Column {
+    fn rgb(name: impl Into<String>, get: impl Fn(&Pixel) -> DVec3 + Sync + 'static) -> Column {
+        Column { name: name.into(), components: "RGB", get: Box::new(move |p| three(get(p).as_vec3())) }
+    }
+
+    fn xyz(name: &str, get: impl Fn(&Pixel) -> Vec3 + Sync + 'static) -> Column {
+        Column { name: name.into(), components: "XYZ", get: Box::new(move |p| three(get(p))) }
+    }
+
+    fn one(name: impl Into<String>, components: &'static str, get: impl Fn(&Pixel) -> f32 + Sync + 'static) -> Column {
+        Column { name: name.into(), components, get: Box::new(move |p| [get(p), 0.0, 0.0, 0.0]) }
+    }
+}
+
+fn three(v: Vec3) -> [f32; 4] {
+    v.extend(0.0).to_array()
+}
+
+/// `sum / count`, zero when nothing was counted.
+fn mean(sum: DVec3, count: u32) -> DVec3 {
+    if count == 0 { DVec3::ZERO } else { sum / f64::from(count) }
+}
+
+/// The layers that the pixels of a render give, cryptomattes excepted.
+fn columns(shape: &Shape) -> Vec<Column> {
+    let Shape { levels, own, radius2_factor, environment } = *shape;
+    let mut columns = vec![
+        Column {
+            name: String::new(),
+            components: "RGBA",
+            get: Box::new(move |p| {
+                let alpha = if environment { 1.0 } else { p.coverage.hit_fraction() };
+                p.levels[own].mean.as_vec3().extend(alpha).to_array()
+            }),
+        },
+        Column::rgb("Noisy", move |p| p.levels[own].mean),
+    ];
+    for level in 0..levels {
+        columns.push(Column::rgb(format!("Level{}", level + 1), move |p| p.levels[level].mean));
+    }
+    for level in 0..levels {
+        columns.push(Column::rgb(format!("Variance{}", level + 1), move |p| variance(p, level)));
+    }
+    for level in 0..levels {
+        // Each level's squared bandwidth is half that of the next larger.
+        let factor = (radius2_factor * 0.5f64.powi((levels - 1 - level) as i32)).sqrt() as f32;
+        columns.push(Column::one(format!("Radius{}", level + 1), "X", move |p| p.bandwidth * factor));
+    }
+    columns.extend([
+        Column::rgb("Direct", |p| mean(p.parts.direct, p.iterations)),
+        Column::rgb("Indirect", |p| mean(p.parts.indirect, p.iterations)),
+        Column::rgb("Caustic", |p| mean(p.parts.caustic, p.iterations)),
+        Column::rgb("Emission", |p| mean(p.parts.emission, p.iterations)),
+        Column::rgb("Error", move |p| match SquaredError::of(p, own, levels) {
+            Some(error) => error.root(),
+            None => p.levels[own].mean.abs(),
+        }),
+        Column::rgb("albedo", |p| mean(p.albedo, p.features)),
+        Column::xyz("normal", |p| p.normal.normalize_or_zero().as_vec3()),
+        Column::one("depth", "Z", |p| if p.depths == 0 { BACKGROUND } else { (p.depth / f64::from(p.depths)) as f32 }),
+        Column::one("Z", "Z", |p| p.z),
+        Column::xyz("P", |p| p.p),
+        Column::one("Rejected", "X", |p| p.rejected as f32),
+    ]);
+    columns
+}
+
+/// Variance of the mean of a level; before two iterations the square of the mean.
+fn variance(pixel: &Pixel, level: usize) -> DVec3 {
+    let welford = &pixel.levels[level];
+    if pixel.iterations < 2 {
+        welford.mean * welford.mean
+    } else {
+        welford.variance_of_mean(f64::from(pixel.iterations))
+    }
+}
+
+/// Names of the layers that [`layers`] can make.
+pub fn names(shape: &Shape) -> Vec<String> {
+    columns(shape).into_iter().map(|column| column.name).collect()
+}
+
+/// The layers of a picture whose name is `wanted`; pixels row by row from the top.
+///
+/// # Errors
+/// There are not `width * height` pixels.
+pub fn layers(
+    (width, height): (u32, u32),
+    pixels: &[Pixel],
+    shape: &Shape,
+    wanted: impl Fn(&str) -> bool,
+) -> Result<LayerSet> {
+    let mut columns = columns(shape);
+    columns.retain(|column| wanted(&column.name));
+    let channels = columns.iter().map(|column| column.components.len()).sum();
+    let mut values = vec![vec![0f32; pixels.len()]; channels];
+    // One look at each pixel for all layers: pixels are large, and reading them all once per layer would take seconds.
+    let mut blocks: Vec<Vec<&mut [f32]>> = Vec::new();
+    blocks.resize_with(pixels.len().div_ceil(BLOCK), || Vec::with_capacity(channels));
+    for plane in &mut values {
+        for (block, part) in blocks.iter_mut().zip(plane.chunks_mut(BLOCK)) {
+            block.push(part);
+        }
+    }
+    blocks.par_iter_mut().zip(pixels.par_chunks(BLOCK)).for_each(|(planes, pixels)| {
+        let mut planes = planes.as_mut_slice();
+        for column in &columns {
+            let (own, others) = std::mem::take(&mut planes).split_at_mut(column.components.len());
+            for (i, pixel) in pixels.iter().enumerate() {
+                for (plane, value) in own.iter_mut().zip((column.get)(pixel)) {
+                    plane[i] = value;
+                }
+            }
+            planes = others;
+        }
+    });
+    let mut set = LayerSet::new(width as usize, height as usize);
+    let mut values = values.into_iter();
+    for column in columns {
+        let components = column.components.chars().zip(values.by_ref());
+        let planes =
+            components.map(|(c, values)| Plane { component: c.into(), sample: Sample::Float, values }).collect();
+        set.push(Layer { name: column.name, planes })?;
+    }
+    Ok(set)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rgb;
+    use crate::transport::{EyeMeasure, Features, FirstHit};
+
+    const SHAPE: Shape = Shape { levels: 5, own: 3, radius2_factor: 0.25, environment: false };
+
+    /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
+    fn measure(x: f32, hit: bool) -> EyeMeasure {
+        let photons = std::array::from_fn(|k| Rgb::splat(x + k as f32));
+        EyeMeasure {
+            emission: Rgb::splat(x),
+            direct: Rgb::new(x, 2.0 * x, 3.0 * x),
+            indirect: Rgb::splat(0.5 * x),
+            caustic_photons: photons,
+            indirect_photons: photons,
+            features: if hit {
+                Features { albedo: Rgb::splat(0.5), normal: Vec3::Y, depth: 4.0 }
+            } else {
+                Features::default()
+            },
+            first: hit.then_some(FirstHit { p: Vec3::X, instance: 3 }),
+        }
+    }
+
+    fn value(set: &LayerSet, layer: &str, component: &str) -> f32 {
+        set.get(layer).and_then(|l| l.plane(component)).expect("the layer is there").values[0]
+    }
+
+    #[test]
+    fn the_parts_sum_to_the_image_and_radii_halve_their_squares() {
+        let mut pixel = Pixel::new(2.0);
+        for i in 0..5 {
+            let x = 0.1 + 0.37 * i as f32;
+            pixel.add(&measure(x, true), Some(&measure(1.1 * x, i != 0)), 5, 3);
+        }
+        let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
+        for c in ["R", "G", "B"] {
+            let parts = ["Direct", "Indirect", "Caustic", "Emission"];
+            let sum: f32 = parts.iter().map(|part| value(&set, part, c)).sum();
+            assert!((sum / value(&set, "Noisy", c) - 1.0).abs() < 1e-6);
+            assert_eq!(value(&set, "Noisy", c), value(&set, "Level4", c));
+            assert_eq!(value(&set, "Noisy", c), value(&set, "", c));
+        }
+        // sqrt(0.25) of the largest bandwidth, then 1/sqrt(2) a level.
+        for (name, expected) in [("Radius5", 1.0), ("Radius4", 0.5f32.sqrt()), ("Radius3", 0.5), ("Radius1", 0.25)] {
+            assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
+        }
+        // One of ten eye paths missed: it counts for alpha and albedo, not for depth.
+        assert_eq!(value(&set, "", "A"), 0.9);
+        assert!((value(&set, "albedo", "R") - 0.45).abs() < 1e-6);
+        assert_eq!((value(&set, "depth", "Z"), value(&set, "normal", "Y")), (4.0, 1.0));
+        assert_eq!(names(&SHAPE), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
+        let mut pixel = Pixel::new(1.0);
+        pixel.add(&measure(0.5, false), Some(&measure(0.5, false)), 5, 3);
+        let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
+        let mean = value(&set, "Level2", "R");
+        assert!((value(&set, "Variance2", "R") / (mean * mean) - 1.0).abs() < 1e-6);
+        assert_eq!(value(&set, "Error", "G"), value(&set, "Noisy", "G"));
+        assert_eq!((value(&set, "depth", "Z"), value(&set, "Z", "Z")), (BACKGROUND, BACKGROUND));
+        assert_eq!(value(&set, "", "A"), 0.0);
+        let lit = Shape { environment: true, ..SHAPE };
+        let set = layers((1, 1), &[pixel], &lit, |name| name.is_empty()).expect("one pixel");
+        assert_eq!((value(&set, "", "A"), set.layers.len()), (1.0, 1));
+    }
+}

@@ -1,0 +1,79 @@
+//! What a render leaves in its file: layers, and the account in the header.
+
+use super::control::{StopReason, peak_memory};
+use super::result::Rendered;
+use super::settings::Settings;
+use crate::error::Result;
+use crate::estimator::rule::memoryless::radius2_factor;
+use crate::film::{LayerSet, output};
+use serde_json::{Map, Value, json};
+
+/// What the layers of a render with these settings depend on after `iterations` of them; `environment` tells whether one shines.
+pub fn shape(settings: &Settings, iterations: u64, environment: bool) -> output::Shape {
+    // Iterations count from 1; a shard renders every `count`-th.
+    let last = settings.shard.index + iterations.saturating_sub(1) * settings.shard.count + 1;
+    output::Shape {
+        levels: settings.levels.count,
+        own: settings.levels.own(),
+        radius2_factor: radius2_factor(last, settings.alpha),
+        environment,
+    }
+}
+
+impl Rendered {
+    /// The layers that are `wanted` by name, cryptomattes excepted.
+    ///
+    /// # Errors
+    /// None for a render of ours: its pixels are as many as its size says.
+    pub fn layers(&self, environment: bool, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
+        let shape = shape(&self.settings, self.iterations, environment);
+        output::layers((self.width, self.height), &self.pixels, &shape, wanted)
+    }
+
+    /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know: arguments,
+    /// warnings, the combiner. `threads` is `None` for a reproducible file, which has no clocks, no memory and no threads in it.
+    pub fn account(&self, threads: Option<usize>) -> Map<String, Value> {
+        let shard = self.settings.shard;
+        let mut account = Map::new();
+        let mut put = |key: &str, value: Value| account.insert(key.into(), value);
+        put("version", env!("CARGO_PKG_VERSION").into());
+        put("method", "sppm".into());
+        put("seed", self.settings.seed.into());
+        put("iterations", self.iterations.into());
+        put("light_paths", self.light_paths.into());
+        put("shard", json!({"index": shard.index, "count": shard.count}));
+        put("levels", self.settings.levels.count.into());
+        put("stopped", stop_name(self.stop).into());
+        put("error", self.relative_error().into());
+        put("variance_known", (self.iterations >= 2).into());
+        put("rejected", self.rejected().into());
+        let history = self.history.iter().map(|moment| {
+            let mut entry = json!({
+                "iterations": moment.iterations, "light_paths": moment.light_paths, "error": moment.error,
+            });
+            if threads.is_some() {
+                entry["seconds"] = moment.seconds.into();
+                entry["cpu_seconds"] = moment.cpu_seconds.into();
+            }
+            entry
+        });
+        put("history", history.collect());
+        if let Some(threads) = threads {
+            put("seconds", self.seconds.into());
+            put("phases", json!(self.phases));
+            put("threads", threads.into());
+            put("peak_memory", peak_memory().into());
+        }
+        account
+    }
+}
+
+/// Why a render stopped, in a word.
+pub fn stop_name(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Iterations => "iterations",
+        StopReason::Time => "time",
+        StopReason::Error => "error",
+        StopReason::Interrupted => "interrupted",
+    }
+}

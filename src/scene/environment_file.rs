@@ -1,0 +1,99 @@
+//! Environment images: OpenEXR and Radiance HDR files, latitude and longitude.
+
+use super::description::EnvironmentSource;
+use crate::error::{Error, Kind, Result};
+use exr::prelude::{ReadChannels, ReadLayers};
+use image::ImageDecoder;
+use std::fs::File;
+use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Most texels that an environment may have: 16384 x 8192, 1.5 GiB.
+const MOST_TEXELS: u64 = 1 << 27;
+/// What a texel that is infinite is read as: the largest half float, beyond which files overflow.
+const BRIGHTEST: f32 = 65_504.0;
+
+/// Width, height and texels, top row first.
+type Pixels = (u32, u32, Vec<[f32; 3]>);
+
+/// Reads the radiance of an environment from an `.exr` or `.hdr` file (told apart by what they hold, not by their names).
+/// Texels that are negative or not finite are clamped, with a warning.
+///
+/// # Errors
+/// The file cannot be opened, is neither, is damaged, or is absurdly large.
+pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource> {
+    let io = |e: std::io::Error| Error::io(path, &e).hint("check the path of the environment image");
+    let meta = std::fs::metadata(path).map_err(io)?;
+    if !meta.is_file() {
+        return Err(io(std::io::Error::other("it is not a regular file")));
+    }
+    let mut start = Vec::new();
+    std::io::Read::read_to_end(&mut std::io::Read::take(File::open(path).map_err(io)?, 10), &mut start).map_err(io)?;
+    let failed = |cause: String| {
+        Error::new(Kind::Image, path.display(), cause)
+            .hint("save the environment as a latitude-longitude OpenEXR or Radiance HDR image")
+    };
+    let decode: fn(&Path) -> std::result::Result<Pixels, String> = match start.as_slice() {
+        [0x76, 0x2f, 0x31, 0x01, ..] => read_exr,
+        [b'#', b'?', ..] => read_hdr,
+        _ => return Err(failed("it is neither OpenEXR nor Radiance HDR".into())),
+    };
+    // A decoder's own fault must not end the program.
+    let pixels = catch_unwind(AssertUnwindSafe(|| decode(path))).unwrap_or_else(|_| Err("the decoder failed".into()));
+    let (width, height, mut texels) = pixels.map_err(|e| failed(format!("it cannot be read: {e}")))?;
+    let clamped = clamp(&mut texels);
+    if clamped > 0 {
+        warnings.push(format!("{}: {clamped} texels are negative or not finite and are clamped", path.display()));
+    }
+    Ok(EnvironmentSource::Image { width, height, texels })
+}
+
+/// Makes texels finite and not negative; how many were not.
+fn clamp(texels: &mut [[f32; 3]]) -> usize {
+    let mut count = 0;
+    for texel in texels {
+        // NaN compares with nothing, so it becomes 0.
+        let fit = texel.map(|x| if x == f32::INFINITY { BRIGHTEST } else { x.max(0.0) });
+        count += usize::from(fit != *texel);
+        *texel = fit;
+    }
+    count
+}
+
+fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
+    match width.checked_mul(height) {
+        Some(1..=MOST_TEXELS) => Ok(()),
+        _ => Err(format!("{width} x {height} texels are none or too many")),
+    }
+}
+
+fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
+    let text = |e: exr::error::Error| e.to_string();
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(text)?;
+    for header in &meta.headers {
+        check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.width(), vec![[0.0f32; 3]; size.width() * size.height()]),
+            |(width, texels), at, (r, g, b): (f32, f32, f32)| texels[at.y() * *width + at.x()] = [r, g, b],
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(text)?;
+    let size = image.layer_data.size;
+    Ok((size.width() as u32, size.height() as u32, image.layer_data.channel_data.pixels.1))
+}
+
+fn read_hdr(path: &Path) -> std::result::Result<Pixels, String> {
+    let file = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
+    let decoder = image::codecs::hdr::HdrDecoder::new(file).map_err(|e| e.to_string())?;
+    let (width, height) = decoder.dimensions();
+    check_size(u64::from(width), u64::from(height))?;
+    let image = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?.into_rgb32f();
+    Ok((width, height, image.pixels().map(|p| p.0).collect()))
+}

@@ -1,0 +1,160 @@
+//! From bytes to JSON and the binary chunk (specification, section 4.4), and what the document demands of its reader.
+
+use super::fault;
+use crate::error::{Error, Result};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
+
+/// Extensions that are read.
+const SUPPORTED: [&str; 18] = [
+    "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+];
+
+/// Splits a `.glb` into its JSON and binary chunks; a `.gltf` is all JSON.
+pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
+    let (json, binary) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, &[][..]) };
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    if json.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
+        return Err(fault("", "this is not a glTF file").hint("give a .glb or .gltf file"));
+    }
+    let value = serde_json::from_slice(json).map_err(|e| fault("JSON", e).hint(DAMAGED))?;
+    Ok((value, binary))
+}
+
+/// A little-endian word.
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    let word = bytes.get(at..at.checked_add(4)?)?;
+    Some(u32::from_le_bytes(word.try_into().ok()?) as usize)
+}
+
+fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8])> {
+    let damaged = |cause: String| fault("", cause).hint(DAMAGED);
+    let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
+        return Err(damaged(format!("the file ends inside its header, after {} bytes", bytes.len())));
+    };
+    if version != 2 {
+        return Err(
+            fault("", format!("binary glTF version {version} is not supported")).hint("export the scene as glTF 2.0")
+        );
+    }
+    if length > bytes.len() {
+        return Err(damaged(format!("the file is cut off: its header says {length} bytes, it has {}", bytes.len())));
+    }
+    let (mut json, mut binary, mut at) = (None, None, 12);
+    while at + 8 <= length {
+        let (Some(size), Some(kind)) = (word(bytes, at), bytes.get(at + 4..at + 8)) else { break };
+        let start = at + 8;
+        let Some(chunk) = bytes[..length].get(start..start.saturating_add(size)) else {
+            return Err(damaged(format!("the chunk at byte {at} runs past the end of the file")));
+        };
+        match kind {
+            b"JSON" if json.is_none() => json = Some(chunk),
+            b"BIN\0" if binary.is_none() => binary = Some(chunk),
+            _ => {}
+        }
+        // Chunks start at multiples of four.
+        at = start + size.next_multiple_of(4);
+    }
+    match json {
+        Some(json) => Ok((json, binary.unwrap_or(&[]))),
+        None => Err(damaged("the file holds no JSON chunk".into())),
+    }
+}
+
+/// Checks the version and the extensions that the document names. Unknown required ones are an error, optional ones warnings.
+pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> {
+    let asset = &document["asset"];
+    for key in ["version", "minVersion"] {
+        let Some(version) = asset[key].as_str() else {
+            if key == "minVersion" {
+                continue;
+            }
+            return Err(fault("asset", "the glTF version is missing").hint("export the scene as glTF 2.0"));
+        };
+        let newer = key == "minVersion" && version != "2.0";
+        if newer || !(version == "2" || version.starts_with("2.")) {
+            return Err(
+                fault("asset", format!("glTF version {version} is not supported")).hint("export the scene as glTF 2.0")
+            );
+        }
+    }
+    let listed = |key: &str| -> BTreeSet<String> {
+        let names = document[key].as_array().into_iter().flatten();
+        names.filter_map(|name| name.as_str().map(str::to_owned)).collect()
+    };
+    let required = listed("extensionsRequired");
+    let unknown: Vec<&String> = required.iter().filter(|name| !SUPPORTED.contains(&name.as_str())).collect();
+    if let Some(first) = unknown.first() {
+        let names: Vec<String> = unknown.iter().map(|name| format!("\"{name}\"")).collect();
+        let (word, are) = if unknown.len() == 1 { ("extension", "is") } else { ("extensions", "are") };
+        return Err(fault(
+            "extensionsRequired",
+            format!("{word} {} {are} required but not supported", names.join(", ")),
+        )
+        .hint(remedy(first)));
+    }
+    let mut used = listed("extensionsUsed");
+    collect(document, &mut used);
+    for name in used.iter().filter(|name| !SUPPORTED.contains(&name.as_str())) {
+        warnings.push(format!("extension \"{name}\" is not supported: what it says is ignored"));
+    }
+    Ok(())
+}
+
+fn remedy(extension: &str) -> &'static str {
+    match extension {
+        "KHR_draco_mesh_compression" => "export without mesh compression (Blender: Data > Compression off)",
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            "decompress the file, for instance with gltf-transform"
+        }
+        _ => "export the scene without this extension",
+    }
+}
+
+/// Names of the extensions that stand anywhere in the document, listed or not. Extras are the user's own.
+fn collect(value: &Value, names: &mut BTreeSet<String>) {
+    match value {
+        Value::Array(list) => list.iter().for_each(|item| collect(item, names)),
+        Value::Object(object) => {
+            for (key, item) in object {
+                match (key.as_str(), item) {
+                    ("extras", _) => {}
+                    ("extensions", Value::Object(extensions)) => {
+                        for (name, extension) in extensions {
+                            names.insert(name.clone());
+                            if SUPPORTED.contains(&name.as_str()) {
+                                collect(extension, names);
+                            }
+                        }
+                    }
+                    _ => collect(item, names),
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// What a value of a JSON document should have been.
+pub(super) fn malformed(place: impl std::fmt::Display, cause: &serde_json::Error) -> Error {
+    fault(place, cause).hint(DAMAGED)
+}

@@ -1,0 +1,163 @@
+//! `extras.caustique`: what glTF cannot say. Each kind of part has its keys; an unknown one is a warning with a suggestion.
+
+use super::container::malformed;
+use super::fault;
+use crate::error::Result;
+use crate::material::MediumParameters;
+use crate::math::Rgb;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+/// Extras of a scene.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct SceneExtras {
+    pub(super) environment: Option<EnvironmentExtras>,
+    pub(super) medium: Option<Medium>,
+    pub(super) light_units: Option<Units>,
+}
+
+/// Light from infinity: a colour or a file.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct EnvironmentExtras {
+    pub(super) color: Option<[f32; 3]>,
+    pub(super) file: Option<String>,
+    pub(super) rotation_deg: f32,
+    pub(super) strength: Option<f32>,
+}
+
+/// Units of punctual lights.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Units {
+    Radiometric,
+    Photometric,
+}
+
+/// A homogeneous medium (1/m).
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Medium {
+    sigma_a: [f32; 3],
+    sigma_s: [f32; 3],
+    g: f32,
+}
+
+impl Medium {
+    pub(super) fn parameters(&self, place: &str) -> Result<MediumParameters> {
+        let coefficients = self.sigma_a.iter().chain(&self.sigma_s);
+        if !coefficients.into_iter().all(|x| x.is_finite() && *x >= 0.0) {
+            return Err(fault(place, "sigma_a and sigma_s of a medium must be finite and not negative"));
+        }
+        if !(self.g > -1.0 && self.g < 1.0) {
+            return Err(fault(place, format!("g of a medium must lie between -1 and 1, it is {}", self.g)));
+        }
+        let (sigma_a, sigma_s) = (Rgb::from_array(self.sigma_a), Rgb::from_array(self.sigma_s));
+        Ok(MediumParameters { sigma_a, sigma_s, g: self.g })
+    }
+}
+
+/// Extras of a material.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct MaterialExtras {
+    pub(super) medium: Option<Medium>,
+    pub(super) priority: i32,
+}
+
+/// Extras of a camera, or of its node.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct CameraExtras {
+    pub(super) aperture_radius: Option<f32>,
+    pub(super) focus_distance: Option<f32>,
+}
+
+/// Extras of a light's node, or of the light.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct LightExtras {
+    pub(super) radius: Option<f32>,
+    pub(super) angle_deg: Option<f32>,
+}
+
+/// Keys of each kind; those of nested objects follow a dot.
+pub(super) const SCENE: &[&str] = &[
+    "environment",
+    "environment.color",
+    "environment.file",
+    "environment.rotation_deg",
+    "environment.strength",
+    "medium",
+    "medium.sigma_a",
+    "medium.sigma_s",
+    "medium.g",
+    "light_units",
+];
+pub(super) const MATERIAL: &[&str] = &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority"];
+pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance"];
+pub(super) const LIGHT: &[&str] = &["radius", "angle_deg"];
+pub(super) const NODE: &[&str] = &["aperture_radius", "focus_distance", "radius", "angle_deg"];
+
+/// `extras.caustique` of a part of the document; the default if there is none.
+pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> Result<T> {
+    match part.get("extras").and_then(|extras| extras.get("caustique")) {
+        None | Some(Value::Null) => Ok(T::default()),
+        Some(value) => T::deserialize(value).map_err(|e| {
+            let mut error = malformed(format!("{place}, extras.caustique"), &e);
+            error.hint = Some("the documentation lists the keys and their types".into());
+            error
+        }),
+    }
+}
+
+/// Warns of keys in `extras.caustique` that are not `known`.
+pub(super) fn check_keys(part: &Value, known: &[&str], place: &str, warnings: &mut Vec<String>) {
+    if let Some(value) = part.get("extras").and_then(|extras| extras.get("caustique")) {
+        check_object(value, "", known, place, warnings);
+    }
+}
+
+fn check_object(value: &Value, prefix: &str, known: &[&str], place: &str, warnings: &mut Vec<String>) {
+    for (key, item) in value.as_object().into_iter().flatten() {
+        let path = format!("{prefix}{key}");
+        if known.contains(&path.as_str()) {
+            check_object(item, &format!("{path}."), known, place, warnings);
+            continue;
+        }
+        let near = known.iter().map(|k| (distance(&path, k), k)).min();
+        let near = near.filter(|(d, k)| *d <= 3 || k.starts_with(&path));
+        let advice = near.map_or_else(String::new, |(_, k)| format!(" (did you mean \"{k}\"?)"));
+        warnings.push(format!("{place}: extras.caustique has no key \"{path}\"{advice}"));
+    }
+}
+
+/// Levenshtein's distance: insertions, deletions and substitutions between two words.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let best = (diagonal + usize::from(x != *y)).min(row[j] + 1).min(row[j + 1] + 1);
+            diagonal = std::mem::replace(&mut row[j + 1], best);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::distance;
+
+    #[test]
+    fn distances() {
+        assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("angle", "angle_deg"), 4);
+        assert_eq!(distance("radius", "radius"), 0);
+    }
+}

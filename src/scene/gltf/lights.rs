@@ -1,0 +1,187 @@
+//! KHR_lights_punctual and cameras.
+
+use super::document::{Document, get, named};
+use super::extras::{self, CameraExtras, LightExtras, Units};
+use super::{LightUnits, fault};
+use crate::error::Result;
+use crate::math::{DAffine3, Rgb};
+use crate::scene::description::{CameraDescription, Projection, PunctualKind, PunctualLight};
+use gltf::json::camera::Type;
+use gltf::json::validation::Checked;
+use serde::Deserialize;
+use serde_json::Value;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+/// Luminous efficacy (lm/W) with which Blender's exporter turns watts into lumens.
+const EFFICACY: f32 = 683.0;
+
+/// A light of KHR_lights_punctual.
+#[derive(Deserialize)]
+struct Light {
+    #[serde(rename = "type")]
+    kind: String,
+    #[serde(default)]
+    name: Option<String>,
+    #[serde(default = "white")]
+    color: [f32; 3],
+    #[serde(default = "one")]
+    intensity: f32,
+    #[serde(default)]
+    range: Option<f32>,
+    #[serde(default)]
+    spot: Spot,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct Spot {
+    inner_cone_angle: f32,
+    outer_cone_angle: f32,
+}
+
+impl Default for Spot {
+    fn default() -> Self {
+        Spot { inner_cone_angle: 0.0, outer_cone_angle: FRAC_PI_4 }
+    }
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+/// What divides intensities to make them radiometric.
+pub(super) fn divisor(document: &Document, units: LightUnits, said: Option<Units>, warnings: &mut Vec<String>) -> f32 {
+    match (units, said) {
+        (LightUnits::Radiometric, _) | (LightUnits::Auto, Some(Units::Radiometric)) => 1.0,
+        (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => EFFICACY,
+        (LightUnits::Auto, None) => {
+            let generator = document.raw["asset"]["generator"].as_str();
+            if generator.is_some_and(|g| g.starts_with("Khronos glTF Blender I/O")) {
+                return EFFICACY;
+            }
+            let who = generator.map_or("the file's generator".into(), |g| format!("generator \"{g}\""));
+            warnings.push(format!(
+                "{who} does not tell the unit of lamps: they are taken in W/sr and W/m2 (--light-units decides)"
+            ));
+            1.0
+        }
+    }
+}
+
+/// The light that stands on a node.
+pub(super) fn light(
+    document: &Document,
+    index: usize,
+    node: (&str, &Value),
+    to_world: DAffine3,
+    divisor: f32,
+    warnings: &mut Vec<String>,
+) -> Result<PunctualLight> {
+    let list = document.raw["extensions"]["KHR_lights_punctual"]["lights"].as_array();
+    let raw = get(list.map_or(&[][..], Vec::as_slice), index, "light")?;
+    let place = named("light", raw["name"].as_str().or(Some(node.0)), index);
+    let light = Light::deserialize(raw).map_err(|e| super::container::malformed(&place, &e))?;
+    let name =
+        Some(node.0.to_owned()).filter(|n| !n.is_empty()).or(light.name).unwrap_or_else(|| format!("light {index}"));
+    let mut intensity = Rgb::from_array(light.color) * light.intensity / divisor;
+    if !intensity.is_finite() {
+        return Err(fault(place, "its colour or intensity is not finite"));
+    }
+    if intensity.min_element() < 0.0 {
+        warnings.push(format!("{place}: its intensity is negative; it is taken as zero"));
+        intensity = intensity.max(Rgb::ZERO);
+    }
+    if light.range.is_some() {
+        warnings.push(format!("{place}: its range is ignored: light reaches as far as it does"));
+    }
+    extras::check_keys(raw, extras::LIGHT, &place, warnings);
+    let (on_light, on_node): (LightExtras, LightExtras) = (extras::read(raw, &place)?, extras::read(node.1, &place)?);
+    let length = |value: Option<f32>, what: &str| match value {
+        Some(x) if !(x.is_finite() && x >= 0.0) => {
+            Err(fault(&place, format!("extras.caustique.{what} must be finite and not negative, it is {x}")))
+        }
+        value => Ok(value.unwrap_or(0.0)),
+    };
+    let radius = length(on_node.radius.or(on_light.radius), "radius")?;
+    let angle = length(on_node.angle_deg.or(on_light.angle_deg), "angle_deg")?.to_radians();
+    let kind = match light.kind.as_str() {
+        "point" => PunctualKind::Point,
+        "spot" => cone(&light.spot, &place, warnings)?,
+        "directional" if angle <= PI => PunctualKind::Sun { angle },
+        "directional" => return Err(fault(place, "extras.caustique.angle_deg is above 180")),
+        other => return Err(fault(place, format!("its type \"{other}\" is unknown"))),
+    };
+    let sun = matches!(kind, PunctualKind::Sun { .. });
+    if (sun && radius > 0.0) || (!sun && angle > 0.0) {
+        let key = if sun { "radius" } else { "angle_deg" };
+        warnings.push(format!("{place}: extras.caustique.{key} says nothing about a {} light", light.kind));
+    }
+    Ok(PunctualLight { name, to_world, intensity, kind, radius: if sun { 0.0 } else { radius } })
+}
+
+fn cone(spot: &Spot, place: &str, warnings: &mut Vec<String>) -> Result<PunctualKind> {
+    let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
+    if !(inner.is_finite() && outer.is_finite()) {
+        return Err(fault(place, "its cone angles are not finite"));
+    }
+    let wide = outer.clamp(0.0, FRAC_PI_2);
+    let narrow = inner.clamp(0.0, wide);
+    if (narrow, wide) != (inner, outer) {
+        warnings.push(format!("{place}: its cone from {inner} to {outer} radians is taken as {narrow} to {wide}"));
+    }
+    Ok(PunctualKind::Spot { inner: narrow, outer: wide })
+}
+
+/// The camera that stands on a node.
+pub(super) fn camera(
+    document: &Document,
+    index: usize,
+    node: (&str, &Value),
+    to_world: DAffine3,
+    warnings: &mut Vec<String>,
+) -> Result<CameraDescription> {
+    let camera = get(&document.cameras, index, "camera")?;
+    let raw = document.part("cameras", index);
+    let place = named("camera", camera.name.as_deref().or(Some(node.0)), index);
+    let projection = match (&camera.type_, &camera.perspective, &camera.orthographic) {
+        (Checked::Valid(Type::Perspective), Some(p), _) => {
+            if !(p.yfov > 0.0 && p.yfov < PI) {
+                return Err(fault(place, format!("its yfov is {}; it must lie between 0 and pi", p.yfov)));
+            }
+            let aspect = p.aspect_ratio.filter(|a| a.is_finite() && *a > 0.0);
+            if aspect != p.aspect_ratio {
+                warnings.push(format!("{place}: its aspect ratio is not positive and is ignored"));
+            }
+            Projection::Perspective { yfov: p.yfov, aspect }
+        }
+        (Checked::Valid(Type::Orthographic), _, Some(o)) => {
+            let positive = |x: f32| x.is_finite() && x.abs() > 0.0;
+            if !(positive(o.xmag) && positive(o.ymag)) {
+                return Err(fault(place, "xmag and ymag must be finite and not zero"));
+            }
+            Projection::Orthographic { xmag: o.xmag.abs(), ymag: o.ymag.abs() }
+        }
+        _ => return Err(fault(place, "it is neither perspective nor orthographic")),
+    };
+    extras::check_keys(raw, extras::CAMERA, &place, warnings);
+    let (on_camera, on_node): (CameraExtras, CameraExtras) =
+        (extras::read(raw, &place)?, extras::read(node.1, &place)?);
+    let aperture_radius = on_node.aperture_radius.or(on_camera.aperture_radius).unwrap_or(0.0);
+    let focus_distance = on_node.focus_distance.or(on_camera.focus_distance);
+    if !(aperture_radius.is_finite() && aperture_radius >= 0.0) {
+        return Err(fault(place, "extras.caustique.aperture_radius must be finite and not negative"));
+    }
+    if focus_distance.is_some_and(|d| !(d.is_finite() && d > 0.0)) {
+        return Err(fault(place, "extras.caustique.focus_distance must be finite and positive"));
+    }
+    if aperture_radius > 0.0 && focus_distance.is_none() {
+        warnings.push(format!("{place}: it has an aperture but no focus_distance; 1 m is used"));
+    }
+    let name = if node.0.is_empty() { camera.name.clone().unwrap_or_else(|| place.clone()) } else { node.0.into() };
+    let focus_distance = focus_distance.unwrap_or(1.0);
+    Ok(CameraDescription { name, to_world, projection, aperture_radius, focus_distance })
+}

@@ -1,0 +1,333 @@
+//! One material: the specification's section 5.19 and the KHR_materials_* extensions, checked and put into our terms.
+
+use super::container::malformed;
+use super::document::{Document, extension};
+use super::extras::{self, MaterialExtras};
+use super::fault;
+use super::texture::{Info, Textures, Use};
+use crate::error::Result;
+use crate::material::{Alpha, Material, MediumParameters};
+use crate::math::Rgb;
+use crate::texture::TextureRef;
+use serde::Deserialize;
+use serde_json::Value;
+
+/// Defines what JSON holds: every field has its default and may be left out.
+macro_rules! record {
+    ($(#[$doc:meta])* $name:ident { $($field:ident: $kind:ty = $default:expr,)* }) => {
+        $(#[$doc])*
+        #[derive(Deserialize)]
+        #[serde(rename_all = "camelCase", default)]
+        struct $name { $($field: $kind,)* }
+
+        impl Default for $name {
+            fn default() -> Self {
+                $name { $($field: $default,)* }
+            }
+        }
+    };
+}
+
+type Texture = Option<Info>;
+
+record! { Core {
+    pbr_metallic_roughness: MetallicRoughness = MetallicRoughness::default(),
+    normal_texture: Texture = None,
+    occlusion_texture: Option<Value> = None,
+    emissive_texture: Texture = None,
+    emissive_factor: [f32; 3] = [0.0; 3],
+    alpha_mode: String = "OPAQUE".into(),
+    alpha_cutoff: f32 = 0.5,
+    double_sided: bool = false,
+}}
+record! { MetallicRoughness {
+    base_color_factor: [f32; 4] = [1.0; 4],
+    base_color_texture: Texture = None,
+    metallic_factor: f32 = 1.0,
+    roughness_factor: f32 = 1.0,
+    metallic_roughness_texture: Texture = None,
+}}
+record! { SpecularGlossiness {
+    diffuse_factor: [f32; 4] = [1.0; 4],
+    diffuse_texture: Texture = None,
+    specular_factor: [f32; 3] = [1.0; 3],
+    glossiness_factor: f32 = 1.0,
+    specular_glossiness_texture: Texture = None,
+}}
+record! { EmissiveStrength { emissive_strength: f32 = 1.0, }}
+record! { Ior { ior: f32 = 1.5, }}
+record! { Transmission { transmission_factor: f32 = 0.0, transmission_texture: Texture = None, }}
+record! { Volume {
+    thickness_factor: f32 = 0.0,
+    attenuation_distance: f32 = f32::INFINITY,
+    attenuation_color: [f32; 3] = [1.0; 3],
+}}
+record! { Specular {
+    specular_factor: f32 = 1.0,
+    specular_texture: Texture = None,
+    specular_color_factor: [f32; 3] = [1.0; 3],
+    specular_color_texture: Texture = None,
+}}
+record! { Clearcoat {
+    clearcoat_factor: f32 = 0.0,
+    clearcoat_texture: Texture = None,
+    clearcoat_roughness_factor: f32 = 0.0,
+    clearcoat_roughness_texture: Texture = None,
+    clearcoat_normal_texture: Option<Value> = None,
+}}
+record! { Sheen {
+    sheen_color_factor: [f32; 3] = [0.0; 3],
+    sheen_color_texture: Texture = None,
+    sheen_roughness_factor: f32 = 0.0,
+    sheen_roughness_texture: Texture = None,
+}}
+record! { Anisotropy {
+    anisotropy_strength: f32 = 0.0,
+    anisotropy_rotation: f32 = 0.0,
+    anisotropy_texture: Texture = None,
+}}
+record! { Dispersion { dispersion: f32 = 0.0, }}
+
+/// A material, and whether the file itself says that its meshes are solid or thin.
+pub(super) struct Loaded {
+    pub(super) material: Material,
+    /// `Some(true)`: a volume extension with a thickness, or a medium inside. `Some(false)`: a volume extension without thickness.
+    pub(super) solid: Option<bool>,
+    /// It has an occlusion texture, which is not read: occlusion is simulated.
+    pub(super) occlusion: bool,
+}
+
+/// Reads material `index`.
+///
+/// # Errors
+/// A number is not finite, or a texture cannot be had.
+pub(super) fn read(
+    document: &Document,
+    index: usize,
+    place: &str,
+    textures: &mut Textures,
+    warnings: &mut Vec<String>,
+) -> Result<Loaded> {
+    let raw = document.part("materials", index);
+    let core = Core::deserialize(raw).map_err(|e| malformed(place, &e))?;
+    let mut reader = Reader { document, raw, place, textures, warnings };
+    let pbr = core.pbr_metallic_roughness;
+    let name =
+        raw["name"].as_str().filter(|n| !n.is_empty()).map_or_else(|| format!("material {index}"), str::to_owned);
+    let mut material = Material {
+        name,
+        base_color: reader.units(pbr.base_color_factor, "baseColorFactor")?,
+        base_color_texture: reader.texture(pbr.base_color_texture, Use::Color, "baseColorTexture")?,
+        metallic: reader.unit(pbr.metallic_factor, "metallicFactor")?,
+        roughness: reader.unit(pbr.roughness_factor, "roughnessFactor")?,
+        metallic_roughness_texture: reader.texture(
+            pbr.metallic_roughness_texture,
+            Use::Data,
+            "metallicRoughnessTexture",
+        )?,
+        emission: reader.color(core.emissive_factor, f32::MAX, "emissiveFactor")?,
+        emission_texture: reader.texture(core.emissive_texture, Use::Color, "emissiveTexture")?,
+        alpha: match core.alpha_mode.as_str() {
+            "OPAQUE" => Alpha::Opaque,
+            "MASK" => Alpha::Mask(reader.range(core.alpha_cutoff, f32::MAX, "alphaCutoff")?),
+            "BLEND" => Alpha::Blend,
+            other => return Err(fault(place, format!("alpha mode \"{other}\" is unknown"))),
+        },
+        double_sided: core.double_sided,
+        ..Material::default()
+    };
+    if let Some(info) = core.normal_texture {
+        let scale = reader.finite(info.scale, "normalTexture.scale")?;
+        let texture = reader.texture(Some(info), Use::Data, "normalTexture")?;
+        material.normal_texture = texture.map(|t| (t, scale));
+    }
+    reader.specular_glossiness(&mut material)?;
+    reader.surface(&mut material)?;
+    reader.coatings(&mut material)?;
+    let solid = reader.transmission(&mut material)?;
+    Ok(Loaded { material, solid, occlusion: core.occlusion_texture.is_some() })
+}
+
+struct Reader<'r> {
+    document: &'r Document<'r>,
+    raw: &'r Value,
+    place: &'r str,
+    textures: &'r mut Textures,
+    warnings: &'r mut Vec<String>,
+}
+
+impl Reader<'_> {
+    fn extension<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
+        extension(self.raw, name, self.place)
+    }
+
+    fn finite(&self, x: f32, name: &str) -> Result<f32> {
+        if x.is_finite() { Ok(x) } else { Err(fault(self.place, format!("{name} is not finite"))) }
+    }
+
+    /// A number in `[0, most]`; others are moved there, with a warning.
+    fn range(&mut self, x: f32, most: f32, name: &str) -> Result<f32> {
+        let inside = self.finite(x, name)?.clamp(0.0, most);
+        if inside != x {
+            self.warnings.push(format!("{}: {name} is {x}; {inside} is used", self.place));
+        }
+        Ok(inside)
+    }
+
+    fn unit(&mut self, x: f32, name: &str) -> Result<f32> {
+        self.range(x, 1.0, name)
+    }
+
+    fn units<const N: usize>(&mut self, mut x: [f32; N], name: &str) -> Result<[f32; N]> {
+        for value in &mut x {
+            *value = self.unit(*value, name)?;
+        }
+        Ok(x)
+    }
+
+    fn color(&mut self, c: [f32; 3], most: f32, name: &str) -> Result<Rgb> {
+        let [r, g, b] = c;
+        Ok(Rgb::new(self.range(r, most, name)?, self.range(g, most, name)?, self.range(b, most, name)?))
+    }
+
+    fn texture(&mut self, info: Texture, usage: Use, name: &str) -> Result<Option<TextureRef>> {
+        let Some(info) = info else { return Ok(None) };
+        let place = format!("{}, {name}", self.place);
+        self.textures.reference(self.document, &info, usage, &place, self.warnings).map(Some)
+    }
+
+    /// KHR_materials_pbrSpecularGlossiness: a dielectric whose reflectance at normal incidence is the specular colour, which
+    /// KHR_materials_ior's legacy index 0 (Fresnel's factor is 1 before the specular colour) expresses.
+    fn specular_glossiness(&mut self, material: &mut Material) -> Result<()> {
+        const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
+        let Some(old) = self.extension::<SpecularGlossiness>(NAME)? else { return Ok(()) };
+        self.warnings.push(format!("{}: {NAME} is translated, so highlights differ a little", self.place));
+        material.base_color = self.units(old.diffuse_factor, "diffuseFactor")?;
+        material.base_color_texture = self.texture(old.diffuse_texture, Use::Color, "diffuseTexture")?;
+        material.metallic = 0.0;
+        material.metallic_roughness_texture = None;
+        material.ior = f32::INFINITY;
+        material.specular_color = self.color(old.specular_factor, 1.0, "specularFactor")?;
+        let glossiness = self.unit(old.glossiness_factor, "glossinessFactor")?;
+        material.roughness = 1.0 - glossiness;
+        if let Some(info) = old.specular_glossiness_texture {
+            let name = "specularGlossinessTexture";
+            material.specular_color_texture = self.texture(Some(info.clone()), Use::Color, name)?;
+            if glossiness == 1.0 {
+                material.roughness = 1.0;
+                material.metallic_roughness_texture = self.texture(Some(info), Use::Glossiness, name)?;
+            } else {
+                self.warnings.push(format!("{}: the glossiness texture is ignored beside its factor", self.place));
+            }
+        }
+        Ok(())
+    }
+
+    fn surface(&mut self, material: &mut Material) -> Result<()> {
+        if let Some(e) = self.extension::<EmissiveStrength>("KHR_materials_emissive_strength")? {
+            material.emission *= self.range(e.emissive_strength, f32::MAX, "emissiveStrength")?;
+            if !material.emission.is_finite() {
+                return Err(fault(self.place, "its emission is not finite"));
+            }
+        }
+        material.unlit = self.extension::<Value>("KHR_materials_unlit")?.is_some();
+        if let Some(e) = self.extension::<Ior>("KHR_materials_ior")? {
+            material.ior = match self.finite(e.ior, "ior")? {
+                0.0 => f32::INFINITY,
+                ior if ior < 1.0 => {
+                    self.warnings.push(format!("{}: an index of refraction of {ior} is raised to 1", self.place));
+                    1.0
+                }
+                ior => ior,
+            };
+        }
+        if let Some(e) = self.extension::<Specular>("KHR_materials_specular")? {
+            material.specular = self.unit(e.specular_factor, "specularFactor")?;
+            material.specular_texture = self.texture(e.specular_texture, Use::Data, "specularTexture")?;
+            material.specular_color = self.color(e.specular_color_factor, f32::MAX, "specularColorFactor")?;
+            material.specular_color_texture =
+                self.texture(e.specular_color_texture, Use::Color, "specularColorTexture")?;
+        }
+        if let Some(e) = self.extension::<Dispersion>("KHR_materials_dispersion")? {
+            material.dispersion = self.range(e.dispersion, f32::MAX, "dispersion")?;
+        }
+        Ok(())
+    }
+
+    fn coatings(&mut self, material: &mut Material) -> Result<()> {
+        if let Some(e) = self.extension::<Clearcoat>("KHR_materials_clearcoat")? {
+            material.clearcoat = self.unit(e.clearcoat_factor, "clearcoatFactor")?;
+            material.clearcoat_texture = self.texture(e.clearcoat_texture, Use::Data, "clearcoatTexture")?;
+            material.clearcoat_roughness = self.unit(e.clearcoat_roughness_factor, "clearcoatRoughnessFactor")?;
+            material.clearcoat_roughness_texture =
+                self.texture(e.clearcoat_roughness_texture, Use::Data, "clearcoatRoughnessTexture")?;
+            if e.clearcoat_normal_texture.is_some() {
+                self.warnings.push(format!("{}: clearcoatNormalTexture is ignored", self.place));
+            }
+        }
+        if let Some(e) = self.extension::<Sheen>("KHR_materials_sheen")? {
+            material.sheen_color = self.color(e.sheen_color_factor, 1.0, "sheenColorFactor")?;
+            material.sheen_color_texture = self.texture(e.sheen_color_texture, Use::Color, "sheenColorTexture")?;
+            material.sheen_roughness = self.unit(e.sheen_roughness_factor, "sheenRoughnessFactor")?;
+            material.sheen_roughness_texture =
+                self.texture(e.sheen_roughness_texture, Use::Data, "sheenRoughnessTexture")?;
+        }
+        if let Some(e) = self.extension::<Anisotropy>("KHR_materials_anisotropy")? {
+            material.anisotropy = self.unit(e.anisotropy_strength, "anisotropyStrength")?;
+            material.anisotropy_rotation = self.finite(e.anisotropy_rotation, "anisotropyRotation")?;
+            material.anisotropy_texture = self.texture(e.anisotropy_texture, Use::Data, "anisotropyTexture")?;
+        }
+        Ok(())
+    }
+
+    /// Transmission, and what fills the solid; whether the file itself says that it is one.
+    fn transmission(&mut self, material: &mut Material) -> Result<Option<bool>> {
+        if let Some(e) = self.extension::<Transmission>("KHR_materials_transmission")? {
+            material.transmission = self.unit(e.transmission_factor, "transmissionFactor")?;
+            material.transmission_texture = self.texture(e.transmission_texture, Use::Data, "transmissionTexture")?;
+        }
+        let mut solid = None;
+        if let Some(e) = self.extension::<Volume>("KHR_materials_volume")? {
+            let thick = self.range(e.thickness_factor, f32::MAX, "thicknessFactor")? > 0.0;
+            solid = Some(thick);
+            if thick {
+                material.medium = self.absorption(e.attenuation_distance, e.attenuation_color)?;
+            }
+        }
+        extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
+        let said: MaterialExtras = extras::read(self.raw, self.place)?;
+        material.priority = said.priority;
+        if let Some(medium) = said.medium {
+            material.medium = Some(medium.parameters(self.place)?);
+            solid = Some(true);
+        }
+        if material.transmission == 0.0 && material.medium.is_some_and(|m| m != MediumParameters::default()) {
+            self.warnings.push(format!("{}: its medium is ignored: no light is transmitted", self.place));
+            material.medium = None;
+        }
+        Ok(solid)
+    }
+
+    /// sigma_a = -ln(c) / d: after distance d the colour c is left (KHR_materials_volume).
+    fn absorption(&mut self, distance: f32, color: [f32; 3]) -> Result<Option<MediumParameters>> {
+        /// What passes is never nothing: sigma_a stays finite.
+        const LEAST: f32 = 1e-6;
+        let c = self.color(color, 1.0, "attenuationColor")?;
+        if c == Rgb::ONE || distance == f32::INFINITY {
+            return Ok(None);
+        }
+        if distance.is_nan() || distance <= 0.0 {
+            self.warnings
+                .push(format!("{}: attenuationDistance {distance} is not positive: nothing is absorbed", self.place));
+            return Ok(None);
+        }
+        if c.min_element() < LEAST {
+            self.warnings.push(format!("{}: attenuationColor is raised to {LEAST}, absorption is finite", self.place));
+        }
+        let sigma_a = -c.max(Rgb::splat(LEAST)).map(f32::ln) / distance;
+        if !sigma_a.is_finite() {
+            return Err(fault(self.place, "its absorption is not finite"));
+        }
+        Ok(Some(MediumParameters { sigma_a, ..MediumParameters::default() }))
+    }
+}

@@ -1,0 +1,141 @@
+//! The materials that a scene uses, each once, or twice where its closed meshes are solid and its open ones thin.
+
+use super::Glass;
+use super::document::{Document, get, named};
+use super::material::{self, Loaded};
+use super::texture::Textures;
+use super::topology::Solid;
+use crate::error::Result;
+use crate::geometry::Mesh;
+use crate::material::Material;
+use crate::texture::TextureRef;
+use std::collections::HashMap;
+
+/// Loads materials as meshes call for them.
+pub(super) struct Library {
+    glass: Glass,
+    /// Those called for.
+    pub(super) list: Vec<Material>,
+    pub(super) textures: Textures,
+    loaded: HashMap<Option<usize>, Loaded>,
+    /// By material of the file and whether it is solid.
+    known: HashMap<(Option<usize>, bool), u32>,
+    /// Materials with an occlusion texture.
+    pub(super) occluded: usize,
+}
+
+impl Library {
+    pub(super) fn new(glass: Glass) -> Library {
+        let (list, textures) = (Vec::new(), Textures::default());
+        Library { glass, list, textures, loaded: HashMap::new(), known: HashMap::new(), occluded: 0 }
+    }
+
+    /// The material of a mesh that bounds `bounds`.
+    pub(super) fn wear(
+        &mut self,
+        document: &Document,
+        index: Option<usize>,
+        mesh: &Mesh,
+        bounds: Solid,
+        warnings: &mut Vec<String>,
+    ) -> Result<u32> {
+        let closed = bounds.closed;
+        let place = place(document, index)?;
+        if !self.loaded.contains_key(&index) {
+            let loaded = match index {
+                Some(i) => material::read(document, i, &place, &mut self.textures, warnings)?,
+                None => Loaded { material: default(), solid: None, occlusion: false },
+            };
+            self.occluded += usize::from(loaded.occlusion);
+            self.loaded.insert(index, loaded);
+        }
+        let loaded = &self.loaded[&index];
+        let transmits = loaded.material.transmission > 0.0;
+        let solid = transmits
+            && loaded.solid.unwrap_or(match self.glass {
+                Glass::Auto => closed,
+                Glass::Solid => true,
+                Glass::Thin => false,
+            });
+        if solid && !closed {
+            let why = match bounds.flipped {
+                true => "part of its faces is turned over: recalculate its normals",
+                false => "the mesh is not closed: light may get lost inside",
+            };
+            warnings.push(format!("mesh \"{}\": its {place} is solid, but {why}", mesh.name));
+        }
+        check_coordinates(&loaded.material, mesh, &place, warnings);
+        if let Some(&known) = self.known.get(&(index, solid)) {
+            return Ok(known);
+        }
+        if transmits && loaded.solid.is_none() && self.glass == Glass::Auto {
+            let split = self.known.contains_key(&(index, !solid));
+            match (solid, split) {
+                (true, _) => warnings.push(format!(
+                    "{place}: it transmits light but has no volume extension; closed meshes such as \"{}\" are taken for \
+                     solid glass (--glass solid or thin decides)",
+                    mesh.name
+                )),
+                (false, true) => warnings.push(format!(
+                    "{place}: it is solid on closed meshes, thin on open ones such as \"{}\" (--glass solid or thin decides)",
+                    mesh.name
+                )),
+                (false, false) => {}
+            }
+        }
+        let mut material = loaded.material.clone();
+        material.thin = !solid;
+        let known = self.list.len() as u32;
+        self.list.push(material);
+        self.known.insert((index, solid), known);
+        Ok(known)
+    }
+}
+
+fn place(document: &Document, index: Option<usize>) -> Result<String> {
+    let Some(i) = index else { return Ok("default material".into()) };
+    let list = document.raw["materials"].as_array().map_or(&[][..], Vec::as_slice);
+    Ok(named("material", get(list, i, "material")?["name"].as_str(), i))
+}
+
+/// The specification's default (section 3.9.1), for primitives without a material.
+fn default() -> Material {
+    Material { name: "default".into(), ..Material::default() }
+}
+
+fn uses(material: &Material) -> impl Iterator<Item = TextureRef> {
+    [
+        material.base_color_texture,
+        material.metallic_roughness_texture,
+        material.normal_texture.map(|(t, _)| t),
+        material.emission_texture,
+        material.transmission_texture,
+        material.specular_texture,
+        material.specular_color_texture,
+        material.clearcoat_texture,
+        material.clearcoat_roughness_texture,
+        material.sheen_color_texture,
+        material.sheen_roughness_texture,
+        material.anisotropy_texture,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &mut Vec<String>) {
+    for set in 0..2 {
+        if mesh.uvs[set].is_empty() && uses(material).any(|t| usize::from(t.set) == set) {
+            warnings.push(format!(
+                "mesh \"{}\": it lacks the texture coordinates {set} that its {place} reads; one texel covers it",
+                mesh.name
+            ));
+        }
+    }
+}
+
+/// The texture coordinates along which a material wants tangents.
+pub(super) fn tangent_set(material: &Material) -> Option<usize> {
+    let normal = material.normal_texture.map(|(t, _)| t.set);
+    let anisotropy = material.anisotropy_texture.map_or(0, |t| t.set);
+    normal.or((material.anisotropy > 0.0).then_some(anisotropy)).map(usize::from)
+}

@@ -1,0 +1,91 @@
+//! Reads glTF 2.0 (`.glb`, `.gltf`) as Blender exports it, and as others do, into a [`Description`].
+//!
+//! The specification: <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate names the parts of a
+//! document; what they say about indices, ranges and bytes is checked here, because files come from anywhere: a fault is an
+//! error that names its place, and whatever is ignored or approximated is a warning.
+//!
+//! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `nodes` (the hierarchy), which
+//! calls for meshes, materials and textures as it meets them, so that what no node uses is not even decoded.
+
+mod accessor;
+mod container;
+mod document;
+mod extras;
+mod lights;
+mod material;
+mod materials;
+mod mesh;
+mod nodes;
+mod shading_frame;
+mod texture;
+mod topology;
+mod uri;
+
+use super::Description;
+use crate::error::{Error, Kind, Result};
+use std::fmt::Display;
+use std::path::Path;
+
+/// What the numbers of punctual lights mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum LightUnits {
+    /// `extras.caustique.light_units` of the scene, or else the generator: Blender's exporter multiplies watts by 683 lm/W (and
+    /// leaves emissive surfaces alone), so its files are photometric. Other files state lamps and emissive surfaces in one
+    /// system, so their ratio holds when lamps are taken as they are.
+    #[default]
+    Auto,
+    /// W/sr and W/m2: taken as they are.
+    Radiometric,
+    /// cd and lx: divided by 683 lm/W.
+    Photometric,
+}
+
+/// What a transmissive mesh without a volume extension is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Glass {
+    /// Solid where the mesh is closed, thin where it is open.
+    #[default]
+    Auto,
+    /// The boundary of a solid: light refracts.
+    Solid,
+    /// A thin wall, as the glTF specification says: light passes straight.
+    Thin,
+}
+
+/// How to read what a file leaves open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct ReadOptions {
+    /// Units of punctual lights.
+    pub light_units: LightUnits,
+    /// Glass without a volume extension.
+    pub glass: Glass,
+}
+
+/// Reads the scene file at `path`; buffers, textures and the environment that it names are looked for beside it.
+///
+/// # Errors
+/// The file or one that it names cannot be read, is damaged, or requires an extension that is not supported. The place in
+/// the error names the file and the part of it.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
+    let bytes = std::fs::read(path)
+        .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
+    read_bytes(&bytes, path, options)
+}
+
+/// Like [`read`], from the bytes of a file that stands (or would stand) at `path`.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_bytes(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
+    nodes::describe(bytes, path, options).map_err(|e| e.within(path.display()))
+}
+
+/// `1 vertex`, `2 vertices`.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// A fault of the scene file at a place in it.
+fn fault(place: impl Display, cause: impl Display) -> Error {
+    Error::new(Kind::Scene, place, cause)
+}

@@ -1,0 +1,392 @@
+//! The node hierarchy: transforms composed in f64, and what stands on the nodes.
+
+use super::document::{Document, extension, get, named};
+use super::extras::{self, SceneExtras};
+use super::materials::{Library, tangent_set};
+use super::mesh::FARTHEST;
+use super::{ReadOptions, counted, fault, lights, mesh, shading_frame, topology};
+use crate::error::Result;
+use crate::geometry::Mesh;
+use crate::math::{DAffine3, DMat3, DVec3, Rgb};
+use crate::scene::Description;
+use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Placed};
+use crate::scene::environment_file;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+/// More copies of one node than this are taken for damage.
+const MOST_COPIES: usize = 1 << 24;
+
+/// Turns the bytes of a file into a description.
+pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
+    let mut warnings = Vec::new();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let document = Document::parse(bytes, folder, &mut warnings)?;
+    let mut reader = Reader {
+        document: &document,
+        library: Library::new(options.glass),
+        meshes: HashMap::new(),
+        bounds: Vec::new(),
+        divisor: None,
+        options: *options,
+        scene: SceneExtras::default(),
+        out: Description { source: path.to_owned(), warnings, ..Description::default() },
+    };
+    reader.scene()?;
+    let Reader { library, mut out, .. } = reader;
+    if library.occluded > 0 {
+        let n = library.occluded;
+        let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
+        out.warnings.push(format!("{n} {plural}, ignored: occlusion is simulated"));
+    }
+    let mut said = HashSet::new();
+    out.warnings.retain(|warning| said.insert(warning.clone()));
+    out.materials = library.list;
+    out.textures = library.textures.list;
+    Ok(out)
+}
+
+/// KHR_node_visibility.
+#[derive(Deserialize)]
+struct Visibility {
+    #[serde(default = "visible")]
+    visible: bool,
+}
+
+fn visible() -> bool {
+    true
+}
+
+/// A reference to a light.
+#[derive(Deserialize)]
+struct LightReference {
+    light: u32,
+}
+
+/// EXT_mesh_gpu_instancing.
+#[derive(Deserialize)]
+struct Instancing {
+    attributes: HashMap<String, u32>,
+}
+
+/// A primitive that is ready to be placed.
+#[derive(Clone, Copy)]
+struct Part {
+    mesh: u32,
+    material: u32,
+}
+
+struct Reader<'r> {
+    document: &'r Document<'r>,
+    library: Library,
+    /// By mesh of the file.
+    meshes: HashMap<usize, Vec<Part>>,
+    /// Local bounds of the meshes read.
+    bounds: Vec<(DVec3, DVec3)>,
+    /// What divides intensities, once it is known.
+    divisor: Option<f32>,
+    options: ReadOptions,
+    scene: SceneExtras,
+    out: Description,
+}
+
+impl Reader<'_> {
+    fn scene(&mut self) -> Result<()> {
+        let document = self.document;
+        let index = match document.raw.get("scene") {
+            None => 0,
+            Some(value) => {
+                let index = value.as_u64().and_then(|i| usize::try_from(i).ok());
+                let index = index.ok_or_else(|| fault("scene", "the default scene is not an index"))?;
+                get(&document.scenes, index, "scene").map(|_| index)?
+            }
+        };
+        let roots = match document.scenes.get(index) {
+            Some(scene) => scene.nodes.iter().map(|n| n.value()).collect(),
+            None => self.orphans(),
+        };
+        let place = named("scene", document.part("scenes", index)["name"].as_str(), index);
+        let raw = document.part("scenes", index);
+        extras::check_keys(raw, extras::SCENE, &place, &mut self.out.warnings);
+        self.scene = extras::read(raw, &place)?;
+        if let Some(medium) = &self.scene.medium {
+            self.out.medium = Some(medium.parameters(&place)?);
+        }
+        self.environment(&place).map_err(|e| e.within(&place))?;
+        self.walk(roots)?;
+        if let Some(animations) = document.raw["animations"].as_array().filter(|a| !a.is_empty()) {
+            let n = counted(animations.len(), "animation", "animations");
+            self.out.warnings.push(format!("{n} ignored: the nodes are rendered where they stand"));
+        }
+        Ok(())
+    }
+
+    /// Nodes that are nobody's child: a file may have no scene.
+    fn orphans(&self) -> Vec<usize> {
+        let nodes = &self.document.nodes;
+        let mut child = vec![false; nodes.len()];
+        for index in nodes.iter().flat_map(|n| n.children.iter().flatten()) {
+            if let Some(flag) = child.get_mut(index.value()) {
+                *flag = true;
+            }
+        }
+        (0..nodes.len()).filter(|i| !child[*i]).collect()
+    }
+
+    fn environment(&mut self, place: &str) -> Result<()> {
+        let Some(said) = &self.scene.environment else { return Ok(()) };
+        let strength = said.strength.unwrap_or(1.0);
+        if !(strength.is_finite() && strength >= 0.0 && said.rotation_deg.is_finite()) {
+            return Err(fault("environment", "strength and rotation_deg must be finite, strength not negative"));
+        }
+        let source = match (&said.color, &said.file) {
+            (Some(color), None) => {
+                let color = Rgb::from_array(*color);
+                if !(color.is_finite() && color.min_element() >= 0.0) {
+                    return Err(fault("environment", "its color must be finite and not negative"));
+                }
+                EnvironmentSource::Color(color)
+            }
+            (None, Some(file)) => environment_file::read(&self.document.folder.join(file), &mut self.out.warnings)?,
+            _ => {
+                self.out
+                    .warnings
+                    .push(format!("{place}: the environment has not one of color and file and is ignored"));
+                return Ok(());
+            }
+        };
+        self.out.environment = Some(EnvironmentDescription { source, rotation_deg: said.rotation_deg, strength });
+        Ok(())
+    }
+
+    /// Visits the nodes in the file's order, parents first, each once: nodes make trees (specification, section 3.5.2).
+    fn walk(&mut self, roots: Vec<usize>) -> Result<()> {
+        let document = self.document;
+        let mut seen = vec![false; document.nodes.len()];
+        let mut stack: Vec<(usize, DAffine3, bool)> =
+            roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY, true)).collect();
+        while let Some((index, parent, shown)) = stack.pop() {
+            let node = get(&document.nodes, index, "node")?;
+            let place = named("node", node.name.as_deref(), index);
+            if std::mem::replace(&mut seen[index], true) {
+                return Err(fault(place, "it is its own ancestor, or the child of two nodes")
+                    .hint("the file is damaged: export it again"));
+            }
+            let raw = document.part("nodes", index);
+            let to_world = parent * local(raw, &place)?;
+            if !finite(&to_world) {
+                return Err(fault(place, "its transform is not finite").hint("look at its scale and position"));
+            }
+            let shown = shown
+                && extension::<Visibility>(raw, "KHR_node_visibility", &place)?
+                    .is_none_or(|visibility| visibility.visible);
+            self.node(index, raw, &place, to_world, shown)?;
+            for child in node.children.iter().flatten().rev() {
+                get(&document.nodes, child.value(), "node").map_err(|e| e.within(&place))?;
+                stack.push((child.value(), to_world, shown));
+            }
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, index: usize, raw: &Value, place: &str, to_world: DAffine3, shown: bool) -> Result<()> {
+        let document = self.document;
+        let node = &document.nodes[index];
+        let name = node.name.clone().unwrap_or_default();
+        extras::check_keys(raw, extras::NODE, place, &mut self.out.warnings);
+        if let Some(camera) = node.camera {
+            let warnings = &mut self.out.warnings;
+            let camera = lights::camera(document, camera.value(), (&name, raw), to_world, warnings);
+            self.out.cameras.push(camera.map_err(|e| e.within(place))?);
+        }
+        if !shown {
+            return Ok(());
+        }
+        if let Some(reference) = extension::<LightReference>(raw, "KHR_lights_punctual", place)? {
+            let (units, said) = (self.options.light_units, self.scene.light_units);
+            let warnings = &mut self.out.warnings;
+            let divisor = *self.divisor.get_or_insert_with(|| lights::divisor(document, units, said, warnings));
+            let light = lights::light(document, reference.light as usize, (&name, raw), to_world, divisor, warnings);
+            self.out.lights.push(light.map_err(|e| e.within(place))?);
+        }
+        if let Some(mesh) = node.mesh {
+            let mesh = mesh.value();
+            let mesh_name = get(&document.meshes, mesh, "mesh").map_err(|e| e.within(place))?.name.clone();
+            let known = |name: &String| !name.is_empty();
+            let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
+            self.place(mesh, name, self.copies(raw, place)?, to_world, place)?;
+        }
+        Ok(())
+    }
+
+    /// Places a mesh, once for each of `copies`.
+    fn place(
+        &mut self,
+        mesh: usize,
+        name: String,
+        copies: Vec<DAffine3>,
+        to_world: DAffine3,
+        place: &str,
+    ) -> Result<()> {
+        let parts = self.parts(mesh)?;
+        if parts.is_empty() {
+            return Ok(());
+        }
+        let object = self.out.objects.len() as u32;
+        self.out.objects.push(name.clone());
+        let mut flat = 0;
+        for copy in copies {
+            let to_world = to_world * copy;
+            if !can_be_inverted(&to_world) {
+                flat += 1;
+                continue;
+            }
+            for &Part { mesh, material } in &parts {
+                self.check_reach(mesh, &to_world, place)?;
+                self.out.instances.push(Placed { name: name.clone(), mesh, material, object, to_world });
+            }
+        }
+        if flat > 0 {
+            self.out.warnings.push(format!("{place}: it is left out, because its scale is zero along an axis"));
+        }
+        Ok(())
+    }
+
+    fn check_reach(&self, mesh: u32, to_world: &DAffine3, place: &str) -> Result<()> {
+        let (low, high) = self.bounds[mesh as usize];
+        let far = |i: usize| {
+            let corner = DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), low, high);
+            let reach = to_world.transform_point3(corner).abs().max_element();
+            reach.is_nan() || reach > FARTHEST
+        };
+        if (0..8).any(far) {
+            return Err(fault(place, "it reaches too far from the origin").hint("look at its scale and position"));
+        }
+        Ok(())
+    }
+
+    /// The primitives of a mesh with their materials, read at the first call.
+    fn parts(&mut self, index: usize) -> Result<Vec<Part>> {
+        if let Some(parts) = self.meshes.get(&index) {
+            return Ok(parts.clone());
+        }
+        let document = self.document;
+        let source = get(&document.meshes, index, "mesh")?;
+        let mut read: Vec<(usize, Mesh)> = Vec::new();
+        for i in 0..source.primitives.len() {
+            if let Some(mesh) = mesh::read(document, index, i, &mut self.out.warnings)? {
+                read.push((i, mesh));
+            }
+        }
+        // A solid may wear several materials: what counts for glass is the surface as a whole.
+        let whole = topology::solid(&read.iter().map(|(_, m)| m).collect::<Vec<_>>());
+        let mut parts = Vec::new();
+        let alone = read.len() == 1;
+        for (i, mut mesh) in read {
+            let own = if alone { whole } else { topology::solid(&[&mesh]) };
+            mesh.closed = own.closed;
+            let place = format!("{}, primitive {i}", named("mesh", source.name.as_deref(), index));
+            let dropped = mesh::drop_degenerate(&mut mesh);
+            if dropped > 0 {
+                self.out
+                    .warnings
+                    .push(format!("{place}: {} without area left out", counted(dropped, "triangle", "triangles")));
+            }
+            if mesh.triangles.is_empty() {
+                self.out.warnings.push(format!("{place}: it has no triangle to render"));
+                continue;
+            }
+            let warnings = &mut self.out.warnings;
+            let index = source.primitives[i].material.map(|m| m.value());
+            let bounds = if own.closed { own } else { whole };
+            let material = self
+                .library
+                .wear(document, index, &mesh, bounds, warnings)
+                .map_err(|e| if e.place.is_empty() { e.within(&place) } else { e })?;
+            let worn = &self.library.list[material as usize];
+            if worn.is_solid_glass() && bounds.closed && bounds.volume < 0.0 {
+                warnings.push(format!(
+                    "{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"
+                ));
+            }
+            if mesh.tangents.is_empty()
+                && let Some(set) = tangent_set(worn)
+            {
+                shading_frame::make_tangents(&mut mesh, set);
+            }
+            parts.push(Part { mesh: self.out.meshes.len() as u32, material });
+            let points = || mesh.positions.iter().map(|p| p.as_dvec3());
+            let low = points().fold(DVec3::INFINITY, DVec3::min);
+            self.bounds.push((low, points().fold(DVec3::NEG_INFINITY, DVec3::max)));
+            self.out.meshes.push(mesh);
+        }
+        self.meshes.insert(index, parts.clone());
+        Ok(parts)
+    }
+
+    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing): itself without the extension.
+    fn copies(&self, raw: &Value, place: &str) -> Result<Vec<DAffine3>> {
+        const NAME: &str = "EXT_mesh_gpu_instancing";
+        let Some(instancing) = extension::<Instancing>(raw, NAME, place)? else { return Ok(vec![DAffine3::IDENTITY]) };
+        let within = |e: crate::error::Error| e.within(format!("{place}, {NAME}"));
+        let index = |key: &str| instancing.attributes.get(key).map(|i| *i as usize);
+        let read3 = |key: &str| index(key).map(|i| self.document.floats::<3>(i)).transpose().map_err(within);
+        let (moves, scales) = (read3("TRANSLATION")?, read3("SCALE")?);
+        let turns = index("ROTATION").map(|i| self.document.floats::<4>(i)).transpose().map_err(within)?;
+        let counts = [moves.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), turns.as_ref().map(Vec::len)];
+        let n = counts.iter().flatten().copied().max().unwrap_or(0);
+        if counts.iter().flatten().any(|c| *c != n) || n > MOST_COPIES {
+            return Err(within(fault("", "its attributes differ in length, or are too long")));
+        }
+        let copy = |i: usize| {
+            let three = |v: &Option<Vec<[f32; 3]>>| v.as_ref().map(|v| v[i].map(f64::from));
+            let turn = turns.as_ref().map(|v| v[i].map(f64::from));
+            let copy = compose(three(&moves), turn, three(&scales)).filter(finite);
+            copy.ok_or_else(|| within(fault("", format!("the transform of copy {i} is not finite"))))
+        };
+        (0..n).map(copy).collect()
+    }
+}
+
+/// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3), with
+/// all the digits of the file.
+fn local(raw: &Value, place: &str) -> Result<DAffine3> {
+    fn numbers<const N: usize>(raw: &Value, key: &str, place: &str) -> Result<Option<[f64; N]>> {
+        let Some(value) = raw.get(key) else { return Ok(None) };
+        let list = value.as_array().map_or(&[][..], Vec::as_slice);
+        let numbers: Option<Vec<f64>> = list.iter().map(Value::as_f64).collect();
+        let numbers = numbers.and_then(|n| <[f64; N]>::try_from(n).ok());
+        numbers.map(Some).ok_or_else(|| fault(place, format!("its {key} is not {N} numbers")))
+    }
+    if let Some(m) = numbers::<16>(raw, "matrix", place)? {
+        if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
+            return Err(fault(place, "the last row of its matrix is not 0, 0, 0, 1"));
+        }
+        let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
+        return Ok(DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) });
+    }
+    let (t, r, s) =
+        (numbers(raw, "translation", place)?, numbers(raw, "rotation", place)?, numbers(raw, "scale", place)?);
+    compose(t, r, s).ok_or_else(|| fault(place, "its rotation is not a quaternion"))
+}
+
+/// Scale, then rotation (a quaternion, made unit), then translation. `None`: the rotation has no direction.
+fn compose(t: Option<[f64; 3]>, r: Option<[f64; 4]>, s: Option<[f64; 3]>) -> Option<DAffine3> {
+    let rotation = glam::DVec4::from_array(r.unwrap_or([0.0, 0.0, 0.0, 1.0])).try_normalize()?;
+    let (t, s) = (DVec3::from_array(t.unwrap_or([0.0; 3])), DVec3::from_array(s.unwrap_or([1.0; 3])));
+    Some(DAffine3::from_scale_rotation_translation(s, glam::DQuat::from_vec4(rotation), t))
+}
+
+fn finite(transform: &DAffine3) -> bool {
+    transform.matrix3.is_finite() && transform.translation.is_finite()
+}
+
+/// Whether f32 can hold the inverse of a transform.
+fn can_be_inverted(transform: &DAffine3) -> bool {
+    let inverse = transform.matrix3.inverse();
+    transform.matrix3.determinant() != 0.0
+        && inverse.is_finite()
+        && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
+}

@@ -1,0 +1,63 @@
+//! What an iteration costs, and what levels and the second eye path add: variants interleaved in one run, core-seconds per phase.
+//!
+//! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/figures`.
+
+use caustique::estimator::InitialBandwidth;
+use caustique::render::{Control, Levels, Settings, peak_memory, sppm};
+use caustique::scene::gltf::{ReadOptions, read};
+use caustique::scene::{Scene, View};
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let path = arguments.first().map_or("scenes/interior.glb", String::as_str);
+    let number = |i: usize, default: u32| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
+    let (width, rounds) = (number(1, 1280), number(2, 3));
+    let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
+    let view = View { camera: None, width: Some(width), height: None };
+    let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
+    let variants = [
+        ("five levels, two eye paths", Levels { count: 5, two_paths: true }, 20),
+        ("one level, two eye paths", Levels { count: 1, two_paths: true }, 10),
+        ("one level, one eye path", Levels { count: 1, two_paths: false }, 10),
+    ];
+    let mut phases = [[0.0f64; 3]; 3];
+    let mut seconds = [0.0f64; 3];
+    for round in 0..rounds {
+        for (v, (_, levels, k)) in variants.iter().enumerate() {
+            let settings = Settings {
+                seed: u64::from(round),
+                iterations: Some(2),
+                levels: *levels,
+                initial: InitialBandwidth::Nearest(*k),
+                ..Settings::default()
+            };
+            let rendered = sppm(&scene, &camera, &settings, |_, _| Control::Continue);
+            let n = f64::from(rounds) * 2.0;
+            let p = rendered.phases;
+            for (sum, x) in phases[v].iter_mut().zip([p.light, p.map, p.eye]) {
+                *sum += x / n;
+            }
+            seconds[v] += p.pilot / f64::from(rounds);
+        }
+    }
+    println!("{path}, {:?}, 100000 light paths, core-seconds per iteration ({rounds} rounds)", camera.size());
+    println!("{:<30}{:>8}{:>8}{:>8}{:>8}{:>10}", "", "light", "map", "eye", "all", "pilot");
+    let all = |v: usize| phases[v].iter().sum::<f64>();
+    for (v, (name, ..)) in variants.iter().enumerate() {
+        let [light, map, eye] = phases[v];
+        println!("{name:<30}{light:>8.3}{map:>8.3}{eye:>8.3}{:>8.3}{:>10.3}", all(v), seconds[v]);
+    }
+    println!("five levels over one, both with two eye paths: {:+.1} %", (all(0) / all(1) - 1.0) * 100.0);
+    println!("five levels over one on one eye path: {:+.1} %", (all(0) / all(2) - 1.0) * 100.0);
+    println!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30));
+    let [light, map, eye] = phases[0];
+    println!(
+        "{{\"light\": {light:.3}, \"map\": {map:.3}, \"eye\": {eye:.3}, \"all\": {:.3}, \"pilot\": {:.3}, \"one_level_two_paths\": {:.3}, \"one_level_one_path\": {:.3}, \"peak_gib\": {:.3}}}",
+        all(0),
+        seconds[0],
+        all(1),
+        all(2),
+        peak_memory() as f64 / f64::from(1 << 30)
+    );
+}

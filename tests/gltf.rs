@@ -1,0 +1,38 @@
+//! The glTF reader: what it reads, what it warns of, what it refuses, and that damaged files never bring it down.
+
+#[path = "gltf/glb.rs"]
+mod glb;
+
+#[path = "gltf/bad_input.rs"]
+mod bad_input;
+#[path = "gltf/fuzz.rs"]
+mod fuzz;
+#[path = "gltf/geometry.rs"]
+mod geometry;
+#[path = "gltf/lights.rs"]
+mod lights;
+#[path = "gltf/materials.rs"]
+mod materials;
+#[path = "gltf/scenes.rs"]
+mod scenes;
+
+use caustique::error::Error;
+use caustique::scene::Description;
+use caustique::scene::gltf::{ReadOptions, read_bytes};
+use glb::Glb;
+use std::path::Path;
+
+/// Reads a file made in memory.
+fn read(file: &Glb) -> Description {
+    try_read(file).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn try_read(file: &Glb) -> Result<Description, Error> {
+    read_bytes(&file.bytes(), Path::new("pool.glb"), &ReadOptions::default())
+}
+
+/// An error as the command line shows it.
+fn message(error: &Error) -> String {
+    let hint = error.hint.as_ref().map_or_else(String::new, |h| format!("\nhint: {h}"));
+    format!("{error}{hint}")
+}

@@ -1,0 +1,199 @@
+//! Lights, cameras, the environment, and the scene's extras.
+
+use super::glb::Glb;
+use super::{message, read, try_read};
+use caustique::math::{DVec3, Rgb};
+use caustique::scene::Description;
+use caustique::scene::description::{EnvironmentSource, Projection, PunctualKind};
+use caustique::scene::environment_file;
+use caustique::scene::gltf::{LightUnits, ReadOptions, read_bytes};
+use serde_json::{Value, json};
+use std::path::Path;
+
+fn lamps(lights: Value, nodes: &[Value]) -> Glb {
+    let mut file = Glb::new();
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+    file.json["extensionsRequired"] = json!(["KHR_lights_punctual"]);
+    for node in nodes {
+        file.node(node.clone());
+    }
+    file
+}
+
+fn on(light: usize) -> Value {
+    json!({"KHR_lights_punctual": {"light": light}})
+}
+
+#[test]
+fn kinds_of_lights() {
+    let file = lamps(
+        json!([
+            {"type": "point", "intensity": 683, "color": [1, 0.5, 0], "extras": {"own": 1}},
+            {"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2}, "range": 5},
+            {"type": "directional", "intensity": 1366, "name": "sun"},
+            {"type": "spot", "intensity": -1, "spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.25}, "name": "dark"},
+        ]),
+        &[
+            json!({"name": "bulb", "extensions": on(0), "translation": [1, 2, 3], "extras": {"caustique": {"radius": 0.5}}}),
+            json!({"name": "beam", "extensions": on(1)}),
+            json!({"extensions": on(2), "extras": {"caustique": {"angle_deg": 0.53}}}),
+            json!({"name": "dark", "extensions": on(3), "extras": {"caustique": {"angle": 1}}}),
+        ],
+    );
+    let scene = read(&file);
+    let [bulb, beam, sun, dark] = &scene.lights[..] else { panic!() };
+    assert_eq!((bulb.name.as_str(), bulb.kind, bulb.radius), ("bulb", PunctualKind::Point, 0.5));
+    assert!((bulb.intensity - Rgb::new(1.0, 0.5, 0.0)).length() < 1e-6);
+    assert_eq!(bulb.to_world.translation, DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(beam.kind, PunctualKind::Spot { inner: 0.1, outer: 0.2 });
+    assert!((beam.intensity.x - 1.0 / 683.0).abs() < 1e-9);
+    assert_eq!((sun.name.as_str(), sun.kind), ("sun", PunctualKind::Sun { angle: 0.53f32.to_radians() }));
+    assert!((sun.intensity.x - 2.0).abs() < 1e-6);
+    assert_eq!((dark.intensity, dark.kind), (Rgb::ZERO, PunctualKind::Spot { inner: 0.25, outer: 0.25 }));
+    assert_eq!(
+        scene.warnings,
+        [
+            "light \"beam\": its range is ignored: light reaches as far as it does",
+            "node \"dark\": extras.caustique has no key \"angle\" (did you mean \"angle_deg\"?)",
+            "light \"dark\": its intensity is negative; it is taken as zero",
+            "light \"dark\": its cone from 0.5 to 0.25 radians is taken as 0.25 to 0.25",
+        ]
+    );
+}
+
+/// Blender's lamps are in lumens; who else wrote the file matters, unless somebody says.
+#[test]
+fn units_of_lights() {
+    let mut file = lamps(json!([{"type": "point", "intensity": 683}]), &[json!({"extensions": on(0)})]);
+    let with = |file: &Glb, light_units| -> Description {
+        let options = ReadOptions { light_units, ..ReadOptions::default() };
+        read_bytes(&file.bytes(), Path::new("x.glb"), &options).unwrap()
+    };
+    let intensity = |file: &Glb, units| with(file, units).lights[0].intensity.x;
+    assert_eq!(intensity(&file, LightUnits::Auto), 1.0);
+    assert_eq!(intensity(&file, LightUnits::Radiometric), 683.0);
+    file.json["asset"]["generator"] = json!("THREE.GLTFExporter");
+    let scene = with(&file, LightUnits::Auto);
+    assert_eq!(scene.lights[0].intensity.x, 683.0);
+    assert_eq!(
+        scene.warnings,
+        ["generator \"THREE.GLTFExporter\" does not tell the unit of lamps: they are taken in W/sr and W/m2 \
+          (--light-units decides)"]
+    );
+    assert_eq!(intensity(&file, LightUnits::Photometric), 1.0);
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"light_units": "photometric"}});
+    let scene = with(&file, LightUnits::Auto);
+    assert_eq!((scene.lights[0].intensity.x, scene.warnings.len()), (1.0, 0));
+    assert_eq!(intensity(&file, LightUnits::Radiometric), 683.0);
+}
+
+#[test]
+fn cameras_in_the_order_of_the_scene() {
+    let mut file = Glb::new();
+    let lens = json!({"caustique": {"aperture_radius": 0.01, "focus_distance": 2.5}});
+    file.push(
+        "cameras",
+        json!({"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1.5, "znear": 0.1},
+        "extras": lens}),
+    );
+    file.push(
+        "cameras",
+        json!({"type": "orthographic", "name": "plan",
+        "orthographic": {"xmag": 2, "ymag": -1, "znear": 0.1, "zfar": 10}}),
+    );
+    let inner = file.push("nodes", json!({"name": "eye", "camera": 0, "translation": [0, 0, 3]}));
+    file.node(json!({"children": [inner], "translation": [0, 1, 0]}));
+    file.node(json!({"camera": 1, "extras": {"caustique": {"aperture_radius": 0.5}}}));
+    let scene = read(&file);
+    let [eye, plan] = &scene.cameras[..] else { panic!() };
+    assert_eq!((eye.name.as_str(), eye.aperture_radius, eye.focus_distance), ("eye", 0.01, 2.5));
+    assert_eq!(eye.projection, Projection::Perspective { yfov: 0.5, aspect: Some(1.5) });
+    assert_eq!(eye.to_world.translation, DVec3::new(0.0, 1.0, 3.0));
+    assert_eq!((plan.name.as_str(), plan.aperture_radius), ("plan", 0.5));
+    assert_eq!(plan.projection, Projection::Orthographic { xmag: 2.0, ymag: 1.0 });
+    assert_eq!(scene.warnings, ["camera \"plan\": it has an aperture but no focus_distance; 1 m is used"]);
+    let bad = |pointer: &str, value: Value| {
+        let mut file = file.clone();
+        *file.json.pointer_mut(pointer).unwrap() = value;
+        message(&try_read(&file).unwrap_err())
+    };
+    assert_eq!(
+        bad("/cameras/0/perspective/yfov", json!(4)),
+        "pool.glb: node \"eye\": camera \"eye\": its yfov is 4; it must lie between 0 and pi"
+    );
+    assert_eq!(
+        bad("/cameras/1/orthographic/xmag", json!(0)),
+        "pool.glb: node 2: camera \"plan\": xmag and ymag must be finite and not zero"
+    );
+}
+
+#[test]
+fn environment_and_medium_of_the_scene() {
+    let mut file = Glb::new();
+    file.json["scenes"][0]["extras"] = json!({"caustique": {
+        "environment": {"color": [0.1, 0.2, 0.3], "strength": 2, "rotation": 3},
+        "medium": {"sigma_s": [0.1, 0.1, 0.1], "g": -0.5}}});
+    let scene = read(&file);
+    let environment = scene.environment.unwrap();
+    assert!(matches!(environment.source, EnvironmentSource::Color(c) if c == Rgb::new(0.1, 0.2, 0.3)));
+    assert_eq!((environment.strength, environment.rotation_deg), (2.0, 0.0));
+    assert_eq!(scene.medium.map(|m| (m.sigma_a, m.g)), Some((Rgb::ZERO, -0.5)));
+    assert_eq!(
+        scene.warnings,
+        [
+            "scene \"Scene\": extras.caustique has no key \"environment.rotation\" (did you mean \"environment.rotation_deg\"?)"
+        ]
+    );
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"file": "no sky.exr"}}});
+    assert_eq!(
+        message(&try_read(&file).unwrap_err()),
+        "pool.glb: scene \"Scene\": no sky.exr: No such file or directory (os error 2)\n\
+         hint: check the path of the environment image"
+    );
+}
+
+/// OpenEXR and Radiance images, the first beside the scene file; what is negative or not finite is clamped and counted.
+#[test]
+fn environment_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sky.exr");
+    let texel = |x: usize, y: usize| match (x, y) {
+        (0, 0) => (f32::NAN, 1.0, 1.0),
+        (1, 0) => (-1.0, f32::INFINITY, 2.0),
+        _ => (x as f32, y as f32, 70_000.0),
+    };
+    exr::prelude::write_rgb_file(&path, 4, 2, texel).unwrap();
+    let mut file = Glb::new();
+    file.json["scenes"][0]["extras"] =
+        json!({"caustique": {"environment": {"file": "sky.exr", "rotation_deg": 90, "strength": 0.5}}});
+    let scene = read_bytes(&file.bytes(), &folder.path().join("a.glb"), &ReadOptions::default()).unwrap();
+    let environment = scene.environment.unwrap();
+    assert_eq!((environment.rotation_deg, environment.strength), (90.0, 0.5));
+    let EnvironmentSource::Image { width, height, texels } = environment.source else { panic!() };
+    assert_eq!((width, height), (4, 2));
+    assert_eq!(texels[..2], [[0.0, 1.0, 1.0], [0.0, 65_504.0, 2.0]]);
+    assert_eq!(texels[7], [3.0, 1.0, 70_000.0]);
+    assert_eq!(scene.warnings, [format!("{}: 2 texels are negative or not finite and are clamped", path.display())]);
+
+    let path = folder.path().join("sky.hdr");
+    let image = image::Rgb32FImage::from_fn(3, 2, |x, y| image::Rgb([x as f32, y as f32, 0.5]));
+    image.save(&path).unwrap();
+    let mut warnings = Vec::new();
+    let Ok(EnvironmentSource::Image { width, height, texels }) = environment_file::read(&path, &mut warnings) else {
+        panic!()
+    };
+    assert_eq!((width, height, warnings.len()), (3, 2, 0));
+    assert!((texels[5][0] - 2.0).abs() < 0.02 && (texels[5][1] - 1.0).abs() < 0.02, "{texels:?}");
+
+    // Damage of every kind ends in a message.
+    for name in ["sky.exr", "sky.hdr"] {
+        let whole = std::fs::read(folder.path().join(name)).unwrap();
+        let path = folder.path().join("damaged");
+        for cut in [0, 5, whole.len() / 2, whole.len() - 1] {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let error = environment_file::read(&path, &mut warnings).unwrap_err();
+            assert!(message(&error).contains("damaged: it "), "{name} {cut}: {error}");
+        }
+    }
+    assert!(message(&environment_file::read(folder.path(), &mut warnings).unwrap_err()).contains("not a regular file"));
+}

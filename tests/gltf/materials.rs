@@ -1,0 +1,293 @@
+//! Materials, textures, and the question of what glass is.
+
+use super::glb::{Glb, png};
+use super::{message, read, try_read};
+use caustique::material::{Alpha, Material};
+use caustique::math::{Rgb, Vec2};
+use caustique::scene::gltf::{Glass, ReadOptions, read_bytes};
+use caustique::texture::{Texels, Wrap};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A cube of this material with texture coordinates; `texture` is what the file's one texture is called.
+fn wearing(material: Value) -> Glb {
+    let mut file = Glb::new();
+    file.png(2, &[[255, 0, 0, 255], [0, 188, 0, 128]]);
+    let material = file.push("materials", material);
+    let mesh = file.cube("cube", Some(material));
+    let uv = file.floats(&[[0.5, 0.5]; 8]);
+    file.json["meshes"][mesh]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uv);
+    file.json["meshes"][mesh]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(uv);
+    file.node(json!({"mesh": mesh, "name": "Cube"}));
+    file
+}
+
+fn material(json: Value) -> (Material, Vec<String>) {
+    let scene = read(&wearing(json));
+    (scene.materials[0].clone(), scene.warnings)
+}
+
+#[test]
+fn every_field_is_read() {
+    let t = |set: u32| json!({"index": 0, "texCoord": set});
+    let (m, warnings) = material(json!({
+        "name": "all", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25,
+        "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 0.4], "baseColorTexture": t(0), "metallicFactor": 0.5,
+            "roughnessFactor": 0.6, "metallicRoughnessTexture": t(1)},
+        "normalTexture": {"index": 0, "scale": -2.0}, "emissiveFactor": [1, 0.5, 0], "emissiveTexture": t(0),
+        "extensions": {
+            "KHR_materials_emissive_strength": {"emissiveStrength": 12},
+            "KHR_materials_ior": {"ior": 1.33},
+            "KHR_materials_transmission": {"transmissionFactor": 0.9, "transmissionTexture": t(0)},
+            "KHR_materials_volume": {"thicknessFactor": 0.1, "attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.25]},
+            "KHR_materials_specular": {"specularFactor": 0.8, "specularTexture": t(0), "specularColorFactor": [2, 1, 0.5],
+                "specularColorTexture": t(0)},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.7, "clearcoatTexture": t(0), "clearcoatRoughnessFactor": 0.3,
+                "clearcoatRoughnessTexture": t(0)},
+            "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenColorTexture": t(0), "sheenRoughnessFactor": 0.4,
+                "sheenRoughnessTexture": t(0)},
+            "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1.5, "anisotropyTexture": t(0)},
+            "KHR_materials_dispersion": {"dispersion": 0.36},
+            "KHR_materials_unlit": {},
+        },
+        "extras": {"caustique": {"priority": 3}, "maker": "us"},
+    }));
+    assert_eq!(warnings, [""; 0]);
+    assert_eq!((m.name.as_str(), m.double_sided, m.alpha, m.unlit), ("all", true, Alpha::Mask(0.25), true));
+    assert_eq!((m.base_color, m.metallic, m.roughness), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
+    // Colour and data are two textures of one image.
+    let set = |t: Option<caustique::texture::TextureRef>| t.map(|t| (t.texture, t.set));
+    assert_eq!(set(m.base_color_texture), Some((0, 0)));
+    assert_eq!(set(m.metallic_roughness_texture), Some((1, 1)));
+    assert_eq!((set(m.emission_texture), m.normal_texture.map(|t| t.1)), (Some((0, 0)), Some(-2.0)));
+    assert_eq!((m.emission, m.ior, m.transmission), (Rgb::new(12.0, 6.0, 0.0), 1.33, 0.9));
+    let sigma_a = m.medium.unwrap().sigma_a;
+    assert!((sigma_a - Rgb::new(0.0, 2.0 * 2f32.ln(), 4.0 * 2f32.ln())).length() < 1e-6, "{sigma_a}");
+    assert!(!m.thin && m.priority == 3);
+    assert_eq!((m.specular, m.specular_color), (0.8, Rgb::new(2.0, 1.0, 0.5)));
+    assert_eq!((set(m.specular_texture), set(m.specular_color_texture)), (Some((1, 0)), Some((0, 0))));
+    assert_eq!((m.clearcoat, m.clearcoat_roughness), (0.7, 0.3));
+    assert_eq!((m.sheen_color, m.sheen_roughness), (Rgb::new(0.1, 0.2, 0.3), 0.4));
+    assert_eq!((set(m.sheen_color_texture), set(m.sheen_roughness_texture)), (Some((0, 0)), Some((1, 0))));
+    assert_eq!((m.anisotropy, m.anisotropy_rotation, m.dispersion), (0.5, 1.5, 0.36));
+    assert!(m.clearcoat_texture.is_some() && m.clearcoat_roughness_texture.is_some() && m.anisotropy_texture.is_some());
+}
+
+#[test]
+fn defaults_and_legacy_values() {
+    let (m, _) = material(json!({}));
+    assert_eq!(
+        (m.name.as_str(), m.base_color, m.metallic, m.roughness, m.ior),
+        ("material 0", [1.0; 4], 1.0, 1.0, 1.5)
+    );
+    assert_eq!((m.alpha, m.transmission, m.specular, m.thin), (Alpha::Opaque, 0.0, 1.0, true));
+    let (m, _) = material(json!({"alphaMode": "BLEND", "extensions": {"KHR_materials_ior": {"ior": 0}}}));
+    assert_eq!((m.alpha, m.ior), (Alpha::Blend, f32::INFINITY));
+}
+
+#[test]
+fn numbers_out_of_range_are_moved_with_a_warning() {
+    let (m, warnings) = material(json!({"name": "odd", "pbrMetallicRoughness": {"metallicFactor": 1.5},
+        "occlusionTexture": {"index": 0},
+        "extensions": {"KHR_materials_ior": {"ior": 0.5},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatNormalTexture": {"index": 0}},
+            "KHR_materials_transmission": {"transmissionFactor": 1.0},
+            "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0, 1, 1]},
+            "KHR_materials_iridescence": {"iridescenceFactor": 1}}}));
+    assert_eq!((m.metallic, m.ior), (1.0, 1.0));
+    assert!((m.medium.unwrap().sigma_a.x - 1e6f32.ln()).abs() < 1e-3);
+    assert_eq!(
+        warnings,
+        [
+            "extension \"KHR_materials_iridescence\" is not supported: what it says is ignored",
+            "material \"odd\": metallicFactor is 1.5; 1 is used",
+            "material \"odd\": an index of refraction of 0.5 is raised to 1",
+            "material \"odd\": clearcoatNormalTexture is ignored",
+            "material \"odd\": attenuationColor is raised to 0.000001, absorption is finite",
+            "1 material has an occlusion texture, ignored: occlusion is simulated",
+        ]
+    );
+}
+
+#[test]
+fn specular_glossiness_is_translated() {
+    let (m, warnings) = material(json!({"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {
+        "diffuseFactor": [0.5, 0.4, 0.3, 1], "specularFactor": [0.2, 0.1, 0.05],
+        "specularGlossinessTexture": {"index": 0}}}}));
+    assert_eq!((m.base_color, m.metallic, m.ior), ([0.5, 0.4, 0.3, 1.0], 0.0, f32::INFINITY));
+    assert_eq!((m.specular_color, m.roughness), (Rgb::new(0.2, 0.1, 0.05), 1.0));
+    assert_eq!(
+        warnings,
+        ["material \"old\": KHR_materials_pbrSpecularGlossiness is translated, so highlights differ a little"]
+    );
+    let scene = read(&wearing(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {
+        "specularGlossinessTexture": {"index": 0}}}})));
+    let rough = scene.materials[0].metallic_roughness_texture.unwrap();
+    let texel = scene.textures[rough.texture as usize].sample(Vec2::new(0.75, 0.5));
+    assert!((texel.y - (1.0 - 128.0 / 255.0)).abs() < 1e-6, "{texel}");
+}
+
+fn glass_on(mesh: impl Fn(&mut Glb, usize), glass: Glass, extensions: Value) -> (Vec<bool>, Vec<String>) {
+    let mut file = Glb::new();
+    let material = file.push("materials", json!({"name": "glass", "extensions": extensions}));
+    mesh(&mut file, material);
+    for i in 0..file.json["meshes"].as_array().unwrap().len() {
+        file.node(json!({"mesh": i}));
+    }
+    let options = ReadOptions { glass, ..ReadOptions::default() };
+    let scene = read_bytes(&file.bytes(), Path::new("x.glb"), &options).unwrap();
+    let solid = |i: &caustique::scene::description::Placed| scene.materials[i.material as usize].is_solid_glass();
+    (scene.instances.iter().map(solid).collect(), scene.warnings)
+}
+
+/// `--glass`: what a volume extension leaves open.
+#[test]
+fn glass_is_solid_where_the_mesh_is_closed() {
+    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
+    let both = |file: &mut Glb, material: usize| {
+        file.cube("closed", Some(material));
+        file.mesh("open", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[0, 1, 2], Some(material));
+    };
+    let (solid, warnings) = glass_on(both, Glass::Auto, clear.clone());
+    assert_eq!(solid, [true, false]);
+    assert_eq!(
+        warnings,
+        [
+            "material \"glass\": it transmits light but has no volume extension; closed meshes such as \"closed\" are taken \
+             for solid glass (--glass solid or thin decides)",
+            "material \"glass\": it is solid on closed meshes, thin on open ones such as \"open\" (--glass solid or thin \
+             decides)",
+        ]
+    );
+    let (solid, warnings) = glass_on(both, Glass::Solid, clear.clone());
+    assert_eq!(solid, [true, true]);
+    assert_eq!(
+        warnings,
+        ["mesh \"open\": its material \"glass\" is solid, but the mesh is not closed: light may get lost inside"]
+    );
+    assert_eq!(glass_on(both, Glass::Thin, clear.clone()), (vec![false, false], vec![]));
+    // A volume extension decides by itself.
+    for (thickness, solid) in [(0.0, false), (0.2, true)] {
+        let mut volume = clear.clone();
+        volume["KHR_materials_volume"] = json!({"thicknessFactor": thickness});
+        for glass in [Glass::Auto, Glass::Solid, Glass::Thin] {
+            assert_eq!(
+                glass_on(
+                    |f, m| {
+                        f.cube("c", Some(m));
+                    },
+                    glass,
+                    volume.clone()
+                ),
+                (vec![solid], vec![])
+            );
+        }
+    }
+}
+
+#[test]
+fn glass_that_is_inside_out_is_reported() {
+    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
+    let turned = |file: &mut Glb, material: usize| {
+        let mesh = file.cube("inverted", Some(material));
+        let mut indices = super::glb::CUBE;
+        indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
+        file.json["meshes"][mesh]["primitives"][0]["indices"] = file.indices(&indices).into();
+        indices[..3].swap(0, 1);
+        let mesh = file.cube("torn", Some(material));
+        file.json["meshes"][mesh]["primitives"][0]["indices"] = file.indices(&indices).into();
+    };
+    assert_eq!(
+        glass_on(turned, Glass::Auto, clear).1,
+        [
+            "mesh \"inverted\", primitive 0: its faces look inwards, so the inside of the glass is outside: flip its normals",
+            "mesh \"torn\": its material \"glass\" is solid, but part of its faces is turned over: recalculate its normals",
+        ]
+    );
+}
+
+#[test]
+fn textures_keep_wrap_filter_transform_and_encoding() {
+    let transform = json!({"KHR_texture_transform": {"offset": [0.25, 0.5], "scale": [2, 4], "texCoord": 1}});
+    let mut file = wearing(json!({"pbrMetallicRoughness": {
+        "baseColorTexture": {"index": 0, "extensions": transform}, "metallicRoughnessTexture": {"index": 0}}}));
+    file.push("samplers", json!({"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}));
+    file.json["textures"][0]["sampler"] = json!(0);
+    let scene = read(&file);
+    let reference = scene.materials[0].base_color_texture.unwrap();
+    assert_eq!((reference.set, reference.transform), (1, [[2.0, 0.0, 0.25], [0.0, 4.0, 0.5]]));
+    let [color, data] = &scene.textures[..] else { panic!("{}", scene.textures.len()) };
+    assert_eq!((color.wrap, color.linear, color.name.as_str()), ([Wrap::Clamp, Wrap::Mirror], false, "tiles"));
+    // 188 is 0.503 in linear light.
+    assert!((color.sample(Vec2::new(0.75, 0.5)).y - 0.5029).abs() < 1e-3);
+    assert!((data.sample(Vec2::new(0.75, 0.5)).y - 188.0 / 255.0).abs() < 1e-6);
+}
+
+/// Sixteen bits become floats; JPEG is read; images may be files, with percent signs in their names, or data URIs.
+#[test]
+fn images_from_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(1, 1, vec![40_000u16]).unwrap();
+    deep.save(folder.path().join("deep map.png")).unwrap();
+    let flat = image::RgbImage::from_raw(1, 1, vec![200, 100, 50]).unwrap();
+    flat.save(folder.path().join("flat.jpg")).unwrap();
+    let mut file = wearing(json!({"pbrMetallicRoughness": {
+        "baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}, "emissiveTexture": {"index": 2}}));
+    file.json["images"] = json!([{"uri": "flat.jpg"}, {"uri": "deep%20map.png"},
+        {"uri": format!("data:image/png;base64,{}", base64(&png(1, &[[255, 255, 255, 255]])))}]);
+    file.json["textures"] = json!([{"source": 0}, {"source": 1}, {"source": 2}]);
+    let path = folder.path().join("scene.glb");
+    let scene = read_bytes(&file.bytes(), &path, &ReadOptions::default()).unwrap();
+    let [white, flat, deep] = [2, 0, 1].map(|i| &scene.textures[[0, 1, 2][i]]);
+    let find = |linear: f32| scene.textures.iter().any(|t| (t.sample(Vec2::splat(0.5)).x - linear).abs() < 0.02);
+    assert!(find(1.0) && find(0.5776) && find(40_000.0 / 65_535.0), "{white:?} {flat:?} {deep:?}");
+    assert!(scene.textures.iter().any(|t| matches!(&t.texels, Texels::Floats(f) if f.len() == 1)));
+    std::fs::remove_file(folder.path().join("flat.jpg")).unwrap();
+    let error = read_bytes(&file.bytes(), &path, &ReadOptions::default()).unwrap_err();
+    let folder = folder.path().display();
+    assert_eq!(
+        message(&error),
+        format!(
+            "{folder}/scene.glb: material 0, baseColorTexture: image 0: the file {folder}/flat.jpg cannot be read: No such file or \
+             directory (os error 2)\nhint: put the file there, or export as .glb, which holds buffers and textures itself"
+        )
+    );
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |c: &[u8]| {
+        let bits = c.iter().fold(0u32, |n, b| n << 8 | u32::from(*b)) << (8 * (3 - c.len()));
+        (0..4).map(|i| if i <= c.len() { LETTERS[(bits >> (18 - 6 * i) & 63) as usize] as char } else { '=' }).collect()
+    };
+    bytes.chunks(3).map::<String, _>(group).collect()
+}
+
+#[test]
+fn extras_of_materials() {
+    let glass = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
+    let medium = json!({"sigma_a": [1, 2, 3], "sigma_s": [4, 5, 6], "g": 0.5});
+    let (m, warnings) = material(json!({"extensions": glass, "extras": {"caustique": {"medium": medium}}}));
+    let found = m.medium.unwrap();
+    assert_eq!((found.sigma_a, found.sigma_s, found.g), (Rgb::new(1.0, 2.0, 3.0), Rgb::new(4.0, 5.0, 6.0), 0.5));
+    assert!(!m.thin && warnings.is_empty());
+    let (m, warnings) = material(json!({"name": "wall", "extras": {"caustique": {"medium": medium, "prioritty": 2}}}));
+    assert_eq!(m.medium, None);
+    assert_eq!(
+        warnings,
+        [
+            "material \"wall\": extras.caustique has no key \"prioritty\" (did you mean \"priority\"?)",
+            "material \"wall\": its medium is ignored: no light is transmitted",
+        ]
+    );
+    let bad = |medium: Value| {
+        let file = wearing(json!({"name": "fog", "extensions": glass, "extras": {"caustique": {"medium": medium}}}));
+        message(&try_read(&file).unwrap_err())
+    };
+    assert_eq!(bad(json!({"g": 1})), "pool.glb: material \"fog\": g of a medium must lie between -1 and 1, it is 1");
+    assert_eq!(
+        bad(json!({"sigma_s": [-1, 0, 0]})),
+        "pool.glb: material \"fog\": sigma_a and sigma_s of a medium must be finite and not negative"
+    );
+    assert!(bad(json!({"sigma_s": 4})).starts_with("pool.glb: material \"fog\", extras.caustique: invalid type"));
+}

@@ -1,0 +1,70 @@
+//! A small scene as a .glb file: a floor, an upright mirror on it, a point light, two cameras.
+
+use serde_json::json;
+use std::path::Path;
+
+/// Writes the scene, with the lamp or dark.
+pub fn write(path: &Path, lamp: bool) {
+    std::fs::write(path, bytes(lamp)).expect("the scene can be written");
+}
+
+/// Quads as positions and indices: the floor looks up, the mirror along +Z.
+fn bytes(lamp: bool) -> Vec<u8> {
+    let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
+    let mirror: [[f32; 3]; 4] = [[-1.0, 0.1, -1.5], [1.0, 0.1, -1.5], [1.0, 2.0, -1.5], [-1.0, 2.0, -1.5]];
+    let mut binary = Vec::new();
+    for quad in [floor, mirror] {
+        binary.extend(quad.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    }
+    binary.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
+    let positions = |view: u32, low: [f32; 3], high: [f32; 3]| json!({"bufferView": view, "componentType": 5126, "count": 4, "type": "VEC3", "min": low, "max": high});
+    let mesh = |name: &str, positions: u32, material: u32| json!({"name": name, "primitives": [{"attributes": {"POSITION": positions}, "indices": 2, "material": material}]});
+    // Cameras look along their local -Z: this turn about X looks down at the floor.
+    let camera = |name: &str, x: f64| json!({"name": name, "camera": 0, "translation": [x, 3.5, 5.5], "rotation": [-0.27, 0.0, 0.0, 0.962_859_283_7]});
+    let light = json!({"name": "Lamp", "type": "point", "intensity": 20.0});
+    let document = json!({
+        "asset": {"version": "2.0", "generator": "the tests of caustique"},
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [light]}},
+        "scene": 0,
+        "scenes": [{"extras": {"caustique": {"light_units": "radiometric"}}, "nodes": if lamp { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
+        "nodes": [
+            {"name": "Floor", "mesh": 0},
+            {"name": "Mirror", "mesh": 1},
+            {"name": "Lamp", "translation": [0.5, 3.0, 1.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            camera("Camera", 0.0),
+            camera("Side", 1.0),
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.9, "aspectRatio": 4.0 / 3.0, "znear": 0.1}}],
+        "meshes": [mesh("floor", 0, 0), mesh("mirror", 1, 1)],
+        "materials": [
+            {"name": "stone", "pbrMetallicRoughness":
+                {"baseColorFactor": [0.7, 0.6, 0.5, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0}},
+            {"name": "silver", "pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}},
+        ],
+        "accessors": [
+            positions(0, [-5.0, 0.0, -5.0], [5.0, 0.0, 5.0]),
+            positions(1, [-1.0, 0.1, -1.5], [1.0, 2.0, -1.5]),
+            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 96, "byteLength": 12},
+        ],
+        "buffers": [{"byteLength": 108}],
+    });
+    let mut json = document.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut file = Vec::new();
+    let total = 12 + 8 + json.len() + 8 + binary.len();
+    for word in [0x4654_6c67, 2, total as u32, json.len() as u32, 0x4e4f_534a] {
+        file.extend(u32::to_le_bytes(word));
+    }
+    file.extend(json);
+    for word in [binary.len() as u32, 0x004e_4942] {
+        file.extend(u32::to_le_bytes(word));
+    }
+    file.extend(binary);
+    file
+}
