@@ -153,7 +153,7 @@ impl<'s> Whole<'s> {
     }
 
     /// Density per area of node `j` walked to from the light.
-    fn from_light(&self, j: usize) -> f64 {
+    fn light_pdf_a(&self, j: usize) -> f64 {
         let cos = self.nodes[j].cos[0];
         match j {
             0 if self.light.infinite => f64::from(self.light.onward) * cos,
@@ -163,7 +163,7 @@ impl<'s> Whole<'s> {
     }
 
     /// Density per area of node `j` walked to from the eye.
-    fn from_eye(&self, j: usize) -> f64 {
+    fn eye_pdf_a(&self, j: usize) -> f64 {
         let pdf = if j + 1 == self.nodes.len() { self.camera_pdf_w } else { self.scatters(j + 1, true) };
         pdf * self.nodes[j].cos[1] / self.distance2[j + 1]
     }
@@ -172,8 +172,8 @@ impl<'s> Whole<'s> {
     fn density(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: Eta) -> f64 {
         let k = self.nodes.len();
         let smooth = |j: usize| !self.nodes[j].delta;
-        let light = |n: usize| (0..n).map(|j| self.from_light(j)).product::<f64>() * f64::from(self.light.direct);
-        let eye = |n: usize| (n..k).map(|j| self.from_eye(j)).product::<f64>();
+        let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.direct);
+        let eye = |n: usize| (n..k).map(|j| self.eye_pdf_a(j)).product::<f64>();
         match strategy {
             Strategy::Hit if self.light.delta => 0.0,
             Strategy::Hit => {
@@ -259,19 +259,19 @@ impl<'s> Whole<'s> {
                     let light = mis::End {
                         mis: &lights[s - 1],
                         reverse_pdf_w: reverse(s - 1, true),
-                        arrival_pdf_a: self.from_eye(s - 1) as f32,
+                        arrival_pdf_a: self.eye_pdf_a(s - 1) as f32,
                         merges: which.light_merges(s as u32),
                     };
                     let eye = mis::End {
                         mis: &eyes[s],
                         reverse_pdf_w: reverse(s, false),
-                        arrival_pdf_a: self.from_light(s) as f32,
+                        arrival_pdf_a: self.light_pdf_a(s) as f32,
                         merges: which.eye_merges((k - s) as u32),
                     };
                     mis::connect(&light, &eye).weight(eta)
                 }
                 Strategy::Camera => {
-                    let (pdf_a, back) = (self.from_eye(k - 1) as f32, reverse(k - 1, true));
+                    let (pdf_a, back) = (self.eye_pdf_a(k - 1) as f32, reverse(k - 1, true));
                     mis::camera(&lights[k - 1], pdf_a, light_paths as f32, back).weight(eta)
                 }
                 Strategy::Merge(m) => {
