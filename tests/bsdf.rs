@@ -5,10 +5,13 @@
 
 mod support;
 
-use caustique::bsdf::{Bsdf, BsdfSample, Coverings, EnergyTables, LobeSet, Parameters, SHARP_ALPHA, Transport};
+use caustique::bsdf::{
+    Bsdf, BsdfSample, Coverings, DELTA_ALPHA, EnergyTables, LobeSet, Parameters, SHARP_ALPHA, Transport,
+};
 use caustique::math::{Rgb, Vec2, Vec3};
 use caustique::random::mix;
-use std::f64::consts::{PI, TAU};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::sync::LazyLock;
 use support::stats::{chi_squared_p, sidak};
 
@@ -108,7 +111,7 @@ fn outgoing(mu: f32, phi: f32) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), mu)
 }
 
-const COSINES: [f32; 10] = [1.0, 0.8, 0.4, 0.1, 0.02, -1.0, -0.8, -0.4, -0.1, -0.02];
+const COSINES: [f32; 6] = [1.0, 0.4, 0.1, 0.02, -0.7, -0.05];
 
 /// Mean weight of directions drawn: the albedo. The points are Roberts' R3 sequence.
 fn drawn_albedo(bsdf: &Bsdf, wo: Vec3, transport: Transport, side: u32) -> Rgb {
@@ -124,32 +127,34 @@ fn drawn_albedo(bsdf: &Bsdf, wo: Vec3, transport: Transport, side: u32) -> Rgb {
     (sum / f64::from(side * side)).as_vec3()
 }
 
-/// A surface that loses nothing, under a white sky, is white: within 0.5 %, whatever its roughness, from both sides.
+/// How far a white surface is from white, at worst over [`COSINES`].
+fn furnace_error(p: &Parameters) -> f32 {
+    let bsdf = Bsdf::new(p, &TABLES);
+    let worst = |worst: f32, mu: f32| {
+        let off = |side| {
+            let albedo = drawn_albedo(&bsdf, outgoing(mu, 0.7), Transport::Importance, side);
+            (albedo - Rgb::ONE).abs().max_element()
+        };
+        // More points where few leave a doubt.
+        let coarse = off(128);
+        worst.max(if coarse > 0.003 { off(512) } else { coarse })
+    };
+    COSINES.into_iter().fold(0.0, worst)
+}
+
+/// A surface that loses nothing, under a white sky, is white: within 0.5 %, whatever its roughness and what lies on top, from both sides.
 #[test]
 fn white_furnace() {
-    let mut worst = (0.0f32, String::new());
-    for (name, p) in white() {
-        let bsdf = Bsdf::new(&p, &TABLES);
-        for mu in COSINES {
-            let wo = outgoing(mu, 0.7);
-            let off = |side| {
-                let albedo = drawn_albedo(&bsdf, wo, Transport::Importance, side);
-                (albedo, (albedo - Rgb::ONE).abs().max_element())
-            };
-            let (mut albedo, mut error) = off(160);
-            if error > 0.002 {
-                (albedo, error) = off(640);
-            }
-            if error > 0.004 {
-                println!("FURN {name} {mu} {albedo}");
-            }
-            if error > worst.0 {
-                worst = (error, format!("{name}, cosine {mu}: {albedo}"));
-            }
-        }
-    }
-    println!("worst: {worst:?}");
-    assert!(worst.0 < 0.005, "{worst:?}");
+    let failures: Vec<String> = white()
+        .par_iter()
+        .map(|(name, p)| (name, furnace_error(p)))
+        .filter(|(_, error)| *error >= 0.005 || error.is_nan())
+        .map(|(name, error)| format!("{name}: off by {error}"))
+        .collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    // A surface that loses 1 % is not taken for white.
+    let grey = Parameters { base_color: Rgb::splat(0.99), ..metal(0.5) };
+    assert!(furnace_error(&grey) > 0.005);
 }
 
 /// What a triad test needs of a BSDF, so that bugs can be planted between.
@@ -253,15 +258,14 @@ fn triads() -> Vec<(String, Parameters)> {
     list
 }
 
-const TRIAD_DRAWS: usize = 20_000;
+const TRIAD_DRAWS: usize = 10_000;
 
 #[test]
 fn directions_follow_their_density() {
-    use rayon::prelude::*;
     let mut cases = vec![];
     for (name, p) in triads() {
         let bsdf = Bsdf::new(&p, &TABLES);
-        for mu in [0.95, 0.3, 0.04, -0.6, -0.05f32] {
+        for mu in [0.9, 0.04, -0.4f32] {
             for set in [LobeSet::ALL, LobeSet::BROAD, LobeSet::SHARP, LobeSet::SHARP | LobeSet::DELTA] {
                 // A set that holds the same lobes as ALL says nothing new.
                 if bsdf.lobes().has(set) && (set == LobeSet::ALL || bsdf.lobes() & set != bsdf.lobes()) {
@@ -282,4 +286,277 @@ fn directions_follow_their_density() {
         })
         .collect();
     assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), cases.len(), failures.join("\n"));
+}
+
+/// Bugs that others have made, planted between the model and its test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Bug {
+    None,
+    MissingCosine,
+    MissingJacobian,
+    SwappedAlpha,
+    LobeForgotten,
+    WeightWithoutCosine,
+    DeltaShareForgotten,
+}
+
+struct Planted<'a>(Bsdf<'a>, Bsdf<'a>, Bug);
+
+impl Scatter for Planted<'_> {
+    fn sample(&self, wo: Vec3, set: LobeSet, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let mut s = Bsdf::sample(&self.0, wo, Transport::Radiance, set, lobe, u)?;
+        s.pdf_w = self.pdf(wo, s.wi, set);
+        s.weight = self.eval(wo, s.wi, Transport::Radiance, set) * (s.wi.z.abs() / s.pdf_w);
+        if self.2 == Bug::WeightWithoutCosine {
+            s.weight /= s.wi.z.abs();
+        }
+        Some(s)
+    }
+    fn pdf(&self, wo: Vec3, wi: Vec3, set: LobeSet) -> f32 {
+        let pdf = |bsdf: &Bsdf, set| Bsdf::pdf(bsdf, wo, wi, Transport::Radiance, set);
+        let own = pdf(&self.0, set);
+        match self.2 {
+            Bug::MissingCosine => own / (2.0 * wi.z.abs()),
+            Bug::MissingJacobian if wi.z * wo.z < 0.0 => own / 2.25,
+            Bug::SwappedAlpha => pdf(&self.1, set),
+            Bug::LobeForgotten if wi.z * wo.z < 0.0 => 0.97 * own,
+            Bug::DeltaShareForgotten => pdf(&self.0, LobeSet::SMOOTH),
+            _ => own,
+        }
+    }
+    fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
+        Bsdf::eval(&self.0, wo, wi, transport, set)
+    }
+}
+
+#[test]
+fn planted_bugs_in_densities_are_found() {
+    let least = sidak(ERROR_RATE, 1000);
+    let found = |p: Parameters, bug: Bug| {
+        let swapped = Parameters { alpha_x: p.alpha_y, alpha_y: p.alpha_x, ..p };
+        let planted = Planted(Bsdf::new(&p, &TABLES), Bsdf::new(&swapped, &TABLES), bug);
+        let wo = outgoing(0.6, 0.5);
+        let lobes = planted.0.lobes();
+        let (p, difference) = triad(&planted, wo, lobes, 4 * TRIAD_DRAWS, 99);
+        p < least || difference > 2e-3
+    };
+    let stretched = Parameters { alpha_x: 0.5, alpha_y: 0.3, ..glass(0.0, 1.5) };
+    let coated = Parameters { clearcoat: 1.0, ..Parameters::default() };
+    assert!(!found(stretched, Bug::None) && !found(coated, Bug::None));
+    for bug in
+        [Bug::MissingCosine, Bug::MissingJacobian, Bug::SwappedAlpha, Bug::LobeForgotten, Bug::WeightWithoutCosine]
+    {
+        assert!(found(stretched, bug), "{bug:?} passes");
+    }
+    assert!(found(coated, Bug::DeltaShareForgotten), "DeltaShareForgotten passes");
+}
+
+/// Pairs of directions: every side, grazing ones too.
+fn pairs(count: usize, seed: u64) -> Vec<(Vec3, Vec3)> {
+    let mut uniform = Uniform(seed << 32);
+    let mut one = || {
+        let z = 2.0 * uniform.next() - 1.0;
+        let z = if uniform.next() < 0.2 { z * 0.05 } else { z };
+        direction(f64::from(z), TAU * f64::from(uniform.next()))
+    };
+    (0..count).map(|_| (one(), one())).collect()
+}
+
+fn index(p: &Parameters, w: Vec3) -> f32 {
+    if w.z > 0.0 || p.thin { 1.0 } else { p.eta }
+}
+
+/// Largest relative violation of `f_radiance(o, i) / n_o^2 = f_radiance(i, o) / n_i^2`, which for reflection is reciprocity, and of
+/// `f_radiance(o, i) = f_importance(i, o)`.
+fn asymmetry(bsdf: &dyn Scatter, p: &Parameters) -> f32 {
+    let mut worst = 0.0f32;
+    for (o, i) in pairs(2000, 3) {
+        let there = bsdf.eval(o, i, Transport::Radiance, LobeSet::ALL);
+        let back = bsdf.eval(i, o, Transport::Radiance, LobeSet::ALL);
+        let adjoint = bsdf.eval(i, o, Transport::Importance, LobeSet::ALL);
+        let squared = |w| index(p, w) * index(p, w);
+        let relative = |a: Rgb, b: Rgb| (a - b).abs().max_element() / a.max(b).max_element().max(1e-4);
+        worst = worst.max(relative(there / squared(o), back / squared(i))).max(relative(there, adjoint));
+    }
+    worst
+}
+
+struct WithoutEta<'a>(Bsdf<'a>);
+
+impl Scatter for WithoutEta<'_> {
+    fn sample(&self, wo: Vec3, set: LobeSet, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        Scatter::sample(&self.0, wo, set, lobe, u)
+    }
+    fn pdf(&self, wo: Vec3, wi: Vec3, set: LobeSet) -> f32 {
+        Scatter::pdf(&self.0, wo, wi, set)
+    }
+    fn eval(&self, wo: Vec3, wi: Vec3, _: Transport, set: LobeSet) -> Rgb {
+        Bsdf::eval(&self.0, wo, wi, Transport::Importance, set)
+    }
+}
+
+#[test]
+fn directions_can_be_exchanged() {
+    for (name, p) in all() {
+        // The half vector of refraction by an index near 1 is a small difference: its rounding shows where the lobe is narrow.
+        let allowed = if p.alpha_x < 0.05 { 0.2 } else { 1e-2 };
+        let worst = asymmetry(&Bsdf::new(&p, &TABLES), &p);
+        assert!(worst < allowed, "{name}: off by {worst}");
+    }
+    let p = glass(0.3, 1.5);
+    assert!(asymmetry(&WithoutEta(Bsdf::new(&p, &TABLES)), &p) > 0.5, "a missing eta^2 passes");
+}
+
+/// Smooth glass, water to air: Fresnel's and Snell's numbers, and the factor 1/eta^2, from both sides and both ways.
+#[test]
+fn smooth_glass_by_the_book() {
+    let p = glass(0.0, 1.5);
+    let bsdf = Bsdf::new(&p, &TABLES);
+    assert_eq!(bsdf.lobes(), LobeSet::DELTA);
+    for (transport, radiance) in [(Transport::Radiance, true), (Transport::Importance, false)] {
+        for (wo, eta) in [(outgoing(0.6, 0.0), 1.5f32), (-outgoing(0.9, 0.0), 1.0 / 1.5)] {
+            // Fresnel's equations in angles (not as the model writes them).
+            let theta_o = wo.z.abs().acos();
+            let theta_i = (theta_o.sin() / eta).asin();
+            let s = ((theta_o - theta_i).sin() / (theta_o + theta_i).sin()).powi(2);
+            let t = ((theta_o - theta_i).tan() / (theta_o + theta_i).tan()).powi(2);
+            let reflectance = 0.5 * (s + t);
+            let mut seen = [false; 2];
+            for k in 0..64 {
+                let lobe = (k as f32 + 0.5) / 64.0;
+                let s = bsdf.sample(wo, transport, LobeSet::ALL, lobe, Vec2::splat(0.5)).expect("a direction");
+                assert_eq!(s.lobe, LobeSet::DELTA);
+                let (value, wi) = if s.transmitted {
+                    let scale = if radiance { 1.0 / (eta * eta) } else { 1.0 };
+                    ((1.0 - reflectance) * scale, Vec3::new(-theta_i.sin(), 0.0, -theta_i.cos()) * wo.z.signum())
+                } else {
+                    (reflectance, Vec3::new(-wo.x, -wo.y, wo.z))
+                };
+                let wi = if s.transmitted { Vec3::new(-wo.x / eta, 0.0, wi.z) } else { wi };
+                seen[usize::from(s.transmitted)] = true;
+                assert!((s.wi - wi).length() < 1e-4, "{:?} is not {wi}", s.wi);
+                assert!((s.weight.x * s.pdf_w - value).abs() < 1e-4, "{} is not {value}", s.weight.x * s.pdf_w);
+            }
+            assert_eq!(seen, [true; 2]);
+        }
+    }
+    // Beyond the critical angle (41.8 degrees) all is reflected.
+    let wo = -outgoing(0.7, 0.3);
+    for k in 0..16 {
+        let lobe = (k as f32 + 0.5) / 16.0;
+        let s = bsdf.sample(wo, Transport::Radiance, LobeSet::ALL, lobe, Vec2::splat(0.5)).expect("a direction");
+        assert!(!s.transmitted && (s.weight.x - 1.0).abs() < 1e-5);
+    }
+}
+
+/// Reflectance of KHR_materials_specular, of metal and of a clear coat at normal incidence.
+#[test]
+fn reflectance_at_normal_incidence_is_the_extensions() {
+    let mirror = |p: Parameters| {
+        let bsdf = Bsdf::new(&p, &TABLES);
+        let s = bsdf.sample(Vec3::Z, Transport::Radiance, LobeSet::DELTA, 0.5, Vec2::splat(0.5)).expect("a direction");
+        s.weight * s.pdf_w
+    };
+    let near = |a: Rgb, b: Rgb| assert!((a - b).abs().max_element() < 1e-4, "{a} is not {b}");
+    let black = Parameters { base_color: Rgb::ZERO, ..plastic(0.0, 1.5) };
+    near(mirror(black), Rgb::splat(0.04));
+    near(mirror(Parameters { specular: 0.5, ..black }), Rgb::splat(0.02));
+    near(mirror(Parameters { specular_color: Rgb::new(1.0, 0.5, 50.0), ..black }), Rgb::new(0.04, 0.02, 1.0));
+    near(mirror(Parameters { eta: f32::INFINITY, ..black }), Rgb::ONE);
+    let gold = Rgb::new(1.0, 0.8, 0.3);
+    near(mirror(Parameters { base_color: gold, ..metal(0.0) }), gold);
+    near(mirror(Parameters { metallic: 0.5, base_color: gold, ..plastic(0.0, 1.5) }), gold * 0.5 + Rgb::splat(0.02));
+    near(mirror(Parameters { clearcoat: 0.5, base_color: Rgb::ZERO, ..Parameters::default() }), Rgb::splat(0.02));
+}
+
+/// Classes: every lobe is in one, and asking for the classes one by one gives what asking for all gives.
+#[test]
+fn classes_share_the_lobes_out() {
+    assert_eq!(Bsdf::new(&metal(DELTA_ALPHA * 0.9), &TABLES).lobes(), LobeSet::DELTA);
+    assert_eq!(Bsdf::new(&metal(SHARP_ALPHA * 0.9), &TABLES).lobes(), LobeSet::SHARP);
+    assert_eq!(Bsdf::new(&metal(SHARP_ALPHA * 1.1), &TABLES).lobes(), LobeSet::BROAD);
+    assert_eq!(Bsdf::new(&plastic(0.1, 1.5), &TABLES).lobes(), LobeSet::SMOOTH);
+    assert_eq!(Bsdf::new(&plastic(0.0, 1.5), &TABLES).lobes(), LobeSet::DELTA | LobeSet::BROAD);
+    assert_eq!(Bsdf::new(&glass(0.5, 1.0), &TABLES).lobes(), LobeSet::DELTA);
+    let black = Parameters { base_color: Rgb::ZERO, ..Parameters::default() };
+    assert_eq!(Bsdf::new(&black, &TABLES).lobes(), LobeSet::NONE);
+    for (name, p) in all() {
+        let bsdf = Bsdf::new(&p, &TABLES);
+        for (o, i) in pairs(50, 5) {
+            let f = |set| bsdf.eval(o, i, Transport::Radiance, set);
+            let (sum, all) = (f(LobeSet::BROAD) + f(LobeSet::SHARP), f(LobeSet::ALL));
+            assert!((sum - all).abs().max_element() <= 1e-4 * all.max_element(), "{name}: {sum} is not {all}");
+            assert_eq!(f(LobeSet::DELTA), Rgb::ZERO);
+            for set in [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD] {
+                if !bsdf.lobes().has(set) {
+                    assert_eq!(f(set), Rgb::ZERO, "{name}");
+                    assert_eq!(bsdf.albedo(o, set), Rgb::ZERO, "{name}");
+                }
+            }
+            if p.transmission == 0.0 && o.z * i.z < 0.0 {
+                assert_eq!(all, Rgb::ZERO, "{name}: an opaque surface lets light through");
+            }
+        }
+    }
+}
+
+/// The albedo that roulette goes by is near the true one.
+#[test]
+fn albedo_is_near_the_truth() {
+    for (name, p) in all() {
+        let bsdf = Bsdf::new(&p, &TABLES);
+        for mu in [1.0, 0.5, -0.5] {
+            let wo = outgoing(mu, 1.0);
+            let (told, drawn) = (bsdf.albedo(wo, LobeSet::ALL), drawn_albedo(&bsdf, wo, Transport::Importance, 64));
+            assert!((told - drawn).abs().max_element() < 0.12, "{name}, {mu}: {told} is not {drawn}");
+        }
+    }
+}
+
+/// Nothing that a file or a ray can bring makes a value that is not finite.
+#[test]
+fn extremes_stay_finite() {
+    let mut uniform = Uniform(77 << 32);
+    let tiny = 1e-30f32;
+    let directions = [
+        Vec3::Z,
+        -Vec3::Z,
+        Vec3::X,
+        outgoing(1e-4, 0.3),
+        outgoing(1e-7, 1.0),
+        -outgoing(1e-5, 2.0),
+        Vec3::new(1.0, 0.0, tiny),
+    ];
+    for (name, p) in all() {
+        for alpha in [p.alpha_x, DELTA_ALPHA, 1e-5] {
+            let p = Parameters { alpha_x: alpha, ..p };
+            let bsdf = Bsdf::new(&p, &TABLES);
+            for wo in directions {
+                assert!(bsdf.albedo(wo, LobeSet::ALL).is_finite(), "{name} {alpha} {wo}");
+                for transport in [Transport::Radiance, Transport::Importance] {
+                    for wi in directions {
+                        let (f, pdf) = bsdf.evaluate(wo, wi, transport, LobeSet::ALL);
+                        assert!(f.is_finite() && pdf.is_finite(), "{name} {alpha} {wo} {wi}: {f} {pdf}");
+                        assert!(f.min_element() >= 0.0 && pdf >= 0.0, "{name} {alpha} {wo} {wi}: {f} {pdf}");
+                    }
+                    for k in 0..32 {
+                        let edge = [0.0, 1.0 - f32::EPSILON / 2.0, 0.5][k % 3];
+                        let u = if k < 9 {
+                            Vec2::new(edge, [0.0, 1.0 - f32::EPSILON / 2.0, 0.3][k / 3])
+                        } else {
+                            uniform.two()
+                        };
+                        let lobe = if k < 9 { edge } else { uniform.next() };
+                        if let Some(s) = bsdf.sample(wo, transport, LobeSet::ALL, lobe, u) {
+                            assert!(
+                                s.weight.is_finite() && s.pdf_w > 0.0 && s.wi.is_finite(),
+                                "{name} {alpha} {wo} {s:?}"
+                            );
+                            assert!(s.weight.min_element() >= 0.0, "{name} {alpha} {wo} {s:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

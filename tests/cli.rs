@@ -132,7 +132,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --levels 9"),
             2,
-            "command line: invalid value '9' for '--levels <M>': it must be a whole number from 1 to 8",
+            "command line: invalid value '9' for '--levels <M>': it must be a whole number from 1 to 5",
             help,
         ),
         (

@@ -374,7 +374,8 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                         continue;
                     }
                     let direction = eye_notes.escaped.expect("an escape");
-                    whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(), ..infinity };
+                    let met = from_eye[from_eye.len() - 1];
+                    whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
                     scene.lights.escape(direction, |_, pdf| whole.light.direct = pdf);
                     whole.distance2.push(1.0);
                     whole.append(from_eye[..from_eye.len()].iter().rev(), true);
@@ -395,9 +396,11 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let sample = sample.expect("a light sample");
                     let mut distance2 = 1.0;
                     whole.light = match sample.target {
-                        None => {
-                            EmissionDensity { direct: sample.pdf_w, onward: scene.lights.entry_pdf_a(), ..infinity }
-                        }
+                        None => EmissionDensity {
+                            direct: sample.pdf_w,
+                            onward: scene.lights.entry_pdf_a(met.p, sample.wi),
+                            ..infinity
+                        },
                         Some(target) if sample.delta => {
                             distance2 = f64::from(target.distance_squared(met.p));
                             let onward = 0.25 * std::f32::consts::FRAC_1_PI;

@@ -69,11 +69,17 @@ impl<'a> Cover<'a> {
         [self.coat, self.sheen.max_element()]
     }
 
+    /// Albedo of white sheen. The distribution's own exceeds 1 at grazing angles where it is narrow: see [`Cover::sheen`].
+    #[inline]
+    fn sheen_albedo(&self, mu: Position) -> f32 {
+        self.sheen_albedo.at(mu).min(1.0)
+    }
+
     /// What the coverings leave of light in one direction.
     #[inline]
     pub fn passes(&self, mu: Position) -> f32 {
         let [coat, sheen] = self.strengths();
-        (1.0 - coat * self.coat_albedo.at(mu)) * (1.0 - sheen * self.sheen_albedo.at(mu))
+        (1.0 - coat * self.coat_albedo.at(mu)) * (1.0 - sheen * self.sheen_albedo(mu))
     }
 
     /// What they leave of light that facets below turn from one direction to another.
@@ -81,7 +87,7 @@ impl<'a> Cover<'a> {
     pub fn passes_both(&self, o: Position, i: Position) -> f32 {
         let [coat, sheen] = self.strengths();
         (1.0 - coat * self.coat_albedo.at(o).max(self.coat_albedo.at(i)))
-            * (1.0 - sheen * self.sheen_albedo.at(o).max(self.sheen_albedo.at(i)))
+            * (1.0 - sheen * self.sheen_albedo(o).max(self.sheen_albedo(i)))
     }
 
     /// Albedos of coat and sheen.
@@ -94,7 +100,7 @@ impl<'a> Cover<'a> {
             albedos[0] = Rgb::splat(self.coat * albedo);
         }
         if self.has_sheen() && set.has(LobeSet::BROAD) {
-            albedos[1] = self.sheen * (self.sheen_albedo.at(mu) * (1.0 - self.coat * self.coat_albedo.at(mu)));
+            albedos[1] = self.sheen * (self.sheen_albedo(mu) * (1.0 - self.coat * self.coat_albedo.at(mu)));
         }
         albedos
     }
@@ -116,7 +122,7 @@ impl<'a> Cover<'a> {
         reflect(o, if smooth { Vec3::Z } else { self.coat_ggx.sample_visible(o, u) })
     }
 
-    /// The sheen lobe without cosine. Both directions above.
+    /// The sheen lobe without cosine, scaled down where its albedo would exceed 1. Both directions above.
     #[inline]
     pub fn sheen(&self, o: Vec3, i: Vec3, at_o: Position, at_i: Position) -> Rgb {
         let Some(h) = (o + i).try_normalize() else { return Rgb::ZERO };
@@ -125,6 +131,7 @@ impl<'a> Cover<'a> {
         } else {
             1.0
         };
-        self.sheen * (sheen::eval(o.z, i.z, h.z.min(1.0), self.sheen_alpha) * coat)
+        let excess = self.sheen_albedo.at(at_o).max(self.sheen_albedo.at(at_i)).max(1.0);
+        self.sheen * (sheen::eval(o.z, i.z, h.z.min(1.0), self.sheen_alpha) * coat / excess)
     }
 }

@@ -7,6 +7,7 @@ mod layered;
 mod microfacet;
 mod parameters;
 mod profile;
+mod scatter;
 mod shading;
 mod sheen;
 
@@ -171,7 +172,7 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::Matte(color) => {
                 let mut wi = warp::hemisphere_cosine(u);
-                if !self.lobes().has(set) || wi.z <= 0.0 || !(wo.z.abs() > 0.0) {
+                if !self.lobes().has(set) || wi.z <= 0.0 || wo.z == 0.0 {
                     return None;
                 }
                 let pdf_w = wi.z * FRAC_1_PI;

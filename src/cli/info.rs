@@ -71,7 +71,9 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
     for layer in &set.layers {
         let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
         let name = if layer.name.is_empty() { "(beauty)" } else { &layer.name };
-        let known = describe(&layer.name).map(|known| format!("{} [{}]", known.meaning, known.unit));
+        // Blender's names that are ours behind the view layer's.
+        let plain = layer.name.strip_prefix("ViewLayer.").unwrap_or(&layer.name);
+        let known = describe(plain).map(|known| format!("{} [{}]", known.meaning, known.unit));
         text += format!("  {name:<18} {:<8} {}", components.concat(), known.unwrap_or_default()).trim_end();
         text.push('\n');
     }

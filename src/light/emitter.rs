@@ -115,6 +115,11 @@ impl Emitter {
         }
     }
 
+    /// Its light comes from infinity.
+    pub fn is_infinite(&self) -> bool {
+        matches!(self, Emitter::Sun { .. } | Emitter::Environment)
+    }
+
     /// Radiance of a sun of finite size.
     #[inline]
     pub fn sun_radiance(irradiance: Rgb, one_minus_cos: f32) -> Rgb {

@@ -1,11 +1,15 @@
 //! All lights of a scene: choosing one by power, sampling it from a point, sampling emission, and the densities for MIS.
 
+use super::aim::Targets;
 use super::cdf::Cdf;
 use super::emitter::{Emitter, Sky, spot_falloff};
 use crate::geometry::{Shapes, Surface};
 use crate::material::Materials;
 use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+/// Share of the choices that all lights get alike; the rest goes by power.
+const EQUAL_SHARE: f64 = 0.05;
 
 /// A light seen from a point.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +58,8 @@ pub struct EmissionSample {
     pub light: u32,
     /// The light cannot be hit by a ray.
     pub delta: bool,
+    /// The light is at infinity.
+    pub infinite: bool,
     /// Densities of the start.
     pub density: EmissionDensity,
 }
@@ -70,6 +76,7 @@ pub struct Lights {
     suns: Vec<u32>,
     environment: Option<u32>,
     sky: Sky,
+    targets: Targets,
 }
 
 impl Lights {
@@ -96,9 +103,9 @@ impl Lights {
                         radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
                     }
                 }
-                if material.emission_texture.is_some() || material.base_color_texture.is_some() {
+                if material.unlit || material.emission_texture.is_some() || !mesh.colors.is_empty() {
                     // No texel may be impossible to choose: keep a tenth of the brightest.
-                    radiance = radiance.max(material.emission * 0.1);
+                    radiance = radiance.max(material.brightest_emission() * 0.1);
                 }
                 if !(area > 0.0 && area.is_finite()) || radiance.max_element() <= 0.0 {
                     relative[i].push(u32::MAX);
@@ -118,8 +125,12 @@ impl Lights {
         let suns = (0..emitters.len() as u32)
             .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
             .collect();
-        let choice = Cdf::new(emitters.iter().map(|e| e.power(&sky)));
-        Lights { emitters, choice, first, relative, suns, environment, sky }
+        let powers: Vec<f64> = emitters.iter().map(|e| e.power(&sky)).collect();
+        // A lamp beside the sun is weak as seen from the whole scene, and the brightest thing on its own table: a share of the paths goes
+        // to all lights alike. It also keeps every probability above the resolution of the random numbers.
+        let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
+        let choice = Cdf::new(powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 }));
+        Lights { emitters, choice, first, relative, suns, environment, sky, targets: Targets::new(shapes, materials) }
     }
 
     /// No light gives any light.
@@ -159,7 +170,10 @@ impl Lights {
                 if cos == 0.0 || (cos < 0.0 && !two_sided) {
                     return None;
                 }
-                let radiance = materials.list[light.material as usize].emitted(&light, &materials.textures);
+                let material = &materials.list[light.material as usize];
+                // A cut-out part gives no light: rays pass it, so samples must, too.
+                let radiance =
+                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 let arrival_pdf_a = Self::lambertian(cos.abs(), *two_sided) / distance2;
                 let target = Some(light.spawn(-wi));
@@ -184,15 +198,15 @@ impl Lights {
                 Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
             Emitter::Sun { frame, irradiance, one_minus_cos } => {
-                let arrival_pdf_a = self.entry_pdf_a();
                 if *one_minus_cos == 0.0 {
-                    let (wi, radiance) = (frame.n, *irradiance);
-                    let pdf_w = probability;
+                    let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
+                    let arrival_pdf_a = self.entry_pdf_a(p, wi);
                     return Some(DirectSample { wi, target: None, radiance, pdf_w, delta: true, arrival_pdf_a });
                 }
                 let wi = frame.to_world(warp::cone_uniform(u, *one_minus_cos));
                 let radiance = Emitter::sun_radiance(*irradiance, *one_minus_cos);
                 let pdf_w = probability * warp::cone_uniform_pdf_w(*one_minus_cos);
+                let arrival_pdf_a = self.entry_pdf_a(p, wi);
                 Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
             Emitter::Environment => {
@@ -205,7 +219,7 @@ impl Lights {
                     radiance: environment.radiance(wi),
                     pdf_w,
                     delta: false,
-                    arrival_pdf_a: self.entry_pdf_a(),
+                    arrival_pdf_a: self.entry_pdf_a(p, wi),
                 })
             }
         }
@@ -233,10 +247,10 @@ impl Lights {
         1.0 / (TAU * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0))
     }
 
-    /// Density per area of the disc through which light from infinity enters the scene.
+    /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p` towards the light, `wi`.
     #[inline]
-    pub fn entry_pdf_a(&self) -> f32 {
-        1.0 / (PI * self.sky.radius * self.sky.radius)
+    pub fn entry_pdf_a(&self, p: Vec3, wi: Vec3) -> f32 {
+        self.targets.density(&self.sky, p, wi)
     }
 
     /// Radiance of a surface along `wo` and the densities of starting a light path there that way.
@@ -301,7 +315,9 @@ impl Lights {
                 let back = *two_sided && rest < 0.5;
                 let frame = Frame::from_normal(if back { -light.ng } else { light.ng });
                 let d = frame.to_world(warp::hemisphere_cosine(direction));
-                let radiance = materials.list[light.material as usize].emitted(&light, &materials.textures);
+                let material = &materials.list[light.material as usize];
+                let radiance =
+                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
                 let cos = light.ng.dot(d).abs();
                 let flux = radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 });
                 (light.spawn(d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
@@ -330,7 +346,7 @@ impl Lights {
                 // L / pdf = E / mean cosine.
                 let flux = *irradiance * (2.0 / (2.0 - one_minus_cos));
                 let pdf_w = if *one_minus_cos == 0.0 { 1.0 } else { warp::cone_uniform_pdf_w(*one_minus_cos) };
-                let entry = self.entry_pdf_a();
+                let entry = 1.0 / (PI * self.sky.radius * self.sky.radius);
                 (self.disc(point, d), d, flux / entry, [pdf_w, entry, 1.0])
             }
             Emitter::Environment => {
@@ -339,12 +355,12 @@ impl Lights {
                 if pdf <= 0.0 {
                     return None;
                 }
-                let entry = self.entry_pdf_a();
+                let entry = 1.0 / (PI * self.sky.radius * self.sky.radius);
                 (self.disc(point, -wi), -wi, environment.radiance(wi) / (pdf * entry), [pdf, entry, 1.0])
             }
         };
         let flux = flux / probability;
-        let infinite = matches!(emitter, Emitter::Sun { .. } | Emitter::Environment);
+        let infinite = emitter.is_infinite();
         let delta = emitter.is_delta();
         let density = EmissionDensity { direct: direct * probability, onward, cos, infinite, delta };
         (flux.is_finite() && flux.max_element() > 0.0).then_some(EmissionSample {
@@ -353,8 +369,17 @@ impl Lights {
             flux,
             light: index as u32,
             delta,
+            infinite,
             density,
         })
+    }
+
+    /// Aims the start of a path from infinity at what can make caustics (see [`Targets::aim`]); others stay as they are.
+    #[inline]
+    pub fn aim(&self, emission: &mut EmissionSample, u: f32, point: Vec2) {
+        if emission.infinite {
+            self.targets.aim(&self.sky, emission, u, point);
+        }
     }
 
     /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.

@@ -1,10 +1,12 @@
 //! Light sources: emissive triangles, points, spots, suns and the environment, and how they are sampled.
 
+mod aim;
 mod cdf;
 mod emitter;
 mod environment;
 mod lights;
 
+pub use aim::Targets;
 pub use cdf::Cdf;
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};

@@ -1,6 +1,8 @@
 //! All materials and textures of a scene.
 
-use super::Material;
+use super::{Alpha, Material};
+use crate::geometry::Surface;
+use crate::math::Rgb;
 use crate::texture::Texture;
 
 /// The scene's materials, and the textures they refer to.
@@ -16,6 +18,20 @@ impl Material {
     /// Whether surfaces of this material give light of their own.
     pub fn emits(&self) -> bool {
         self.unlit || self.emission.max_element() > 0.0
+    }
+
+    /// No texel emits more than this, vertex colours aside.
+    pub fn brightest_emission(&self) -> Rgb {
+        if self.unlit { Rgb::from_slice(&self.base_color[..3]) } else { self.emission }
+    }
+
+    /// Probability that a ray that comes by meets the surface: 1 but for cut-outs.
+    pub fn coverage(&self, surface: &Surface, textures: &[Texture]) -> f32 {
+        match self.alpha {
+            Alpha::Opaque => 1.0,
+            Alpha::Mask(cutoff) => f32::from(u8::from(self.alpha(surface, textures) >= cutoff)),
+            Alpha::Blend => self.alpha(surface, textures).clamp(0.0, 1.0),
+        }
     }
 
     /// Whether the mesh that wears it bounds a solid that light enters.

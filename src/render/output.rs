@@ -1,6 +1,6 @@
 //! What a render leaves in its file: layers, and the account in the header.
 
-use super::control::{StopReason, peak_memory};
+use super::control::StopReason;
 use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
@@ -31,7 +31,7 @@ impl Rendered {
     }
 
     /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know: arguments,
-    /// warnings, the combiner. `threads` is `None` for a reproducible file, which has no clocks, no memory and no threads in it.
+    /// warnings, the combiner, the peak of memory. `threads` is `None` for a reproducible file, which has no clocks, no memory and no threads in it.
     pub fn account(&self, threads: Option<usize>) -> Map<String, Value> {
         let shard = self.settings.shard;
         let mut account = Map::new();
@@ -62,7 +62,6 @@ impl Rendered {
             put("seconds", self.seconds.into());
             put("phases", json!(self.phases));
             put("threads", threads.into());
-            put("peak_memory", peak_memory().into());
         }
         account
     }

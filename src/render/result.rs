@@ -46,6 +46,9 @@ impl Rendered {
     /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over RGB of
     /// the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + 0.01), the papers' relMSE with the estimate in place of the
     /// squared difference. `None` before two iterations.
+    ///
+    /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance is
+    /// large: where such pixels rule the error, the estimate is too small until they have been seen several times.
     pub fn relative_error(&self) -> Option<f64> {
         relative_error(&self.pixels, self.settings.levels)
     }

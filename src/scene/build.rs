@@ -28,6 +28,22 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
             ));
         }
     }
+    for placed in &description.instances {
+        let material = &description.materials[placed.material as usize];
+        let scatters = material.medium.is_some_and(|m| m.sigma_s.max_element() > 0.0);
+        for (present, what) in [
+            (material.dispersion > 0.0, "its dispersion is not simulated: all colours refract alike"),
+            (scatters, "scattering in its medium is not simulated: it only absorbs"),
+        ] {
+            let warning = format!("material \"{}\": {what}", material.name);
+            if present && !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
+        }
+    }
+    if description.medium.is_some_and(|m| m.sigma_s.max_element() > 0.0) {
+        warnings.push("scene medium: its scattering is not simulated: it only absorbs".into());
+    }
     add_lamps(&mut description);
     let (low, high) = bounds(&description);
     let (center, radius) =

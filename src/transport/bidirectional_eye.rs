@@ -29,6 +29,8 @@ struct EyeWalk<'a, R> {
     meets: &'a Meets<'a>,
     mis: MisState,
     trail: Trail,
+    /// The last vertex.
+    last: Vec3,
     measure: EyeMeasure,
     record: &'a mut R,
 }
@@ -187,6 +189,7 @@ impl<R: Record> Visitor for EyeWalk<'_, R> {
             }
         }
         self.trail.leave(smooth);
+        self.last = vertex.surface.p;
         // Without connections and merging only what mirrors and clear glass show is left to find.
         Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
@@ -203,7 +206,7 @@ impl<R: Record> Visitor for EyeWalk<'_, R> {
             self.trail.scattered(scattered.lobe);
         }
         let lights = &self.shared.eye.scene.lights;
-        let onward = lights.entry_pdf_a();
+        let onward = lights.entry_pdf_a(self.last, direction);
         lights.escape(direction, |radiance, direct| {
             let density = EmissionDensity { direct, onward, cos: 1.0, infinite: true, delta: false };
             self.run_into(throughput * radiance, 0, direction, scattered, &density);
@@ -229,6 +232,7 @@ impl Bidirectional<'_> {
             meets,
             mis: MisState::camera(self.light_paths, pdf_w),
             trail: Trail::START,
+            last: start.origin,
             measure: EyeMeasure::default(),
             record,
         };

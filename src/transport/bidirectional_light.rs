@@ -114,27 +114,26 @@ impl<R: Record> Visitor for LightWalk<'_, '_, R> {
         let distance2 = if first_from_infinity { 1.0 } else { vertex.distance * vertex.distance };
         self.mis = self.mis.arrive(distance2, vertex.wo.dot(vertex.surface.ng).abs());
         let lobes = vertex.shading.bsdf.lobes();
-        if lobes.has(LobeSet::SMOOTH) {
-            if strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
-                let flux = vertex.throughput / *merged_paths;
-                self.left.photons.push(MergePhoton::new(vertex, flux, self.caustic, &self.mis));
+        // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders of materials.
+        if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
+            let flux = vertex.throughput / *merged_paths;
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.caustic, &self.mis));
+        }
+        if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
+            if strategies.connect {
+                self.left.vertices.push(LightVertex {
+                    surface: *vertex.surface,
+                    shading: Shading { bsdf: Bsdf::new(vertex.parameters, &eye.scene.tables), ..*vertex.shading },
+                    wo: vertex.wo,
+                    throughput: vertex.throughput,
+                    depth: vertex.depth,
+                    interior: vertex.interior,
+                    interior_behind: vertex.interior_behind,
+                    mis: self.mis,
+                });
             }
-            if !self.photons_only && vertex.depth < eye.max_depth {
-                if strategies.connect {
-                    self.left.vertices.push(LightVertex {
-                        surface: *vertex.surface,
-                        shading: Shading { bsdf: Bsdf::new(vertex.parameters, &eye.scene.tables), ..*vertex.shading },
-                        wo: vertex.wo,
-                        throughput: vertex.throughput,
-                        depth: vertex.depth,
-                        interior: vertex.interior,
-                        interior_behind: vertex.interior_behind,
-                        mis: self.mis,
-                    });
-                }
-                if strategies.camera {
-                    self.connect_camera(vertex);
-                }
+            if strategies.camera {
+                self.connect_camera(vertex);
             }
         }
         Next::Continue(LobeSet::ALL)

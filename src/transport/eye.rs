@@ -194,7 +194,8 @@ impl Visitor for Gather<'_> {
         self.last = surface.p;
         let lobes = shading.bsdf.lobes();
         let smooth = lobes & LobeSet::SMOOTH;
-        if self.stage == Stage::Clear && !smooth.is_empty() {
+        // Lamps and other surfaces that scatter nothing have features, too.
+        if self.stage == Stage::Clear && lobes != LobeSet::DELTA {
             self.measure.features = Features {
                 albedo: shading.albedo(vertex.wo, LobeSet::ALL),
                 normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },

@@ -4,7 +4,7 @@ use super::interior::Surroundings;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::EmissionDensity;
-use crate::math::Vec2;
+use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags};
 use crate::random::{Domain, SobolPair, Stream, mix};
 use crate::scene::Scene;
@@ -55,14 +55,22 @@ impl LightPass {
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
     pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
-        let choice = self.choice.point(index).x;
+        let choice = self.choice.point(index);
         let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
-        let emission = scene.lights.sample_emission(&scene.shapes, &scene.materials, choice, point, direction)?;
+        let mut emission = scene.lights.sample_emission(&scene.shapes, &scene.materials, choice.x, point, direction)?;
+        scene.lights.aim(&mut emission, choice.y, point);
+        let mut flux = emission.flux / self.paths as f32;
+        if emission.infinite
+            && let Some(medium) = scene.medium
+        {
+            // It has come through the medium that fills all space, from infinity.
+            flux *= Rgb::select(medium.sigma_a.cmpgt(Rgb::ZERO), Rgb::ZERO, Rgb::ONE);
+        }
         Some(Emitted {
             start: PathStart {
                 origin: emission.origin,
                 direction: emission.direction,
-                throughput: emission.flux / self.paths as f32,
+                throughput: flux,
                 interior: surroundings.light(emission.light),
             },
             stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
@@ -73,7 +81,7 @@ impl LightPass {
     }
 }
 
-/// Leaves a photon at every vertex after the first (direct light is not the photons') whose lobes gather it.
+/// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or clear glass.
 struct Deposit<'a> {
     photons: &'a mut Vec<Photon>,
     caustic: bool,
@@ -87,8 +95,9 @@ impl Visitor for Deposit<'_> {
             self.caustic &= !scattered.lobe.has(LobeSet::BROAD);
             self.unreachable &= scattered.lobe == LobeSet::DELTA;
         }
-        let lobes = vertex.shading.bsdf.lobes();
-        let gathers = lobes.has(LobeSet::BROAD) || (self.unreachable && lobes.has(LobeSet::SHARP));
+        // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders of
+        // materials and dark texels.
+        let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         if scattered.is_some() && gathers {
             let flags =
                 u8::from(self.caustic) * PhotonFlags::CAUSTIC | u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;

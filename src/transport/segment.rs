@@ -72,13 +72,14 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     let entering = direction.dot(surface.ng) < 0.0;
     let object = scene.shapes.instances[surface.instance as usize].object;
     let crossing = interior.crossing(scene, object, surface.material, entering);
-    if crossing.is_nothing() {
+    // What gives light of its own is there whatever is behind it.
+    if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
     }
     let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
     let eta = if entering { after / before } else { before / after };
     let parameters = material.parameters(surface, textures, eta);
-    if eta == 1.0 && parameters.is_pure_transmission() {
+    if eta == 1.0 && parameters.is_pure_transmission() && !material.emits() {
         return Boundary::None(parameters.base_color, crossing.interior);
     }
     Boundary::Scattering(parameters, Some(crossing))

@@ -14,7 +14,7 @@ use caustique::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use caustique::film::{Layer, LayerSet, Selection, output as film};
 use caustique::image::exr::{self, Attributes};
 use caustique::render::output::shape;
-use caustique::render::{Clock, Control, Rendered, Settings, StopReason, peak_memory, sppm};
+use caustique::render::{Clock, Control, Rendered, Settings, StopReason, cpu_seconds, peak_memory, sppm};
 use caustique::scene::Scene;
 use options::Method;
 use rayon::prelude::*;
@@ -53,7 +53,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     reporter.finish();
 
     let mut header = rendered.account((!args.reproducible).then_some(threads));
-    let clock = Clock::start();
+    let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let combined_layer = |name: &str| COMBINED_LAYERS.iter().any(|stem| name.starts_with(stem));
     let wanted = |name: &str| selection.wants(name) || name.is_empty() || (network.is_some() && combined_layer(name));
     let environment = scene.lights.sky().environment.is_some();
@@ -66,7 +66,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let combining = clock.seconds();
     set = selection.apply(set)?;
 
-    complete(&mut header, args, &scene, combined, combining);
+    complete(&mut header, args, &scene, combined, cpu_seconds() - cpu_start);
     attributes.insert(exr::ATTRIBUTE, &header)?;
     exr::write(&args.output, &set, &attributes, args.picture.exr_options(args.exr_naming.into()))?;
     args.picture.write_png(&set)?;
@@ -151,7 +151,13 @@ fn network(args: &RenderArgs) -> Result<Option<Named>> {
 }
 
 /// What the header says besides the render's own account.
-fn complete(header: &mut Map<String, Value>, args: &RenderArgs, scene: &Scene, combined: Option<Value>, seconds: f64) {
+fn complete(
+    header: &mut Map<String, Value>,
+    args: &RenderArgs,
+    scene: &Scene,
+    combined: Option<Value>,
+    core_seconds: f64,
+) {
     let mut put = |key: &str, value: Value| header.insert(key.into(), value);
     put("arguments", json!(args));
     put("warnings", json!(scene.warnings));
@@ -161,7 +167,8 @@ fn complete(header: &mut Map<String, Value>, args: &RenderArgs, scene: &Scene, c
     if !args.reproducible
         && let Some(Value::Object(phases)) = header.get_mut("phases")
     {
-        phases.insert("layers_and_combiner".into(), seconds.into());
+        phases.insert("layers_and_combiner".into(), core_seconds.into());
+        header.insert("peak_memory".into(), peak_memory().into());
     }
 }
 
@@ -183,7 +190,10 @@ impl Summary {
             iterations: rendered.iterations,
             light_paths: rendered.light_paths,
             seconds: rendered.seconds,
-            phases: format!("pilot {:.1}, light {:.1}, map {:.1}, eye {:.1}", p.pilot, p.light, p.map, p.eye),
+            phases: format!(
+                "core-seconds: pilot {:.1}, light {:.1}, map {:.1}, eye {:.1}",
+                p.pilot, p.light, p.map, p.eye
+            ),
             error: rendered.relative_error(),
             rejected: rendered.rejected(),
             stop: rendered.stop,

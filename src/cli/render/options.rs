@@ -35,7 +35,7 @@ pub struct RenderArgs {
     /// Light paths sent from the lights in each iteration: more give a smoother start, fewer faster iterations
     #[arg(long, value_name = "N", default_value_t = DEFAULT_PHOTONS, value_parser = value_parser!(u32).range(1..=1_000_000_000), help_heading = "Method")]
     pub photons: u32,
-    /// Bandwidth levels, 1 to 8, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred, from which
+    /// Bandwidth levels, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred, from which
     /// the combiner makes one. The combiner that comes with the program takes 5
     #[arg(long, value_name = "M", default_value_t = 5, value_parser = level_count, help_heading = "Method")]
     pub levels: usize,
@@ -187,6 +187,9 @@ impl FromStr for ShardChoice {
         }
     }
 }
+
+/// The help of `--levels` names the limit.
+const _: () = assert!(MAX_LEVELS == 5);
 
 fn level_count(text: &str) -> std::result::Result<usize, String> {
     let range = format!("it must be a whole number from 1 to {MAX_LEVELS}");
