@@ -2,7 +2,7 @@
 
 Every crop is scaled by the exposure and the median depth of the whole image that it comes from, so that it can stand
 for its part of that image; variances are averaged over RGB and kept as deviations; all is float16 (relative error
-0.0005, far below the noise). Files are named SCENE--ANYTHING.npz.
+0.0005, far below the noise). Files are named SCENE--VARIANT-ANYTHING.npz.
 """
 
 import pathlib
@@ -10,6 +10,9 @@ import pathlib
 import numpy as np
 
 import normalise
+
+# Scenes never trained on.
+HELD_OUT = ("gems", "lamp")
 
 LARGEST = 6e4  # float16 ends at 65504
 
@@ -44,13 +47,14 @@ def load(path):
 
 
 def files(folder):
-    """{scene: [files]}, sorted."""
+    """{scene: [files]} of SCENE--VARIANT-ANYTHING.npz, sorted."""
     scenes = {}
     for file in sorted(pathlib.Path(folder).glob("*.npz")):
         scenes.setdefault(file.stem.split("--")[0], []).append(file)
     return scenes
 
 
-def held_out(scenes):
-    """Every tenth scene: for validation, never for training."""
-    return sorted(scenes)[::10]
+def held_out(scenes, names):
+    """{scene: [files]} never to train on: all of the scenes `names`, and variant 0 (the scene as it is) of every other."""
+    chosen = {s: [f for f in files if s in names or f.stem.split("--")[1].split("-")[0] == "0"] for s, files in scenes.items()}
+    return {s: files for s, files in chosen.items() if files}

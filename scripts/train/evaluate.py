@@ -2,7 +2,7 @@
 
   python evaluate.py --checkpoint RUN/last.pt --data DIR [--all]
 
-Without --all only the scenes that training held out. Level4 of five is what `Noisy` shows: the usual single bandwidth.
+Without --all only what training held out, a row for each picture and number of iterations. Level4 of five is what `Noisy` shows: the usual single bandwidth.
 """
 
 import argparse
@@ -39,20 +39,31 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--checkpoint", required=True)
     parser.add_argument("--data", required=True)
+    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="as train.py was told")
     parser.add_argument("--all", action="store_true", help="scenes that it was trained on too")
     args = parser.parse_args()
     net, _ = export.load(args.checkpoint)
     net.eval()
     scenes = crops.files(args.data)
-    names = sorted(scenes) if args.all else crops.held_out(scenes)
+    scenes = scenes if args.all else crops.held_out(scenes, args.held_out)
     heads = ["combined"] + [f"Level{k + 1}" for k in range(net.levels)]
-    print(f"{'scene':24}" + "".join(f"{h:>20}" for h in heads) + "    relMSE (trimmed), means over crops")
+    print(f"{'scene variant-iterations':28}" + "".join(f"{h:>17}" for h in heads) + "    relMSE (trimmed), means over crops")
     table = []
-    for name in names:
-        rows = [[(e.mean().item(), trimmed(e)) for e in errors(net, file)] for file in scenes[name]]
+    for name, files in group(scenes).items():
+        rows = [[(e.mean().item(), trimmed(e)) for e in errors(net, file)] for file in files]
         table.append(np.mean(rows, axis=0))
-        print(f"{name:24}" + "".join(f"{a:11.5f} ({b:.5f})" for a, b in table[-1]))
-    print(f"{'geometric mean':24}" + "".join(f"{a:11.5f} ({b:.5f})" for a, b in np.exp(np.log(table).mean(0))))
+        print(f"{name:28}" + "".join(f"{a:8.4f} ({b:6.4f})" for a, b in table[-1]), flush=True)
+    print(f"{'mean':28}" + "".join(f"{a:8.4f} ({b:6.4f})" for a, b in np.mean(table, axis=0)))
+    print(f"{'geometric mean':28}" + "".join(f"{a:8.4f} ({b:6.4f})" for a, b in np.exp(np.log(table).mean(0))))
+
+
+def group(scenes):
+    """{what a row shows: [files]}: data.py's names begin SCENE--VARIANT-ITERATIONS."""
+    rows = {}
+    for name, files in scenes.items():
+        for file in files:
+            rows.setdefault(f"{name} {'-'.join(file.stem.split('--')[1].split('-')[:2])}", []).append(file)
+    return rows
 
 
 if __name__ == "__main__":

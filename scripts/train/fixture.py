@@ -1,7 +1,7 @@
 """Write src/combine/testdata/contract.f32, which holds Rust and Python to the same combiner.
 
 Little-endian float32: m, h, w, F, K; the stack (levels, variances, albedo, normal, depth); the network's input; random
-features and equation (6) with them (window 19); the shipped network's image; then, for the top left h/2 x w/2 pixels,
+features and equation (6) with them (window 15); the shipped network's image; then, for the top left h/2 x w/2 pixels,
 random explicit weights of a window of K and equation (6) with them.
 """
 
@@ -20,8 +20,6 @@ import synthetic
 HERE = pathlib.Path(__file__).parent
 TARGET = HERE / "../../src/combine/testdata/contract.f32"
 H, W, K = 16, 22, 5
-
-
 
 
 def main():

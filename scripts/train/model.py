@@ -10,7 +10,8 @@ from torch import nn
 
 import normalise
 
-WINDOW = 19
+# The paper's is 19, at 1.6 times the cost.
+WINDOW = 15
 FEATURES = 4
 # Bound of the logarithms of explicit weights: keeps every sum of weights well inside float32.
 LOG_WEIGHT_BOUND = 8.0
@@ -32,7 +33,9 @@ class Block(nn.Module):
 
 
 class Compact(nn.Module):
-    """A U-Net at full, half and quarter resolution, its skips added; 0.12 MFLOP a pixel.
+    """A U-Net at full, half and quarter resolution, its skips added; 0.07 MFLOP a pixel.
+
+    Widths are multiples of 16, which ONNX Runtime's convolutions like.
 
     Its output, [b, (levels - 1) (features + 3), h, w], holds for all pairs phi, then source, centre and log falloff.
     """
@@ -42,7 +45,7 @@ class Compact(nn.Module):
     # Receptive radius 32 of the layers below (a test looks for seams), rounded up to the stride.
     halo = 32
 
-    def __init__(self, levels=5, window=WINDOW, features=FEATURES, widths=(24, 48, 80), last=32):
+    def __init__(self, levels=5, window=WINDOW, features=FEATURES, widths=(16, 32, 64), last=32):
         super().__init__()
         self.levels, self.window, self.features = levels, window, features
         full, half, quarter = widths

@@ -102,7 +102,7 @@ def stack(seed, size=128, levels=5):
 
 
 def main():
-    """Write stacks for train.py: python synthetic.py -o DIR --count 200."""
+    """Write stacks for train.py, every tenth held out: python synthetic.py -o DIR --count 200."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("-o", "--output", required=True)
     parser.add_argument("--count", type=int, default=200)
@@ -112,7 +112,7 @@ def main():
     pathlib.Path(args.output).mkdir(parents=True, exist_ok=True)
     for k in range(args.count):
         seed = args.seed * 100_000 + k
-        crops.save(pathlib.Path(args.output) / f"synthetic{seed}--0.npz", stack(seed, args.size))
+        crops.save(pathlib.Path(args.output) / f"synthetic{seed}--{min(k % 10, 1)}.npz", stack(seed, args.size))
 
 
 if __name__ == "__main__":

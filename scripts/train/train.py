@@ -1,9 +1,13 @@
-"""Train a network that chooses the weights of equation (6); loss: [Choi and Moon 2021, equation (8)].
+"""Train a network that chooses the weights of equation (6).
+
+The loss is that of [Choi and Moon 2021, equation (8)], which is of the first power: it asks for medians, and a picture of skewed
+noise comes out dark. --squared S adds S log(1 + relMSE) of every pixel, the reported error kept from fireflies' rule.
 
   python train.py --data DIR --out RUN --minutes 60
 
-DIR holds crops of data.py; every tenth scene (by name) validates and is never trained on. Stops after --minutes or
---steps, whichever comes first; run again with the same --out to go on. RUN/last.pt is what export.py takes. On a
+DIRs hold crops of data.py or synthetic.py, and each gives as many to a batch; the scenes of --held-out, and variant 0 of
+every other, validate and are never trained on (with several DIRs: those of the first). Stops after --minutes or --steps,
+whichever comes first; run again with the same --out to go on, or with --init to start from another run's network. RUN/last.pt is what export.py takes. On a
 machine without a GPU it trains on the CPU with --threads threads.
 """
 
@@ -33,22 +37,31 @@ def loss_of(image, reference):
 class Data:
     """All crops in memory."""
 
-    def __init__(self, folder, levels):
-        scenes = crops.files(folder)
-        if len(scenes) < 2:
-            raise SystemExit(f"{folder}: {len(scenes)} scenes; training needs two at least, one to validate with")
-        held_out = crops.held_out(scenes)
-        self.scenes, self.train, self.valid = len(scenes), [], []
-        for name, files in scenes.items():
-            for file in files:
-                item = tuple(torch.from_numpy(np.ascontiguousarray(x)) for x in crops.load(file))
-                if len(item[1]) != levels:
-                    raise SystemExit(f"{file}: {len(item[1])} levels, the network takes {levels}")
-                (self.valid if name in held_out else self.train).append(item)
+    def __init__(self, folders, held_out, levels):
+        self.train, self.valid, said = [], [], []
+        for number, folder in enumerate(folders):
+            scenes = crops.files(folder)
+            valid = {file for files in crops.held_out(scenes, held_out).values() for file in files}
+            train = [read(file, levels) for files in scenes.values() for file in files if file not in valid]
+            if not train or not valid:
+                raise SystemExit(f"{folder}: {len(train)} crops to train with, {len(valid)} held out; both are needed")
+            self.train.append(train)
+            if number == 0:
+                self.valid = [read(file, levels) for file in sorted(valid)]
+            said.append(f"{len(train)} crops of {pathlib.Path(folder).name}")
+        self.said = " and ".join(said)
 
     def batch(self, rng, size, side, device):
-        chosen = [augment(self.train[i], rng, side) for i in rng.integers(len(self.train), size=size)]
+        folders = [self.train[i % len(self.train)] for i in range(size)]
+        chosen = [augment(items[rng.integers(len(items))], rng, side) for items in folders]
         return [torch.stack(part).to(device) for part in zip(*chosen)]
+
+
+def read(file, levels):
+    item = tuple(torch.from_numpy(np.ascontiguousarray(x)) for x in crops.load(file))
+    if len(item[1]) != levels:
+        raise SystemExit(f"{file}: {len(item[1])} levels, the network takes {levels}")
+    return item
 
 
 def augment(item, rng, side):
@@ -74,9 +87,11 @@ def moving_average(average, new, count):
     return torch.lerp(average, new, 1 - min(DECAY, (1 + float(count)) / (10 + float(count))))
 
 
-def forward(net, batch):
+def forward(net, batch, squared):
     image, levels, reference = batch
-    return loss_of(combination.combine(net(image), levels, net.kind, net.window, net.features), reference)
+    combined = combination.combine(net(image), levels, net.kind, net.window, net.features)
+    loss = loss_of(combined, reference)
+    return loss + squared * torch.log1p(relmse(combined, reference)).mean() if squared else loss
 
 
 @torch.no_grad()
@@ -100,7 +115,9 @@ def validate(net, items, device, most=64):
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", required=True)
+    parser.add_argument("--data", required=True, nargs="+")
+    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="scenes never to train on")
+    parser.add_argument("--init", help="checkpoint whose network to start from")
     parser.add_argument("--out", required=True)
     parser.add_argument("--arch", choices=["compact", "paper"], default="compact")
     parser.add_argument("--levels", type=int, default=5)
@@ -109,6 +126,7 @@ def arguments():
     parser.add_argument("--steps", type=int, default=1_000_000, help="of the learning-rate schedule, if time allows them")
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--side", type=int, default=64, help="of training crops, pixels")
+    parser.add_argument("--squared", type=float, default=0.0, help="weight of log(1 + relMSE) in the loss")
     parser.add_argument("--rate", type=float, default=5e-4, help="largest learning rate (Adam)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=0, help="0: all")
@@ -126,9 +144,14 @@ def main():
     net = model.build(args.arch, args.levels, args.window).to(device)
     average = torch.optim.swa_utils.AveragedModel(net, avg_fn=moving_average)
     optimiser = torch.optim.Adam(net.parameters(), lr=args.rate)
-    data = Data(args.data, args.levels)
-    print(f"{device}; {data.scenes} scenes, {len(data.train)} crops to train, {len(data.valid)} to validate")
-    step, seconds = 0, 0.0
+    data = Data(args.data, args.held_out, args.levels)
+    print(f"{device}; {data.said} to train, {len(data.valid)} to validate")
+    step, seconds, before_that = 0, 0.0, ""
+    if args.init:
+        given = torch.load(args.init, map_location=device, weights_only=True)
+        net.load_state_dict(given["best"])
+        average.module.load_state_dict(given["best"])
+        before_that = f", after {given['steps']} steps on {given['data']}"
     if (out / "last.pt").exists():
         saved = torch.load(out / "last.pt", map_location=device, weights_only=True)
         net.load_state_dict(saved["model"])
@@ -143,7 +166,7 @@ def main():
             "arch": args.arch, "levels": args.levels, "window": args.window, "model": net.state_dict(),
             "average": average.state_dict(), "best": average.module.state_dict(), "optimiser": optimiser.state_dict(),
             "steps": step, "seconds": seconds, "device": device,
-            "data": f"{data.scenes} scenes, {len(data.train)} crops of {pathlib.Path(args.data).name}",
+            "data": data.said + before_that,
         }
         torch.save(state, out / "last.tmp")
         (out / "last.tmp").replace(out / "last.pt")
@@ -160,7 +183,7 @@ def main():
         for group in optimiser.param_groups:
             group["lr"] = args.rate * min(1, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * progress)) + 1e-6
         rng = np.random.default_rng([args.seed, step])
-        loss = forward(net, data.batch(rng, args.batch, args.side, device))
+        loss = forward(net, data.batch(rng, args.batch, args.side, device), args.squared)
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)

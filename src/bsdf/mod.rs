@@ -14,9 +14,10 @@ mod sheen;
 pub use energy::{Coverings, EnergyTables};
 pub use layered::Layered;
 pub use parameters::Parameters;
-pub use shading::Shading;
+pub use shading::{Gathering, Shading};
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
+use profile::Profile;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::{BitAnd, BitOr};
 
@@ -156,6 +157,16 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::Matte(_) => self.evaluate(wo, wi, transport, set).0,
             Bsdf::Layered(layered) => layered.eval(wo, wi, transport, set),
+        }
+    }
+
+    /// Where only diffuse reflection is in `set`: the BSDF for `wo` over its dependence on `wi`, and that dependence (`None`: there is none).
+    #[inline]
+    pub(super) fn diffuse_from(&self, wo: Vec3, set: LobeSet) -> Option<(Rgb, Option<&Profile<'_>>)> {
+        match self {
+            Bsdf::Matte(color) if set.has(LobeSet::BROAD) => Some((*color * FRAC_1_PI, None)),
+            Bsdf::Matte(_) => None,
+            Bsdf::Layered(layered) => layered.diffuse_from(wo, set).map(|(factor, through)| (factor, Some(through))),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::fresnel::{reflect, refract};
 use super::layered::{LEAST_COSINE, Layered, Shares, mean};
 use super::microfacet::{g1, g2_reflection, g2_transmission};
-use super::profile::Position;
+use super::profile::{Position, Profile};
 use super::{BsdfSample, LobeSet, Transport};
 use crate::math::{Rgb, Vec2, Vec3, sqr, warp};
 use std::f32::consts::FRAC_1_PI;
@@ -37,6 +37,16 @@ impl Layered<'_> {
         let at = Position::new(mu_o);
         let Some(shares) = self.shares(mu_o, at, side, set) else { return (Rgb::ZERO, 0.0) };
         self.evaluate_shares(wo, wi, at, side, transport, set, &shares)
+    }
+
+    /// Where only diffuse reflection is in `set`: the BSDF for `wo` over its dependence on `wi`, and that dependence.
+    #[inline]
+    pub(super) fn diffuse_from(&self, wo: Vec3, set: LobeSet) -> Option<(Rgb, &Profile<'_>)> {
+        let facets = self.has_facets && set.has(self.class);
+        if facets || self.cover.is_some() || wo.z.abs() < LEAST_COSINE {
+            return None;
+        }
+        Some((self.diffuse * self.through.at(Position::new(wo.z.abs())), &self.through))
     }
 
     /// The first part of [`Layered::evaluate`], where that is cheaper: no densities, so no shares.

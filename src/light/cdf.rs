@@ -1,12 +1,14 @@
 //! Choosing an index with given probabilities.
 
-/// A discrete distribution, inverted by binary search: unlike an alias table it keeps the strata of its input.
+/// A discrete distribution, inverted by a guide table \[Chen and Asau 1974\]: unlike an alias table it keeps the strata of its input.
 #[derive(Clone, Debug)]
 pub struct Cdf {
     /// `cumulative[i]` = probability of an index up to and including `i`; the last is exactly 1.
     cumulative: Vec<f32>,
     /// Probabilities.
     pdf: Vec<f32>,
+    /// `guide[b]`: the first index whose cumulative probability is above `b / guide.len()`, where a search for a number in that bucket starts.
+    guide: Vec<u32>,
     total: f64,
 }
 
@@ -32,7 +34,11 @@ impl Cdf {
         }
         // The probability used must be the one sampled with: the difference of the rounded sums.
         let pdf = cumulative.iter().scan(0.0, |below, &c| Some(c - std::mem::replace(below, c))).collect();
-        Some(Cdf { cumulative, pdf, total })
+        let buckets = cumulative.len();
+        let guide = (0..buckets)
+            .map(|b| cumulative.partition_point(|&c| c <= b as f32 / buckets as f32).min(last) as u32)
+            .collect();
+        Some(Cdf { cumulative, pdf, guide, total })
     }
 
     /// Sum of the weights.
@@ -49,7 +55,15 @@ impl Cdf {
     /// Index, its probability (above zero), and `u` (in `[0, 1)`) stretched over the chosen interval for reuse.
     #[inline]
     pub fn sample(&self, u: f32) -> (usize, f32, f32) {
-        let index = self.cumulative.partition_point(|&c| c <= u).min(self.pdf.len() - 1);
+        let buckets = self.guide.len();
+        let mut index = self.guide[((u * buckets as f32) as usize).min(buckets - 1)] as usize;
+        // The bucket may have been rounded up.
+        while index > 0 && self.cumulative[index - 1] > u {
+            index -= 1;
+        }
+        while self.cumulative[index] <= u {
+            index += 1;
+        }
         let below = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
         let pdf = self.pdf[index];
         (index, pdf, ((u - below) / pdf).clamp(0.0, 1.0f32.next_down()))

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 
 /// Probability of tracing the gathering lobes' own ray. They are wide, so the light sample is nearly always the better one; the ray
 /// bounds what remains near large lights.
-pub const SECOND_STRATEGY: f32 = 0.25;
+pub const SECOND_STRATEGY: f32 = 0.125;
 
 /// Balance heuristic of a density against another.
 #[inline]

@@ -155,12 +155,14 @@ impl Gather<'_> {
         let ng = vertex.surface.ng;
         // Bin by the smallest level that holds the photon; a level is the sum of the bins up to its own.
         let mut bins = [[Rgb::ZERO; MAX_LEVELS]; 2];
+        let by_broad = vertex.shading.gathering(vertex.wo, broad);
+        let by_both = vertex.shading.gathering(vertex.wo, broad | sharp);
         self.photons.within(vertex.surface.p, largest, |photon, distance2| {
-            let set = if photon.flags.has(PhotonFlags::UNREACHABLE) { broad | sharp } else { broad };
-            if set.is_empty() || !same_surface(photon, ng) || u32::from(photon.depth) > longest {
+            let unreachable = photon.flags.has(PhotonFlags::UNREACHABLE);
+            if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
                 return;
             }
-            let f = vertex.shading.gather(vertex.wo, photon.wi, set);
+            let f = if unreachable { by_both.photon(photon.wi) } else { by_broad.photon(photon.wi) };
             let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
             let mut level = radii.len() - 1;
             while level > 0 && distance2 < radii[level - 1] {

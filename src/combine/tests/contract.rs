@@ -47,7 +47,7 @@ fn input_and_equation_equal_the_training_codes() {
 
     let tile = Tile { core: rect, input: rect };
     let data = reader.floats((levels - 1) * (dimensions + affinity::SCALARS) * n);
-    let features = Weights::Features(Map { rect, window: 19, data });
+    let features = Weights::Features(Map { rect, window: 15, data });
     let got = combine_tile(&stack, &stack.valid(), &tile, &features);
     assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
 
@@ -76,7 +76,7 @@ fn input_and_equation_equal_the_training_codes() {
 fn the_shipped_network_is_as_it_says() {
     let combiner = combiner();
     let facts = combiner.facts();
-    assert_eq!((facts.levels, facts.window), (5, 19));
+    assert_eq!((facts.levels, facts.window), (5, 15));
     assert_eq!(tensor::channels(facts.levels), 27);
     assert!(matches!(facts.contract, Contract::Features { .. }));
     assert!(Model::compact().bytes.len() < 2 << 20);
