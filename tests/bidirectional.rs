@@ -315,7 +315,8 @@ fn under_the_sky() {
     add(&mut description, "floor", floor(1.5), matte(0.5, 0.0));
     let block = cuboid(Vec3::new(-0.6, 0.0, -0.6), Vec3::new(-0.1, 0.7, -0.1), false);
     add(&mut description, "block", block, matte(0.6, 0.0));
-    let metal = Material { metallic: 1.0, roughness: 0.6, ..Material::default() };
+    // Narrow enough for light paths to be aimed at it.
+    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
     add(&mut description, "ball", sphere(Vec3::new(0.4, 0.35, 0.1), 0.35, 64), metal);
     let (width, height) = (32, 16);
     let mut texels = vec![[0.3, 0.4, 0.6]; (width * height) as usize];

@@ -533,7 +533,7 @@ fn under_an_environment() {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
     add(&mut description, "floor", floor, matte(0.5, 0.0));
-    let metal = Material { metallic: 1.0, roughness: 0.6, ..Material::default() };
+    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
     add(&mut description, "ball", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
     let wall = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0);
     add(&mut description, "wall", wall, matte(0.6, 0.0));
