@@ -78,6 +78,11 @@ impl Camera {
         -self.rotation.z_axis
     }
 
+    /// Whether [`Camera::sample`] can find it from a point.
+    pub fn connects(&self) -> bool {
+        matches!(self.projection, Projection::Perspective(_))
+    }
+
     /// Whether a lens blurs.
     pub fn has_lens(&self) -> bool {
         self.lens_radius > 0.0

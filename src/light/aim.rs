@@ -105,23 +105,33 @@ impl Targets {
             // Upstream of everything, as all starts are.
             emission.origin = p - d * ((p - sky.center).dot(d) + sky.radius);
         }
+        emission.density.onward = self.density(sky, emission.origin, d);
+        // The flux given was for the uniform density alone.
+        emission.flux *= 1.0 / (PI * sky.radius * sky.radius * emission.density.onward);
+    }
+
+    /// Density per area, in the mixture, of the line through `p` along the unit `d`.
+    #[inline]
+    pub fn density(&self, sky: &Sky, p: Vec3, d: Vec3) -> f32 {
+        let whole = PI * sky.radius * sky.radius;
+        if self.choice.is_none() {
+            return 1.0 / whole;
+        }
         let from_axis = |center: Vec3| {
-            let v = emission.origin - center;
+            let v = p - center;
             (v - d * v.dot(d)).length_squared()
         };
         let discs = self.spheres.iter().filter(|&&(center, radius)| from_axis(center) < radius * radius).count();
-        let whole = PI * sky.radius * sky.radius;
         // A target's disc may reach over the rim of the scene's.
         let uniform = if from_axis(sky.center) <= sky.radius * sky.radius { 1.0 / whole } else { 0.0 };
-        let density = (1.0 - AIMED) * uniform + AIMED * discs as f32 / self.area;
-        // The flux given was for the uniform density alone.
-        emission.flux *= 1.0 / (whole * density);
+        (1.0 - AIMED) * uniform + AIMED * discs as f32 / self.area
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::EmissionDensity;
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
 
@@ -149,6 +159,13 @@ mod tests {
                     light: 0,
                     delta: true,
                     infinite: true,
+                    density: EmissionDensity {
+                        direct: 1.0,
+                        onward: 1.0 / whole,
+                        cos: 1.0,
+                        infinite: true,
+                        delta: true,
+                    },
                 };
                 targets.aim(&sky, &mut emission, draws.one(Purpose::Lobe), draws.two(Purpose::Lens));
                 let v = emission.origin - center;

@@ -6,7 +6,7 @@ use super::emitter::{Emitter, Sky, spot_falloff};
 use crate::geometry::{Shapes, Surface};
 use crate::material::Materials;
 use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Share of the choices that all lights get alike; the rest goes by power.
 const EQUAL_SHARE: f64 = 0.05;
@@ -22,6 +22,25 @@ pub struct DirectSample {
     pub radiance: Rgb,
     /// Density per solid angle, the choice of the light included; for a delta light the probability of choosing it.
     pub pdf_w: f32,
+    /// The light cannot be hit by a ray.
+    pub delta: bool,
+    /// Density per area of a surface that faces `wi` with which light paths emitted from this point of the light (from this direction, if it is
+    /// at infinity) arrive.
+    pub arrival_pdf_a: f32,
+}
+
+/// Densities with which a light path starts, all that multiple importance sampling asks of a light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionDensity {
+    /// Density of [`Lights::sample_direct`]: of the point per area, or of the direction per solid angle for light from infinity; for a delta
+    /// light the probability of choosing it.
+    pub direct: f32,
+    /// Density of the rest of emission: of the direction per solid angle, or of the entry per area for light from infinity.
+    pub onward: f32,
+    /// Cosine at the light; 1 at infinity and for points.
+    pub cos: f32,
+    /// The light is at infinity.
+    pub infinite: bool,
     /// The light cannot be hit by a ray.
     pub delta: bool,
 }
@@ -41,6 +60,8 @@ pub struct EmissionSample {
     pub delta: bool,
     /// The light is at infinity.
     pub infinite: bool,
+    /// Densities of the start.
+    pub density: EmissionDensity,
 }
 
 /// The lights of a scene.
@@ -154,13 +175,16 @@ impl Lights {
                 let radiance =
                     material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
                 let pdf_w = probability * distance2 / (area * cos.abs());
-                Some(DirectSample { wi, target: Some(light.spawn(-wi)), radiance, pdf_w, delta: false })
+                let arrival_pdf_a = Self::lambertian(cos.abs(), *two_sided) / distance2;
+                let target = Some(light.spawn(-wi));
+                Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
             Emitter::Point { p: at, intensity } => {
                 let to = *at - p;
                 let wi = to.try_normalize()?;
                 let radiance = *intensity / to.length_squared();
-                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true })
+                let arrival_pdf_a = 0.5 / TAU / to.length_squared();
+                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
             Emitter::Spot { p: at, frame, intensity, cos_inner, cos_outer } => {
                 let to = *at - p;
@@ -170,17 +194,20 @@ impl Lights {
                     return None;
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
-                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true })
+                let arrival_pdf_a = falloff * Self::spot_pdf_w(*cos_inner, *cos_outer) / to.length_squared();
+                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
             Emitter::Sun { frame, irradiance, one_minus_cos } => {
                 if *one_minus_cos == 0.0 {
-                    let (wi, radiance) = (frame.n, *irradiance);
-                    return Some(DirectSample { wi, target: None, radiance, pdf_w: probability, delta: true });
+                    let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
+                    let arrival_pdf_a = self.entry_pdf_a(p, wi);
+                    return Some(DirectSample { wi, target: None, radiance, pdf_w, delta: true, arrival_pdf_a });
                 }
                 let wi = frame.to_world(warp::cone_uniform(u, *one_minus_cos));
                 let radiance = Emitter::sun_radiance(*irradiance, *one_minus_cos);
                 let pdf_w = probability * warp::cone_uniform_pdf_w(*one_minus_cos);
-                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false })
+                let arrival_pdf_a = self.entry_pdf_a(p, wi);
+                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
@@ -192,6 +219,7 @@ impl Lights {
                     radiance: environment.radiance(wi),
                     pdf_w,
                     delta: false,
+                    arrival_pdf_a: self.entry_pdf_a(p, wi),
                 })
             }
         }
@@ -201,6 +229,33 @@ impl Lights {
     /// [`Lights::sample_direct`] from the ray's origin `p` would have found that point.
     #[inline]
     pub fn hit(&self, materials: &Materials, p: Vec3, surface: &Surface) -> Option<(Rgb, f32)> {
+        let to = surface.p - p;
+        let distance2 = to.length_squared();
+        let (radiance, density) = self.emitted(materials, surface, -to / distance2.sqrt())?;
+        Some((radiance, density.direct * distance2 / density.cos))
+    }
+
+    /// Density per solid angle of emission along cosine `cos` from a triangle.
+    #[inline]
+    fn lambertian(cos: f32, two_sided: bool) -> f32 {
+        cos * FRAC_1_PI * if two_sided { 0.5 } else { 1.0 }
+    }
+
+    /// Density per solid angle of emission from a spot along its axis.
+    #[inline]
+    fn spot_pdf_w(cos_inner: f32, cos_outer: f32) -> f32 {
+        1.0 / (TAU * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0))
+    }
+
+    /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p` towards the light, `wi`.
+    #[inline]
+    pub fn entry_pdf_a(&self, p: Vec3, wi: Vec3) -> f32 {
+        self.targets.density(&self.sky, p, wi)
+    }
+
+    /// Radiance of a surface along `wo` and the densities of starting a light path there that way.
+    #[inline]
+    pub fn emitted(&self, materials: &Materials, surface: &Surface, wo: Vec3) -> Option<(Rgb, EmissionDensity)> {
         let first = self.first[surface.instance as usize];
         if first == u32::MAX {
             return None;
@@ -211,15 +266,15 @@ impl Lights {
         }
         let index = (first + relative) as usize;
         let Emitter::Triangle { area, two_sided, .. } = &self.emitters[index] else { return None };
-        let to = surface.p - p;
-        let distance2 = to.length_squared();
-        let cos = -surface.ng.dot(to) / distance2.sqrt();
+        let cos = surface.ng.dot(wo);
         if !(cos > 0.0 || (*two_sided && cos < 0.0)) {
             return None;
         }
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures);
-        let probability = self.choice.as_ref()?.pdf(index);
-        Some((radiance, probability * distance2 / (area * cos.abs())))
+        let cos = cos.abs();
+        let direct = self.choice.as_ref()?.pdf(index) / area;
+        let onward = Self::lambertian(cos, *two_sided);
+        Some((radiance, EmissionDensity { direct, onward, cos, infinite: false, delta: false }))
     }
 
     /// Calls `each(radiance, density)` for every light at infinity that a ray leaving the scene along `d` meets.
@@ -252,7 +307,8 @@ impl Lights {
     ) -> Option<EmissionSample> {
         let (index, probability, rest) = self.choice.as_ref()?.sample(choice);
         let emitter = &self.emitters[index];
-        let (origin, d, flux) = match emitter {
+        // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine at the light.
+        let (origin, d, flux, [direct, onward, cos]) = match emitter {
             Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
                 let b = warp::triangle_uniform(point);
                 let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
@@ -262,9 +318,13 @@ impl Lights {
                 let material = &materials.list[light.material as usize];
                 let radiance =
                     material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
-                (light.spawn(d), d, radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 }))
+                let cos = light.ng.dot(d).abs();
+                let flux = radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 });
+                (light.spawn(d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
             }
-            Emitter::Point { p, intensity } => (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU)),
+            Emitter::Point { p, intensity } => {
+                (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])
+            }
             Emitter::Spot { p, frame, intensity, cos_inner, cos_outer } => {
                 // Full cone and penumbra are chosen by their flux; inside the penumbra the ramp's square is inverted, so every
                 // path carries the same flux.
@@ -275,14 +335,19 @@ impl Lights {
                     if x < inner { 1.0 - x } else { cos_outer + (cos_inner - cos_outer) * ((x - inner) / edge).cbrt() };
                 let sin = (1.0 - cos * cos).max(0.0).sqrt();
                 let (s, c) = (TAU * direction.y).sin_cos();
-                (*p, frame.to_world(Vec3::new(sin * c, sin * s, cos)), *intensity * (TAU * (inner + edge)))
+                let pdf_w = Self::spot_pdf_w(*cos_inner, *cos_outer);
+                let falloff = spot_falloff(cos, *cos_inner, *cos_outer);
+                let d = frame.to_world(Vec3::new(sin * c, sin * s, cos));
+                (*p, d, *intensity / pdf_w, [1.0, falloff * pdf_w, 1.0])
             }
             Emitter::Sun { frame, irradiance, one_minus_cos } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
                 // Irradiance is what a facing surface gets from the whole cone; a path from direction d stands for
                 // L / pdf = E / mean cosine.
                 let flux = *irradiance * (2.0 / (2.0 - one_minus_cos));
-                (self.disc(point, d), d, flux * (PI * self.sky.radius * self.sky.radius))
+                let pdf_w = if *one_minus_cos == 0.0 { 1.0 } else { warp::cone_uniform_pdf_w(*one_minus_cos) };
+                let entry = 1.0 / (PI * self.sky.radius * self.sky.radius);
+                (self.disc(point, d), d, flux / entry, [pdf_w, entry, 1.0])
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
@@ -290,17 +355,22 @@ impl Lights {
                 if pdf <= 0.0 {
                     return None;
                 }
-                (self.disc(point, -wi), -wi, environment.radiance(wi) * (PI * self.sky.radius * self.sky.radius / pdf))
+                let entry = 1.0 / (PI * self.sky.radius * self.sky.radius);
+                (self.disc(point, -wi), -wi, environment.radiance(wi) / (pdf * entry), [pdf, entry, 1.0])
             }
         };
         let flux = flux / probability;
-        (flux.is_finite() && flux.max_element() > 0.0).then(|| EmissionSample {
+        let infinite = emitter.is_infinite();
+        let delta = emitter.is_delta();
+        let density = EmissionDensity { direct: direct * probability, onward, cos, infinite, delta };
+        (flux.is_finite() && flux.max_element() > 0.0).then_some(EmissionSample {
             origin,
             direction: d,
             flux,
             light: index as u32,
-            delta: emitter.is_delta(),
-            infinite: emitter.is_infinite(),
+            delta,
+            infinite,
+            density,
         })
     }
 

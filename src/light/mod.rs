@@ -10,4 +10,4 @@ pub use aim::Targets;
 pub use cdf::Cdf;
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
-pub use lights::{DirectSample, EmissionSample, Lights};
+pub use lights::{DirectSample, EmissionDensity, EmissionSample, Lights};

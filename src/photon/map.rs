@@ -64,9 +64,29 @@ struct Node {
     max: [f32x8; 3],
 }
 
+/// What a map can hold.
+pub trait Located: Copy + Send + Sync {
+    /// World position.
+    fn position(&self) -> Vec3;
+    /// Whether it is fit for the map.
+    fn is_finite(&self) -> bool;
+}
+
+impl Located for Photon {
+    #[inline]
+    fn position(&self) -> Vec3 {
+        self.p
+    }
+
+    #[inline]
+    fn is_finite(&self) -> bool {
+        self.p.is_finite() && self.flux.is_finite()
+    }
+}
+
 /// Photons of one pass, ready for range queries.
-pub struct PhotonMap {
-    photons: Vec<Photon>,
+pub struct PhotonMap<P = Photon> {
+    photons: Vec<P>,
     leaves: Vec<Leaf>,
     quantiser: Quantiser,
     /// `levels[0]` is the root's level (one node); the last level's children are leaves.
@@ -109,32 +129,37 @@ impl Aabb {
     const EMPTY: Aabb = Aabb { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     #[inline]
+    fn of(photon: &impl Located) -> Aabb {
+        Aabb { min: photon.position(), max: photon.position() }
+    }
+
+    #[inline]
     fn union(self, other: Aabb) -> Aabb {
         Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 }
 
-impl PhotonMap {
+impl<P: Located> PhotonMap<P> {
     /// Builds a map. `photons` come in a fixed order (by path, then vertex); photons that share a Morton cell keep it, so the
     /// map and every query's order of visits depend on the photons alone. Photons that are not finite are left out.
-    pub fn build(mut photons: Vec<Photon>) -> PhotonMap {
-        photons.retain(|p| p.p.is_finite() && p.flux.is_finite());
-        let bounds = photons.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb { min: p.p, max: p.p }));
+    pub fn build(mut photons: Vec<P>) -> PhotonMap<P> {
+        photons.retain(P::is_finite);
+        let bounds = photons.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb::of(p)));
         let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
         let quantiser = Quantiser { min: bounds.min, scale: ((1u32 << MORTON_BITS) - 1) as f32 / extent };
         let mut order: Vec<(u64, u32)> =
-            photons.par_iter().enumerate().map(|(i, photon)| (quantiser.code(photon.p), i as u32)).collect();
+            photons.par_iter().enumerate().map(|(i, photon)| (quantiser.code(photon.position()), i as u32)).collect();
         order.par_sort_unstable();
-        let photons: Vec<Photon> = order.par_iter().map(|&(_, i)| photons[i as usize]).collect();
+        let photons: Vec<P> = order.par_iter().map(|&(_, i)| photons[i as usize]).collect();
 
         let far = f32::INFINITY;
         let (leaves, mut boxes): (Vec<Leaf>, Vec<Aabb>) = photons
             .par_chunks(WIDTH)
             .map(|chunk| {
                 let axis = |a: usize| {
-                    f32x8::from(std::array::from_fn::<f32, WIDTH, _>(|i| chunk.get(i).map_or(far, |p| p.p[a])))
+                    f32x8::from(std::array::from_fn::<f32, WIDTH, _>(|i| chunk.get(i).map_or(far, |p| p.position()[a])))
                 };
-                let aabb = chunk.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb { min: p.p, max: p.p }));
+                let aabb = chunk.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb::of(p)));
                 (Leaf { x: axis(0), y: axis(1), z: axis(2) }, aabb)
             })
             .unzip();
@@ -165,27 +190,27 @@ impl PhotonMap {
     }
 
     /// The photons, in Morton order.
-    pub fn photons(&self) -> &[Photon] {
+    pub fn photons(&self) -> &[P] {
         &self.photons
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.photons.len() * size_of::<Photon>()
+        self.photons.len() * size_of::<P>()
             + self.leaves.len() * size_of::<Leaf>()
             + self.levels.iter().map(|l| l.len() * size_of::<Node>()).sum::<usize>()
     }
 
     /// About `2 * reach` photons around `p` along the Morton curve: a good guess at its neighbourhood.
-    pub(super) fn around(&self, p: Vec3, reach: usize) -> &[Photon] {
+    pub(super) fn around(&self, p: Vec3, reach: usize) -> &[P] {
         let code = self.quantiser.code(p);
-        let at = self.photons.partition_point(|photon| self.quantiser.code(photon.p) < code);
+        let at = self.photons.partition_point(|photon| self.quantiser.code(photon.position()) < code);
         &self.photons[at.saturating_sub(reach)..(at + reach).min(self.photons.len())]
     }
 
     /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p`, in Morton order.
     #[inline]
-    pub fn within(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(&Photon, f32)) {
+    pub fn within(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
         self.traverse(p, radius2, |photon, distance2, radius2| {
             visit(photon, distance2);
             radius2
@@ -194,7 +219,7 @@ impl PhotonMap {
 
     /// As [`PhotonMap::within`], where `visit` also gets and returns the radius squared, which it may shrink.
     #[inline]
-    pub(super) fn traverse(&self, p: Vec3, mut radius2: f32, mut visit: impl FnMut(&Photon, f32, f32) -> f32) {
+    pub(super) fn traverse(&self, p: Vec3, mut radius2: f32, mut visit: impl FnMut(&P, f32, f32) -> f32) {
         if self.levels.is_empty() {
             return;
         }

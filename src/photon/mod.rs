@@ -3,5 +3,5 @@
 mod map;
 mod nearest;
 
-pub use map::{Photon, PhotonFlags, PhotonMap};
+pub use map::{Located, Photon, PhotonFlags, PhotonMap};
 pub use nearest::{MAX_NEIGHBOURS, nearest_radius2};

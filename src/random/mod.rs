@@ -23,6 +23,8 @@ pub enum Domain {
     PilotEye = 4,
     /// Light paths of the pilot pass.
     PilotLight = 5,
+    /// Light paths that serve the eye paths of [`Domain::EyeCorrelated`].
+    LightCorrelated = 6,
     /// Anything in tests.
     Test = 99,
 }

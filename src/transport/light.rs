@@ -3,6 +3,7 @@
 use super::interior::Surroundings;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
+use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags};
 use crate::random::{Domain, SobolPair, Stream, mix};
@@ -32,6 +33,8 @@ pub struct Emitted {
     pub delta: bool,
     /// Index of the light.
     pub light: u32,
+    /// Densities of the start.
+    pub density: EmissionDensity,
 }
 
 impl LightPass {
@@ -73,6 +76,7 @@ impl LightPass {
             stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
             delta: emission.delta,
             light: emission.light,
+            density: emission.density,
         })
     }
 }

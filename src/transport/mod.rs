@@ -1,17 +1,26 @@
 //! Light transport: the one bounce loop, and the visitors that make algorithms of it.
 
+pub mod bidirectional;
+mod bidirectional_eye;
+mod bidirectional_light;
 mod direct;
 mod eye;
 mod interior;
 mod light;
+pub mod mis;
 mod path;
+mod photon_merge;
 mod segment;
 mod walk;
 
+pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Strategies, Technique};
+pub use bidirectional_eye::Meets;
+pub use bidirectional_light::{Left, Splat};
 pub use direct::{balance, direct_light};
 pub use eye::{Eye, EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, same_surface};
 pub use interior::{Crossing, Interior, Surroundings};
 pub use light::{Emitted, LightPass, light_path};
-pub use path::path_radiance;
+pub use path::{path_measure, path_radiance};
+pub use photon_merge::MergePhoton;
 pub use segment::{Arrival, End, next_surface, transmittance};
 pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

@@ -3,7 +3,9 @@
 //! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
 //! (`direct_light` splits them), so that the two check each other.
 
-use super::eye::Eye;
+use super::bidirectional::{Part, Trail};
+use super::bidirectional_eye::look;
+use super::eye::{Eye, EyeMeasure};
 use super::segment::transmittance;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
@@ -14,7 +16,8 @@ use crate::scene::Scene;
 struct PathTracer<'a> {
     scene: &'a Scene,
     max_depth: u32,
-    radiance: Rgb,
+    measure: EyeMeasure,
+    trail: Trail,
     last: Vec3,
 }
 
@@ -52,31 +55,54 @@ impl PathTracer<'_> {
     }
 }
 
+impl PathTracer<'_> {
+    fn add(&mut self, part: Part, light: Rgb) {
+        let measure = &mut self.measure;
+        *match part {
+            Part::Emission => &mut measure.emission,
+            Part::Direct => &mut measure.direct,
+            Part::Caustic => &mut measure.caustic_photons[0],
+            Part::Indirect => &mut measure.indirect,
+        } += light;
+    }
+}
+
 impl Visitor for PathTracer<'_> {
     fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+        look(&mut self.trail, vertex, scattered, &mut self.measure);
         let from = if scattered.is_none() { vertex.from } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, from, vertex.surface) {
-            self.radiance += vertex.throughput * radiance * Self::weight(scattered, pdf);
+            let part = self.trail.hit(scattered.map(|s| s.lobe));
+            self.add(part, vertex.throughput * radiance * Self::weight(scattered, pdf));
         }
         self.last = vertex.surface.p;
         if vertex.depth < self.max_depth {
-            self.radiance += vertex.throughput * self.next_event(vertex);
+            self.add(self.trail.next_event(), vertex.throughput * self.next_event(vertex));
         }
+        self.trail.leave(vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH));
         Next::Continue(LobeSet::ALL)
     }
 
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
-        let radiance = &mut self.radiance;
-        self.scene
-            .lights
-            .escape(direction, |light, pdf| *radiance += throughput * light * Self::weight(scattered, pdf));
+        if let Some(scattered) = scattered {
+            self.trail.scattered(scattered.lobe);
+        }
+        let part = self.trail.hit(scattered.map(|s| s.lobe));
+        let scene = self.scene;
+        scene.lights.escape(direction, |light, pdf| self.add(part, throughput * light * Self::weight(scattered, pdf)));
     }
+}
+
+/// What one path through a uniform point of pixel `(x, y)` measures, on one level.
+pub fn path_measure(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> EyeMeasure {
+    let start = eye.start(pixel, stream);
+    let (measure, trail) = (EyeMeasure::default(), Trail::START);
+    let mut tracer = PathTracer { scene: eye.scene, max_depth: eye.max_depth, measure, trail, last: start.origin };
+    walk(eye.scene, start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
+    tracer.measure
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    let start = eye.start(pixel, stream);
-    let mut tracer = PathTracer { scene: eye.scene, max_depth: eye.max_depth, radiance: Rgb::ZERO, last: start.origin };
-    walk(eye.scene, start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
-    tracer.radiance
+    path_measure(eye, pixel, stream).radiance(0)
 }

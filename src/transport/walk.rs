@@ -3,7 +3,7 @@
 
 use super::interior::Interior;
 use super::segment::{Arrival, End, next_surface};
-use crate::bsdf::{Bsdf, LobeSet, Shading, Transport};
+use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Parameters, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::random::{Draws, Purpose, Stream};
@@ -36,6 +36,8 @@ pub struct Vertex<'a> {
     pub surface: &'a Surface,
     /// How it scatters.
     pub shading: &'a Shading<'a>,
+    /// What it scatters by, from which its BSDF can be made again to outlive the walk.
+    pub parameters: &'a Parameters,
     /// Unit direction back along the path.
     pub wo: Vec3,
     /// Weight of the path up to here, before this vertex scatters.
@@ -77,6 +79,11 @@ pub enum Next {
 pub trait Visitor {
     /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
     fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next;
+    /// `sample` is drawn at `vertex`, and the path goes on.
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_>, sample: &BsdfSample) {
+        let _ = (vertex, sample);
+    }
     /// The path leaves the scene along `direction` with weight `throughput`; `from` is its last vertex.
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
         let _ = (direction, throughput, scattered);
@@ -132,6 +139,7 @@ pub fn walk<V: Visitor>(
         let vertex = Vertex {
             surface: &surface,
             shading: &shading,
+            parameters: &parameters,
             wo: -direction,
             throughput,
             depth,
@@ -156,6 +164,7 @@ pub fn walk<V: Visitor>(
         let sample =
             shading.sample(-direction, transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
         let Some(sample) = sample else { return };
+        visitor.scatter(&vertex, &sample);
         throughput *= sample.weight / survival;
         scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
         direction = sample.wi;

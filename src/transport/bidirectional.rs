@@ -1,0 +1,261 @@
+//! Bidirectional light transport: which strategies find a path, and what its two walks share.
+//!
+//! One presets-and-parts module serves light tracing, bidirectional path tracing \[Veach 1997, 10\], bidirectional photon mapping
+//! and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves splats (its vertices connected to the
+//! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
+
+use super::eye::Eye;
+use super::interior::{Interior, Surroundings};
+use super::mis::{Eta, MisState, Ratios};
+use crate::bsdf::{LobeSet, Shading};
+use crate::geometry::Surface;
+use crate::math::{Rgb, Vec3};
+
+/// Which strategies take part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Strategies {
+    /// Light vertices are connected to the camera.
+    pub camera: bool,
+    /// Next-event estimation, connection of vertices, and eye paths that run into lights.
+    pub connect: bool,
+    /// Photons are merged.
+    pub merge: bool,
+    /// Depth of the first vertex of a light path and of an eye path that is merged (1 is the first surface).
+    pub first_merged: [u32; 2],
+}
+
+impl Strategies {
+    /// Light tracing.
+    pub const LIGHT: Strategies = Strategies { camera: true, connect: false, merge: false, first_merged: [1, 1] };
+    /// Bidirectional path tracing.
+    pub const BDPT: Strategies = Strategies { camera: true, connect: true, merge: false, first_merged: [1, 1] };
+    /// Bidirectional photon mapping: every vertex merges, even direct light.
+    pub const BPM: Strategies = Strategies { camera: false, connect: false, merge: true, first_merged: [1, 1] };
+
+    /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly, if it can be connected to: other strategies do
+    /// both better, without bias.
+    pub fn vcm(camera_connects: bool) -> Strategies {
+        Strategies { camera: true, connect: true, merge: true, first_merged: [2, if camera_connects { 2 } else { 1 }] }
+    }
+
+    /// Whether a light path's vertex at `depth` leaves photons.
+    #[inline]
+    pub fn light_merges(&self, depth: u32) -> bool {
+        self.merge && depth >= self.first_merged[0]
+    }
+
+    /// Whether an eye path's vertex at `depth` merges photons.
+    #[inline]
+    pub fn eye_merges(&self, depth: u32) -> bool {
+        self.merge && depth >= self.first_merged[1]
+    }
+}
+
+/// What the bidirectional paths of a render share.
+#[derive(Clone, Copy)]
+pub struct Bidirectional<'a> {
+    /// Eye paths.
+    pub eye: Eye<'a>,
+    /// The solids around the lights.
+    pub surroundings: &'a Surroundings,
+    /// What finds paths.
+    pub strategies: Strategies,
+    /// Light paths connected to the camera for every eye path of a pixel.
+    pub light_paths: f32,
+    /// Light paths of a pass whose photons are merged.
+    pub merged_paths: f32,
+}
+
+impl Bidirectional<'_> {
+    /// Number of pixels.
+    #[inline]
+    pub fn pixels(&self) -> f32 {
+        let (width, height) = self.eye.camera.size();
+        width as f32 * height as f32
+    }
+}
+
+/// Which strategy found a path; `light` and `eye` are depths of the last vertices of the two walks it was put together from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Technique {
+    /// The eye path ran into a light with its segment number `eye`.
+    Hit {
+        /// See above.
+        eye: u32,
+    },
+    /// Next-event estimation.
+    NextEvent {
+        /// See above.
+        eye: u32,
+    },
+    /// Two vertices connected.
+    Connect {
+        /// See above.
+        light: u32,
+        /// See above.
+        eye: u32,
+    },
+    /// A light vertex connected to the camera.
+    Camera {
+        /// See above.
+        light: u32,
+    },
+    /// A photon merged.
+    Merge {
+        /// See above.
+        light: u32,
+        /// See above.
+        eye: u32,
+    },
+}
+
+/// Looks over the shoulder of the walks: for pictures per technique, and for tests. `()` costs nothing.
+pub trait Record {
+    /// `technique` has found light: `value` unweighted (without visibility), `from` the point connected to or merged, and the ratios its
+    /// weight comes from.
+    #[inline]
+    fn contribution(&mut self, technique: Technique, value: Rgb, from: Vec3, ratios: Ratios) {
+        let _ = (technique, value, from, ratios);
+    }
+}
+
+impl Record for () {}
+
+/// A light path's vertex that eye vertices can be connected to.
+#[derive(Clone, Copy, Debug)]
+pub struct LightVertex<'s> {
+    /// The surface.
+    pub surface: Surface,
+    /// How it scatters.
+    pub shading: Shading<'s>,
+    /// Unit direction towards where the light came from.
+    pub wo: Vec3,
+    /// Flux (W) of the path as if it were the only one.
+    pub throughput: Rgb,
+    /// Number of segments up to here.
+    pub depth: u32,
+    /// The solids on the side of `wo`.
+    pub interior: Interior,
+    /// The solids behind the surface.
+    pub interior_behind: Interior,
+    /// Partial sums of the weights.
+    pub mis: MisState,
+}
+
+/// Part of the picture that some light belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Emitters seen directly or through perfect mirrors and clear glass.
+    Emission,
+    /// Light from lights at the first vertex that scatters otherwise.
+    Direct,
+    /// Light focused by mirrors and glass on to that vertex.
+    Caustic,
+    /// Everything else.
+    Indirect,
+}
+
+/// Where on its way an eye path is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Nothing so far but perfect mirrors and clear glass.
+    Clear,
+    /// The last vertex was the first that scatters otherwise.
+    First,
+    /// Beyond.
+    Later,
+}
+
+/// What decides to which part the light of an eye path belongs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trail {
+    stage: Stage,
+    /// Length of the path so far.
+    pub length: f32,
+    /// The first vertex that is not clear scattered broadly, all later ones did not.
+    focus: bool,
+    /// All vertices scattered by delta lobes.
+    pub delta: bool,
+}
+
+impl Trail {
+    pub const START: Trail = Trail { stage: Stage::Clear, length: 0.0, focus: false, delta: true };
+
+    /// The last vertex sent the path on by `lobe`.
+    #[inline]
+    pub fn scattered(&mut self, lobe: LobeSet) {
+        self.delta &= lobe == LobeSet::DELTA;
+        match self.stage {
+            Stage::Clear => {}
+            Stage::First => self.focus = lobe == LobeSet::BROAD,
+            Stage::Later => self.focus &= lobe != LobeSet::BROAD,
+        }
+    }
+
+    /// An emitter is run into after `lobe` (`None`: by the first segment).
+    #[inline]
+    pub fn hit(&self, lobe: Option<LobeSet>) -> Part {
+        match (self.stage, lobe) {
+            (Stage::Clear, _) => Part::Emission,
+            (Stage::First, Some(lobe)) if lobe != LobeSet::DELTA => Part::Direct,
+            (Stage::Later, _) if self.focus => Part::Caustic,
+            _ => Part::Indirect,
+        }
+    }
+
+    /// Light at this vertex straight from a light.
+    #[inline]
+    pub fn next_event(&self) -> Part {
+        if self.stage == Stage::Clear { Part::Direct } else { Part::Indirect }
+    }
+
+    /// No vertex before this one scatters but by mirrors and clear glass.
+    #[inline]
+    pub fn is_clear(&self) -> bool {
+        self.stage == Stage::Clear
+    }
+
+    /// Leaves a vertex, which has lobes that are not delta if `smooth`.
+    #[inline]
+    pub fn leave(&mut self, smooth: bool) {
+        self.stage = match self.stage {
+            Stage::Clear if !smooth => Stage::Clear,
+            Stage::Clear => Stage::First,
+            _ => Stage::Later,
+        };
+    }
+}
+
+/// Bandwidths of the levels of one eye path, ascending, with their etas.
+#[derive(Clone, Copy, Debug)]
+pub struct MergeLevels {
+    radius2: [f32; super::MAX_LEVELS],
+    eta: [Eta; super::MAX_LEVELS],
+    count: usize,
+}
+
+impl MergeLevels {
+    /// From radii squared in ascending order (at most [`super::MAX_LEVELS`]) and an eta each.
+    #[inline]
+    pub fn new(levels: impl Iterator<Item = (f32, Eta)>) -> MergeLevels {
+        let mut all = MergeLevels { radius2: [0.0; super::MAX_LEVELS], eta: [Eta::NONE; super::MAX_LEVELS], count: 0 };
+        for (radius2, eta) in levels.take(super::MAX_LEVELS) {
+            all.radius2[all.count] = radius2;
+            all.eta[all.count] = eta;
+            all.count += 1;
+        }
+        all
+    }
+
+    /// Radii squared.
+    #[inline]
+    pub fn radius2(&self) -> &[f32] {
+        &self.radius2[..self.count]
+    }
+
+    /// Etas.
+    #[inline]
+    pub fn eta(&self) -> &[Eta] {
+        &self.eta[..self.count]
+    }
+}

@@ -1,0 +1,242 @@
+//! Eye paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass before.
+
+use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Technique, Trail};
+use super::bidirectional_light::{add, scatter};
+use super::eye::{EyeMeasure, Features, FirstHit};
+use super::mis::{self, End, MisState, Ratios};
+use super::photon_merge::{MergePhoton, merge_photons};
+use super::segment::transmittance;
+use super::walk::{Next, Scattered, Vertex, Visitor, walk};
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::light::EmissionDensity;
+use crate::math::{Rgb, Vec3, is_lit};
+use crate::photon::PhotonMap;
+use crate::random::{Purpose, Stream, mix};
+use crate::scene::Scene;
+
+/// What an eye path meets.
+pub struct Meets<'a> {
+    /// Vertices of its light path.
+    pub vertices: &'a [LightVertex<'a>],
+    /// Photons of the pass before; `None` in the first pass, whose etas must be [`mis::Eta::NONE`].
+    pub photons: Option<&'a PhotonMap<MergePhoton>>,
+    /// Its bandwidths.
+    pub levels: &'a MergeLevels,
+}
+
+struct EyeWalk<'a, R> {
+    shared: &'a Bidirectional<'a>,
+    meets: &'a Meets<'a>,
+    mis: MisState,
+    trail: Trail,
+    /// The last vertex.
+    last: Vec3,
+    measure: EyeMeasure,
+    record: &'a mut R,
+}
+
+/// The first hit and the features of a path that arrives at `vertex`.
+#[inline]
+pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_>, scattered: Option<Scattered>, measure: &mut EyeMeasure) {
+    match scattered {
+        None => measure.first = Some(FirstHit { p: vertex.surface.p, instance: vertex.surface.instance }),
+        Some(scattered) => trail.scattered(scattered.lobe),
+    }
+    trail.length += vertex.distance;
+    let shading = vertex.shading;
+    if trail.is_clear() && shading.bsdf.lobes().has(LobeSet::SMOOTH) {
+        let n = shading.frame.n;
+        measure.features = Features {
+            albedo: shading.albedo(vertex.wo, LobeSet::ALL),
+            normal: if n.dot(vertex.wo) < 0.0 { -n } else { n },
+            depth: trail.length,
+        };
+    }
+}
+
+/// Light left on the way from `vertex` along `wi` to `target` (`None`: out of the scene).
+#[inline]
+pub(super) fn visible(scene: &Scene, vertex: &Vertex<'_>, wi: Vec3, target: Option<Vec3>, token: u32) -> Rgb {
+    let origin = vertex.surface.spawn(wi);
+    let (direction, tmax) = match target {
+        None => (wi, f32::INFINITY),
+        Some(target) => {
+            let to = target - origin;
+            let distance = to.length();
+            (to / distance, distance)
+        }
+    };
+    let crosses = wi.dot(vertex.surface.ng) * vertex.wo.dot(vertex.surface.ng) < 0.0;
+    let interior = if crosses { vertex.interior_behind } else { vertex.interior };
+    transmittance(scene, origin, direction, tmax, interior, token)
+}
+
+impl<R: Record> EyeWalk<'_, R> {
+    #[inline]
+    fn add(&mut self, part: Part, value: Rgb, ratios: Ratios) {
+        add(&mut self.measure, self.meets.levels, part, value, ratios);
+    }
+
+    /// The path has run into a light that sends it `value`.
+    #[inline]
+    fn run_into(&mut self, value: Rgb, depth: u32, at: Vec3, scattered: Option<Scattered>, density: &EmissionDensity) {
+        let ratios = if self.trail.delta {
+            Ratios::ALONE
+        } else if self.shared.strategies.connect {
+            mis::hit(&self.mis, density)
+        } else {
+            return;
+        };
+        self.record.contribution(Technique::Hit { eye: depth }, value, at, ratios);
+        self.add(self.trail.hit(scattered.map(|s| s.lobe)), value, ratios);
+    }
+
+    #[inline]
+    fn next_event(&mut self, vertex: &Vertex<'_>) {
+        let scene = self.shared.eye.scene;
+        let Vertex { surface, shading, wo, draws, .. } = vertex;
+        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
+            return;
+        };
+        let (f, pdf) = shading.evaluate_cos(*wo, light.wi, Transport::Radiance, LobeSet::ALL);
+        let value = vertex.throughput * f * light.radiance / light.pdf_w;
+        if !is_lit(value) {
+            return;
+        }
+        let reverse = shading.pdf(light.wi, *wo, Transport::Importance, LobeSet::ALL);
+        let arrival_pdf_a = light.arrival_pdf_a * light.wi.dot(surface.ng).abs();
+        let ratios = mis::next_event(&self.mis, (pdf, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
+        let at = light.target.unwrap_or(light.wi);
+        self.record.contribution(Technique::NextEvent { eye: vertex.depth }, value, at, ratios);
+        let token = draws.token(Purpose::ShadowAlpha);
+        let value = value * visible(scene, vertex, light.wi, light.target, token);
+        self.add(self.trail.next_event(), value, ratios);
+    }
+
+    #[inline]
+    fn connect(&mut self, vertex: &Vertex<'_>, light: &LightVertex<'_>) {
+        let Bidirectional { eye, strategies, .. } = self.shared;
+        let to = light.surface.p - vertex.surface.p;
+        let distance2 = to.length_squared();
+        let d = to / distance2.sqrt();
+        let (f_eye, pdf_eye) = vertex.shading.evaluate_cos(vertex.wo, d, Transport::Radiance, LobeSet::ALL);
+        if !is_lit(f_eye) {
+            return;
+        }
+        let (f_light, pdf_light) = light.shading.evaluate_cos(light.wo, -d, Transport::Importance, LobeSet::ALL);
+        let value = vertex.throughput * f_eye * f_light * light.throughput / distance2;
+        if !is_lit(value) {
+            return;
+        }
+        let (cos_eye, cos_light) = (d.dot(vertex.surface.ng).abs(), d.dot(light.surface.ng).abs());
+        let ratios = mis::connect(
+            &End {
+                mis: &light.mis,
+                reverse_pdf_w: light.shading.pdf(-d, light.wo, Transport::Radiance, LobeSet::ALL),
+                arrival_pdf_a: pdf_eye * cos_light / distance2,
+                merges: strategies.light_merges(light.depth),
+            },
+            &End {
+                mis: &self.mis,
+                reverse_pdf_w: vertex.shading.pdf(d, vertex.wo, Transport::Importance, LobeSet::ALL),
+                arrival_pdf_a: pdf_light * cos_eye / distance2,
+                merges: strategies.eye_merges(vertex.depth),
+            },
+        );
+        let technique = Technique::Connect { light: light.depth, eye: vertex.depth };
+        self.record.contribution(technique, value, light.surface.p, ratios);
+        // Every pair of vertices has its own decisions at cut-outs.
+        let token = mix(vertex.draws.bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
+        let value = value * visible(eye.scene, vertex, d, Some(light.surface.spawn(-d)), token);
+        self.add(Part::Indirect, value, ratios);
+    }
+}
+
+impl<R: Record> Visitor for EyeWalk<'_, R> {
+    #[inline]
+    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+        let Bidirectional { eye, strategies, .. } = self.shared;
+        look(&mut self.trail, vertex, scattered, &mut self.measure);
+        let cos = vertex.wo.dot(vertex.surface.ng).abs();
+        self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos);
+        if let Some((radiance, density)) = eye.scene.lights.emitted(&eye.scene.materials, vertex.surface, vertex.wo) {
+            self.run_into(vertex.throughput * radiance, vertex.depth, vertex.surface.p, scattered, &density);
+        }
+        let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
+        if smooth && vertex.depth < eye.max_depth {
+            if strategies.connect {
+                self.next_event(vertex);
+                let longest = eye.max_depth - vertex.depth;
+                for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {
+                    self.connect(vertex, light);
+                }
+            }
+            if let (true, Some(photons)) = (strategies.eye_merges(vertex.depth), self.meets.photons) {
+                let (measure, clear) = (&mut self.measure, self.trail.is_clear());
+                let longest = eye.max_depth - vertex.depth;
+                let add = |photon: &MergePhoton, level: usize, radiance: Rgb| {
+                    if clear && photon.depth == 1 {
+                        // Only where all is merged, which has one level.
+                        measure.direct += radiance;
+                    } else if photon.caustic {
+                        measure.caustic_photons[level] += radiance;
+                    } else {
+                        measure.indirect_photons[level] += radiance;
+                    }
+                };
+                merge_photons(photons, self.meets.levels, vertex, &self.mis, longest, self.record, add);
+            }
+        }
+        self.trail.leave(smooth);
+        self.last = vertex.surface.p;
+        // Without connections and merging only what mirrors and clear glass show is left to find.
+        Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
+    }
+
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_>, sample: &BsdfSample) {
+        let merges = self.shared.strategies.eye_merges(vertex.depth);
+        self.mis = scatter(self.mis, vertex, sample, Transport::Importance, merges);
+    }
+
+    #[inline]
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+        if let Some(scattered) = scattered {
+            self.trail.scattered(scattered.lobe);
+        }
+        let lights = &self.shared.eye.scene.lights;
+        let onward = lights.entry_pdf_a(self.last, direction);
+        lights.escape(direction, |radiance, direct| {
+            let density = EmissionDensity { direct, onward, cos: 1.0, infinite: true, delta: false };
+            self.run_into(throughput * radiance, 0, direction, scattered, &density);
+        });
+    }
+}
+
+impl Bidirectional<'_> {
+    /// Walks the eye path of `pixel` and measures all levels.
+    #[inline]
+    pub fn eye_path<R: Record>(
+        &self,
+        pixel: (u32, u32),
+        stream: Stream,
+        meets: &Meets<'_>,
+        record: &mut R,
+    ) -> EyeMeasure {
+        let eye = &self.eye;
+        let start = eye.start(pixel, stream);
+        let pdf_w = eye.camera.pdf_w(start.direction) * self.pixels();
+        let mut visitor = EyeWalk {
+            shared: self,
+            meets,
+            mis: MisState::camera(self.light_paths, pdf_w),
+            trail: Trail::START,
+            last: start.origin,
+            measure: EyeMeasure::default(),
+            record,
+        };
+        walk(eye.scene, start, stream, Transport::Radiance, eye.max_depth, &mut visitor);
+        visitor.measure
+    }
+}

@@ -1,0 +1,192 @@
+//! Light paths of the bidirectional methods: what one leaves behind.
+
+use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Technique};
+use super::bidirectional_eye::visible;
+use super::eye::EyeMeasure;
+use super::light::LightPass;
+use super::mis::{self, MisState, Ratios};
+use super::photon_merge::MergePhoton;
+use super::walk::{Next, Scattered, Vertex, Visitor, walk};
+use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
+use crate::math::{Rgb, is_lit};
+use crate::random::Purpose;
+
+/// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
+#[derive(Clone, Copy, Debug)]
+pub struct Splat {
+    /// Index of the pixel, row by row.
+    pub pixel: u32,
+    /// Where it belongs.
+    pub part: Part,
+    /// Radiance of the pixel, unweighted.
+    pub value: Rgb,
+    /// What its weight comes from.
+    pub ratios: Ratios,
+}
+
+impl Splat {
+    /// Adds the weighted light to the pixel's measure.
+    #[inline]
+    pub fn apply(&self, levels: &MergeLevels, measure: &mut EyeMeasure) {
+        add(measure, levels, self.part, self.value, self.ratios);
+    }
+}
+
+/// Adds light to all levels of a measure, each with its own weight.
+#[inline]
+pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, part: Part, value: Rgb, ratios: Ratios) {
+    let into = match part {
+        // Neither can be merged before its first vertex, so no eta is in their weights.
+        Part::Emission => return measure.emission += value * ratios.weight(levels.eta()[0]),
+        Part::Direct => return measure.direct += value * ratios.weight(levels.eta()[0]),
+        Part::Caustic => &mut measure.caustic_photons,
+        Part::Indirect => &mut measure.indirect_photons,
+    };
+    for (into, &eta) in into.iter_mut().zip(levels.eta()) {
+        *into += value * ratios.weight(eta);
+    }
+}
+
+/// What light paths leave behind. `vertices` are those of the last path alone.
+#[derive(Default)]
+pub struct Left<'s> {
+    /// For the eye path it belongs to.
+    pub vertices: Vec<LightVertex<'s>>,
+    /// For the film, of all paths so far.
+    pub splats: Vec<Splat>,
+    /// For the next pass, of all paths so far.
+    pub photons: Vec<MergePhoton>,
+}
+
+struct LightWalk<'a, 's, R> {
+    shared: &'a Bidirectional<'s>,
+    mis: MisState,
+    infinite: bool,
+    caustic: bool,
+    photons_only: bool,
+    left: &'a mut Left<'s>,
+    record: &'a mut R,
+}
+
+impl<R: Record> LightWalk<'_, '_, R> {
+    fn connect_camera(&mut self, vertex: &Vertex<'_>) {
+        let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
+        let Vertex { surface, shading, wo, draws, .. } = vertex;
+        let Some(sample) = eye.camera.sample(surface.p, draws.two(Purpose::Lens)) else { return };
+        let f = shading.eval_cos(*wo, sample.wi, Transport::Importance, LobeSet::ALL);
+        // Density of the rays of one pixel.
+        let pdf_a = sample.importance * self.shared.pixels();
+        let value = vertex.throughput * f * (pdf_a / light_paths);
+        // Written so that NaN is dropped here, before it costs a ray.
+        if !is_lit(value) {
+            return;
+        }
+        let ratios = if strategies.connect {
+            let reverse = shading.pdf(sample.wi, *wo, Transport::Radiance, LobeSet::ALL);
+            mis::camera(&self.mis, pdf_a * sample.wi.dot(surface.ng).abs(), *light_paths, reverse)
+        } else {
+            Ratios::ALONE
+        };
+        self.record.contribution(Technique::Camera { light: vertex.depth }, value, sample.lens, ratios);
+        let token = draws.token(Purpose::ShadowAlpha);
+        let value = value * visible(eye.scene, vertex, sample.wi, Some(sample.lens), token);
+        if value.max_element() > 0.0 {
+            let (width, height) = eye.camera.size();
+            let (x, y) = ((sample.film.x as u32).min(width - 1), (sample.film.y as u32).min(height - 1));
+            let part = match (vertex.depth, self.caustic) {
+                (1, _) => Part::Direct,
+                (_, true) => Part::Caustic,
+                _ => Part::Indirect,
+            };
+            self.left.splats.push(Splat { pixel: y * width + x, part, value, ratios });
+        }
+    }
+}
+
+impl<R: Record> Visitor for LightWalk<'_, '_, R> {
+    #[inline]
+    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+        let Bidirectional { eye, strategies, merged_paths, .. } = self.shared;
+        if let Some(scattered) = scattered {
+            self.caustic &= scattered.lobe != LobeSet::BROAD;
+        }
+        let first_from_infinity = scattered.is_none() && self.infinite;
+        let distance2 = if first_from_infinity { 1.0 } else { vertex.distance * vertex.distance };
+        self.mis = self.mis.arrive(distance2, vertex.wo.dot(vertex.surface.ng).abs());
+        let lobes = vertex.shading.bsdf.lobes();
+        // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders of materials.
+        if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
+            let flux = vertex.throughput / *merged_paths;
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.caustic, &self.mis));
+        }
+        if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
+            if strategies.connect {
+                self.left.vertices.push(LightVertex {
+                    surface: *vertex.surface,
+                    shading: Shading { bsdf: Bsdf::new(vertex.parameters, &eye.scene.tables), ..*vertex.shading },
+                    wo: vertex.wo,
+                    throughput: vertex.throughput,
+                    depth: vertex.depth,
+                    interior: vertex.interior,
+                    interior_behind: vertex.interior_behind,
+                    mis: self.mis,
+                });
+            }
+            if strategies.camera {
+                self.connect_camera(vertex);
+            }
+        }
+        Next::Continue(LobeSet::ALL)
+    }
+
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_>, sample: &BsdfSample) {
+        let merges = self.shared.strategies.light_merges(vertex.depth);
+        self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, merges);
+    }
+}
+
+/// The sums after a vertex has scattered; `back` is the transport of the other side's paths.
+#[inline]
+pub(super) fn scatter(
+    mis: MisState,
+    vertex: &Vertex<'_>,
+    sample: &BsdfSample,
+    back: Transport,
+    merges: bool,
+) -> MisState {
+    let cos = sample.wi.dot(vertex.surface.ng).abs();
+    if sample.lobe == LobeSet::DELTA {
+        return mis.scatter_delta(cos);
+    }
+    mis.scatter(cos, sample.pdf_w, vertex.shading.pdf(sample.wi, vertex.wo, back, LobeSet::ALL), merges)
+}
+
+impl<'s> Bidirectional<'s> {
+    /// Walks light path `index` of `pass`; with `photons_only` it leaves nothing else.
+    #[inline]
+    pub fn light_path<R: Record>(
+        &self,
+        pass: &LightPass,
+        index: u32,
+        photons_only: bool,
+        left: &mut Left<'s>,
+        record: &mut R,
+    ) {
+        left.vertices.clear();
+        let eye = &self.eye;
+        let Some(emitted) = pass.emit(eye.scene, self.surroundings, index) else { return };
+        let mut start = emitted.start;
+        start.throughput *= pass.paths() as f32;
+        let mut visitor = LightWalk {
+            shared: self,
+            mis: MisState::light(&emitted.density),
+            infinite: emitted.density.infinite,
+            caustic: true,
+            photons_only,
+            left,
+            record,
+        };
+        walk(eye.scene, start, emitted.stream, Transport::Importance, eye.max_depth, &mut visitor);
+    }
+}

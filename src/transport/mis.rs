@@ -1,0 +1,202 @@
+//! Multiple importance sampling of vertex connection and merging, accumulated along the walk.
+//!
+//! One function per equation of Georgiev, "Implementing Vertex Connection and Merging" (2012), numbers in brackets; it knows no scene. With
+//! the balance heuristic all partial sums are affine in `eta = pi r^2 n_VM / n_VC`, the one number that holds the merging radius. We
+//! keep the two coefficients apart and put `eta` in when a weight is evaluated, so the radius may differ by pixel, level and pass, and photons
+//! of one pass may be merged in the next. Since `dVM = dVC / eta` holds at the start and is kept by (34) to (36), one pair of coefficients
+//! serves both. [`Eta::NONE`] is bidirectional path tracing; [`Eta::MERGE_ONLY`] leaves merging as the only strategy.
+//!
+//! An eye path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at its last vertex must not
+//! count when it is: [`MisState::last`] keeps that term apart for one more vertex.
+//!
+//! Roulette is left out of all densities: weights need only sum to one. Delta lobes count as if their forward and reverse densities
+//! were equal \[(53) to (55)\], which neglects n^2 ratios, the same for all strategies.
+
+use crate::light::EmissionDensity;
+
+/// `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: how many merges there are for a connection, per unit of density.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eta(pub f32);
+
+impl Eta {
+    /// Nothing is merged.
+    pub const NONE: Eta = Eta(0.0);
+    /// Nothing but merging.
+    pub const MERGE_ONLY: Eta = Eta(f32::INFINITY);
+
+    /// `light_paths` of a pass merged within a squared radius, one connected.
+    #[inline]
+    pub fn new(radius2: f32, light_paths: f32) -> Eta {
+        Eta(std::f32::consts::PI * radius2 * light_paths)
+    }
+}
+
+/// Densities of all strategies of a path over that of plain connection at the one in question: affine in eta.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ratios {
+    /// The part without eta.
+    pub plain: f32,
+    /// The coefficient of eta.
+    pub merged: f32,
+}
+
+impl Ratios {
+    /// No other strategy can do it.
+    pub const ALONE: Ratios = Ratios { plain: 1.0, merged: 0.0 };
+
+    /// Weight of any strategy but merging \[(37), the balance heuristic\].
+    #[inline]
+    pub fn weight(self, eta: Eta) -> f32 {
+        // Without the test a path that cannot be merged would weigh 0 * infinity under MERGE_ONLY.
+        1.0 / if self.merged > 0.0 { self.plain + eta.0 * self.merged } else { self.plain }
+    }
+
+    /// Weight of merging; eta above 0.
+    #[inline]
+    pub fn merge_weight(self, eta: Eta) -> f32 {
+        1.0 / (self.merged + self.plain / eta.0)
+    }
+}
+
+/// Partial sums at a vertex: `dVC = plain + eta * (merged + last)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MisState {
+    /// dVCM \[(31)\].
+    pub d_vcm: f32,
+    /// The part of dVC \[(32)\] without eta.
+    pub plain: f32,
+    /// The coefficient of eta in dVC, but for the merge at the vertex before.
+    pub merged: f32,
+    /// The merge at the vertex before.
+    pub last: f32,
+}
+
+impl MisState {
+    /// A light path's start \[(31), (32), (48) to (52)\]. A delta light cannot be run into.
+    #[inline]
+    pub fn light(start: &EmissionDensity) -> MisState {
+        let plain = if start.delta { 0.0 } else { start.cos / (start.direct * start.onward) };
+        MisState { d_vcm: 1.0 / start.onward, plain, merged: 0.0, last: 0.0 }
+    }
+
+    /// An eye path's start \[(31)\]: light paths that are connected to the camera for every eye path of a pixel, over the density per solid
+    /// angle of that eye path; 0 when the camera cannot be connected to.
+    #[inline]
+    pub fn camera(light_paths: f32, camera_pdf_w: f32) -> MisState {
+        let d_vcm = if camera_pdf_w > 0.0 { light_paths / camera_pdf_w } else { 0.0 };
+        MisState { d_vcm, ..MisState::default() }
+    }
+
+    /// Arrival at a surface \[(31) to (33), the conversion of measures\]: distance squared (1 on the first segment of light from infinity) and the
+    /// cosine there.
+    #[must_use]
+    #[inline]
+    pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
+        let inverse = 1.0 / cos;
+        MisState {
+            d_vcm: self.d_vcm * distance2 * inverse,
+            plain: self.plain * inverse,
+            merged: self.merged * inverse,
+            last: self.last * inverse,
+        }
+    }
+
+    /// Departure by a lobe that is not delta \[(34), (35)\]: cosine, and densities per solid angle of the direction and of its reverse.
+    /// `merges`: photons may be merged at this vertex.
+    #[must_use]
+    #[inline]
+    pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: bool) -> MisState {
+        let ratio = cos / pdf_w;
+        MisState {
+            d_vcm: 1.0 / pdf_w,
+            plain: ratio * (self.plain * reverse_pdf_w + self.d_vcm),
+            merged: ratio * (self.merged + self.last) * reverse_pdf_w,
+            last: if merges { ratio } else { 0.0 },
+        }
+    }
+
+    /// Departure by a delta lobe, whose forward and reverse densities cancel \[(53) to (55)\].
+    #[must_use]
+    #[inline]
+    pub fn scatter_delta(self, cos: f32) -> MisState {
+        MisState { d_vcm: 0.0, plain: self.plain * cos, merged: (self.merged + self.last) * cos, last: 0.0 }
+    }
+
+    /// Densities of all strategies that end this side earlier, over that of ending here; `reverse_pdf_w` is the density of scattering back
+    /// along the path.
+    #[inline]
+    fn earlier(&self, reverse_pdf_w: f32) -> Ratios {
+        Ratios { plain: self.d_vcm + self.plain * reverse_pdf_w, merged: (self.merged + self.last) * reverse_pdf_w }
+    }
+}
+
+/// Adds 1 to what eta multiplies where photons may be merged.
+#[inline]
+fn and_merge(side: Ratios, merges: bool) -> Ratios {
+    Ratios { plain: side.plain, merged: side.merged + if merges { 1.0 } else { 0.0 } }
+}
+
+/// An eye path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is never merged.
+#[inline]
+pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
+    let emission = light.direct * light.onward;
+    Ratios { plain: 1.0 + light.direct * eye.d_vcm + emission * eye.plain, merged: emission * eye.merged }
+}
+
+/// Next-event estimation \[(44), (45)\].
+///
+/// `pdf_w`, `reverse_pdf_w`: densities at the eye vertex of the direction to the light and back; `light_pdf_w`: that of next-event
+/// estimation (the choice of the light included); `arrival_pdf_a`: of emission from the light's point per area of the eye vertex. A delta light
+/// cannot be run into. Direct light is never merged.
+#[inline]
+pub fn next_event(
+    eye: &MisState,
+    (pdf_w, reverse_pdf_w): (f32, f32),
+    (light_pdf_w, arrival_pdf_a): (f32, f32),
+    delta: bool,
+) -> Ratios {
+    let hit = if delta { 0.0 } else { pdf_w / light_pdf_w };
+    let eye = eye.earlier(reverse_pdf_w);
+    Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: arrival_pdf_a * eye.merged }
+}
+
+/// A light vertex connected to the camera \[(46), (47)\]: density of an eye path's arrival per area there, over the number of light paths
+/// connected; density of scattering back along the light path. What the camera sees directly is not merged.
+#[inline]
+pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
+    let light = light.earlier(reverse_pdf_w);
+    let scale = camera_pdf_a / light_paths;
+    Ratios { plain: 1.0 + scale * light.plain, merged: scale * light.merged }
+}
+
+/// One side of a connection.
+#[derive(Clone, Copy, Debug)]
+pub struct End<'a> {
+    /// Sums of its path.
+    pub mis: &'a MisState,
+    /// Density per solid angle of scattering back along its path.
+    pub reverse_pdf_w: f32,
+    /// Density per area at which the other end's path would arrive here.
+    pub arrival_pdf_a: f32,
+    /// Photons may be merged here.
+    pub merges: bool,
+}
+
+/// Two vertices connected \[(40), (41)\].
+#[inline]
+pub fn connect(light: &End<'_>, eye: &End<'_>) -> Ratios {
+    let side = |end: &End<'_>| and_merge(end.mis.earlier(end.reverse_pdf_w), end.merges);
+    let (l, e) = (side(light), side(eye));
+    Ratios {
+        plain: light.arrival_pdf_a * l.plain + 1.0 + eye.arrival_pdf_a * e.plain,
+        merged: light.arrival_pdf_a * l.merged + eye.arrival_pdf_a * e.merged,
+    }
+}
+
+/// A light vertex merged into an eye vertex \[(38), (39)\]: densities there of scattering towards the photon's past and towards the eye.
+/// For [`Ratios::merge_weight`].
+#[inline]
+pub fn merge(light: &MisState, eye: &MisState, pdf_w: f32, reverse_pdf_w: f32) -> Ratios {
+    let (l, e) = (light.earlier(pdf_w), eye.earlier(reverse_pdf_w));
+    Ratios { plain: l.plain + e.plain, merged: 1.0 + l.merged + e.merged }
+}

@@ -1,0 +1,105 @@
+//! Photons that are merged with multiple importance sampling.
+
+use super::bidirectional::{MergeLevels, Record, Technique};
+use super::mis::{self, MisState};
+use super::walk::Vertex;
+use crate::bsdf::{LobeSet, Transport};
+use crate::math::{Rgb, Vec3, is_lit};
+use crate::photon::{Located, PhotonMap};
+use std::f32::consts::FRAC_1_PI;
+
+/// Photons of a surface whose normal turns further than this (cosine) from the merging point's are not its own.
+const NORMAL_COSINE: f32 = 0.7;
+
+/// A light-path vertex, as small as merging in the next pass allows.
+#[derive(Clone, Copy, Debug)]
+pub struct MergePhoton {
+    /// World position.
+    pub p: Vec3,
+    /// Unit direction towards where the light came from.
+    pub wi: Vec3,
+    /// Unit geometric normal of the surface.
+    pub ng: Vec3,
+    /// Flux (W), already divided by the number of light paths of the pass.
+    pub flux: Rgb,
+    /// Partial sums of the weights: dVCM, and dVC's two coefficients.
+    d_vcm: f32,
+    plain: f32,
+    merged: f32,
+    /// Segments of the light path up to here.
+    pub depth: u16,
+    /// Every bounce since the light was specular (delta or sharp).
+    pub caustic: bool,
+}
+
+impl Located for MergePhoton {
+    #[inline]
+    fn position(&self) -> Vec3 {
+        self.p
+    }
+
+    #[inline]
+    fn is_finite(&self) -> bool {
+        self.p.is_finite() && self.flux.is_finite()
+    }
+}
+
+impl MergePhoton {
+    /// The photon that a light path leaves at `vertex`.
+    #[inline]
+    pub fn new(vertex: &Vertex<'_>, flux: Rgb, caustic: bool, mis: &MisState) -> MergePhoton {
+        MergePhoton {
+            p: vertex.surface.p,
+            wi: vertex.wo,
+            ng: vertex.surface.ng,
+            flux,
+            d_vcm: mis.d_vcm,
+            plain: mis.plain,
+            merged: mis.merged + mis.last,
+            depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+            caustic,
+        }
+    }
+
+    /// Partial sums of the weights.
+    #[inline]
+    pub fn mis(&self) -> MisState {
+        MisState { d_vcm: self.d_vcm, plain: self.plain, merged: self.merged, last: 0.0 }
+    }
+}
+
+/// Merges the photons around `vertex`, of all levels with one query: calls `add(photon, level, radiance)`.
+#[inline]
+pub(super) fn merge_photons<R: Record>(
+    photons: &PhotonMap<MergePhoton>,
+    levels: &MergeLevels,
+    vertex: &Vertex<'_>,
+    mis: &MisState,
+    longest: u32,
+    record: &mut R,
+    mut add: impl FnMut(&MergePhoton, usize, Rgb),
+) {
+    let radii = levels.radius2();
+    let Some(&largest) = radii.last() else { return };
+    let (ng, wo, shading) = (vertex.surface.ng, vertex.wo, vertex.shading);
+    photons.within(vertex.surface.p, largest, |photon, distance2| {
+        if photon.ng.dot(ng) <= NORMAL_COSINE || u32::from(photon.depth) > longest {
+            return;
+        }
+        let (f, pdf) = shading.evaluate_cos(wo, photon.wi, Transport::Radiance, LobeSet::ALL);
+        // Photons measure irradiance on the geometric surface: the cosine in f belongs to a direction, not to them.
+        let value = vertex.throughput * f * photon.flux / photon.wi.dot(ng).abs();
+        if !is_lit(value) {
+            return;
+        }
+        let reverse = shading.pdf(photon.wi, wo, Transport::Importance, LobeSet::ALL);
+        let ratios = mis::merge(&photon.mis(), mis, pdf, reverse);
+        let technique = Technique::Merge { light: u32::from(photon.depth), eye: vertex.depth };
+        record.contribution(technique, value, photon.p, ratios);
+        for (level, (&radius2, &eta)) in radii.iter().zip(levels.eta()).enumerate() {
+            if distance2 < radius2 {
+                add(photon, level, value * (ratios.merge_weight(eta) * FRAC_1_PI / radius2));
+            }
+        }
+    });
+}

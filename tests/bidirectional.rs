@@ -1,0 +1,426 @@
+//! Methods made of whole paths: against closed forms where they can, and against each other tile by tile.
+//!
+//! Closed forms are t tests over independent seeds, and tiles are compared by Welch's t statistic over seeds; the family-wise error rate is 0.1 %
+//! for a scene (Sidak over methods and tiles), plus the stated bias of the kernel for methods that merge. Every comparison is shown to have power: a
+//! tile brighter by a stated share is rejected, and so are the bugs planted in the arithmetic of weights (`tests/mis.rs`).
+
+mod support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::{Material, MediumParameters};
+use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, Shard, paths, sppm};
+use caustique::scene::description::{
+    EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,
+};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::stats::{mean_and_error, t_critical};
+
+const ERROR_RATE: f64 = 1e-3;
+const ALL: [Method; 5] = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm];
+
+fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
+    let camera = scene.camera(&square(size)).expect("a camera");
+    let rendered = paths(scene, &camera, settings, method, |_, _| Control::Continue);
+    assert_eq!(rendered.rejected(), 0, "{method:?}");
+    rendered
+}
+
+fn settings(iterations: u64, radius: f32, seed: u64) -> Settings {
+    Settings {
+        seed,
+        initial: InitialBandwidth::Fixed(radius),
+        levels: Levels::new(1),
+        alpha: 0.75,
+        iterations: Some(iterations),
+        ..Settings::default()
+    }
+}
+
+fn value(rendered: &Rendered, level: usize, index: usize) -> f64 {
+    rendered.pixels[index].levels[level].mean.element_sum() / 3.0
+}
+
+// ---------------------------------------------------------------- closed forms
+
+struct Check {
+    expected: f64,
+    /// Relative bias of the closed form or of the kernel that is known to remain.
+    bias: f64,
+    /// Relative shift of the expectation that must be rejected.
+    detects: f64,
+}
+
+impl Check {
+    fn passes(&self, values: &[f64], expected: f64) -> bool {
+        let (mean, error) = mean_and_error(values);
+        let critical = t_critical(ERROR_RATE, ALL.len(), values.len() as f64 - 1.0);
+        (mean - expected).abs() <= critical * error + (self.bias + 1e-6) * expected.abs()
+    }
+
+    /// Means over an 8 x 8 picture, 12 seeds.
+    fn run(&self, what: &str, scene: &Scene, methods: &[Method], iterations: u64, radius: f32) {
+        for &method in methods {
+            let mean = |seed| {
+                let rendered = render(scene, method, 8, &settings(iterations, radius, seed));
+                (0..64).map(|i| value(&rendered, 0, i)).sum::<f64>() / 64.0
+            };
+            let values: Vec<f64> = (0..12).map(mean).collect();
+            let (mean, error) = mean_and_error(&values);
+            println!("{what}, {method:?}: {mean:.6} +- {error:.6}, expected {:.6}", self.expected);
+            assert!(self.passes(&values, self.expected), "{what}, {method:?}: {mean} +- {error}, {}", self.expected);
+            for sign in [-1.0, 1.0] {
+                let planted = self.expected * (1.0 + sign * self.detects);
+                assert!(
+                    !self.passes(&values, planted),
+                    "{what}, {method:?}: cannot tell {planted} ({mean} +- {error})"
+                );
+            }
+        }
+    }
+}
+
+fn floor(half: f32) -> caustique::geometry::Mesh {
+    quad(Vec3::new(-half, 0.0, -half), Vec3::Z * (2.0 * half), Vec3::X * (2.0 * half))
+}
+
+/// Cosine over distance squared from a point at height `y`, off by `x` and `z`.
+fn lambert(x: f64, y: f64, z: f64) -> f64 {
+    y / (x * x + y * y + z * z).powf(1.5)
+}
+
+fn mean_over_square(half: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
+    let at = |i: i32| (f64::from(i) + 0.5) / 50.0 * half - half;
+    (0..10_000).map(|i| f(at(i % 100), at(i / 100))).sum::<f64>() / 10_000.0
+}
+
+fn sun(intensity: f32) -> PunctualLight {
+    PunctualLight {
+        name: "sun".into(),
+        to_world: DAffine3::from_quat(glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
+        intensity: Rgb::splat(intensity),
+        kind: PunctualKind::Sun { angle: 0.0 },
+        radius: 0.0,
+    }
+}
+
+/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho).
+#[test]
+fn furnace_box() {
+    let (rho, e) = (0.5, 0.5);
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(rho, e));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    let scene = build(description);
+    let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
+    check.run("furnace", &scene, &ALL, 400, 0.1);
+}
+
+/// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2.
+#[test]
+fn sphere_light_over_a_plane() {
+    let (rho, radiance, radius, height) = (0.5, 4.0, 0.5, 1.0);
+    let mut description = Description::default();
+    add(&mut description, "plane", floor(3.0), matte(rho, 0.0));
+    add(&mut description, "lamp", sphere(Vec3::Y * height, radius, 128), matte(0.0, radiance));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.4, 0.0), DVec3::ZERO, 60.0));
+    let scene = build(description);
+    let half = 0.4 * 30f64.to_radians().tan();
+    let facing = f64::from(rho * radiance * radius * radius);
+    let expected = mean_over_square(half, |x, z| facing * lambert(x, 1.0, z));
+    // 128 segments: the inscribed polyhedron is smaller by 1e-3; kernels average the irradiance's curvature.
+    let check = Check { expected, bias: 2.5e-3, detects: 0.1 };
+    check.run("sphere light", &scene, &ALL, 1500, 0.06);
+}
+
+/// A point light over a plane, and its mirror image: what a path tracer cannot find.
+#[test]
+fn point_light_beside_a_mirror() {
+    let mut description = Description::default();
+    let (rho, intensity) = (0.5, 2.0);
+    add(&mut description, "plane", floor(4.0), matte(rho, 0.0));
+    let wall = quad(Vec3::new(-1.0, 0.0, -4.0), Vec3::Y * 8.0, Vec3::Z * 8.0);
+    add(&mut description, "mirror", wall, mirror());
+    description.lights.push(point_light(DVec3::new(0.0, 1.0, 0.0), intensity));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.5, 0.0), DVec3::ZERO, 60.0));
+    let scene = build(description);
+    let scale = f64::from(rho * intensity) / std::f64::consts::PI;
+    let half = 0.5 * 30f64.to_radians().tan();
+    let expected = mean_over_square(half, |x, z| scale * (lambert(x, 1.0, z) + lambert(x + 2.0, 1.0, z)));
+    let check = Check { expected, bias: 2.5e-3, detects: 0.08 };
+    check.run("mirror", &scene, &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm], 1000, 0.05);
+}
+
+/// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab.
+#[test]
+fn sun_through_a_slab_seen_directly_and_through_a_slab() {
+    let (rho, e, n) = (0.5, 3.0, 1.5f64);
+    for (through, what) in [(false, "caustic"), (true, "caustic behind glass")] {
+        let mut description = Description::default();
+        add(&mut description, "plane", floor(0.5), matte(rho, 0.0));
+        add(&mut description, "slab", cuboid(Vec3::new(-0.5, 4.0, -0.5), Vec3::new(0.5, 4.1, 0.5), false), glass(1.5));
+        description.lights.push(sun(e));
+        if through {
+            let pane = cuboid(Vec3::new(-0.5, 2.0, -0.5), Vec3::new(0.5, 2.01, 0.5), false);
+            add(&mut description, "pane", pane, glass(1.5));
+        }
+        description.cameras.push(look_at(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, 12.0));
+        let scene = build(description);
+        let f = ((n - 1.0) / (n + 1.0)).powi(2);
+        let expected =
+            f64::from(rho * e) / std::f64::consts::PI * ((1.0 - f) / (1.0 + f)).powi(if through { 3 } else { 1 });
+        let check = Check { expected, bias: 6e-3, detects: 0.06 };
+        let methods: &[Method] = if through {
+            &[Method::Bpm, Method::Vcm]
+        } else {
+            &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm]
+        };
+        check.run(what, &scene, methods, 2000, 0.1);
+    }
+}
+
+/// Radiance of a lamp seen straight through a slab that absorbs.
+#[test]
+fn lamp_seen_through_absorbing_glass() {
+    let (n, sigma, depth, radiance) = (1.5, 2.0, 0.25, 5.0);
+    let mut description = Description::default();
+    let water = MediumParameters { sigma_a: Rgb::splat(sigma), sigma_s: Rgb::ZERO, g: 0.0 };
+    let material = Material { medium: Some(water), ..glass(n) };
+    let slab = cuboid(Vec3::new(-2.0, 1.0, -2.0), Vec3::new(2.0, 1.0 + depth, 2.0), false);
+    add(&mut description, "slab", slab, material);
+    add(&mut description, "lamp", floor(2.0), matte(0.0, radiance));
+    description.cameras.push(look_at(DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, 0.1));
+    let scene = build(description);
+    let f = ((f64::from(n) - 1.0) / (f64::from(n) + 1.0)).powi(2);
+    let a = f64::from(-sigma * depth).exp();
+    let expected = f64::from(radiance) * (1.0 - f).powi(2) * a / (1.0 - f * f * a * a);
+    Check { expected, bias: 1e-4, detects: 0.03 }.run("absorbing slab", &scene, &ALL, 400, 0.1);
+}
+
+// ---------------------------------------------------------------- agreement
+
+const SIZE: u32 = 32;
+const TILE: u32 = 8;
+const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
+const SEEDS: u64 = 10;
+
+fn tiles(rendered: &Rendered, level: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; TILES];
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            sums[(y / TILE * (SIZE / TILE) + x / TILE) as usize] +=
+                value(rendered, level, (y * SIZE + x) as usize) / f64::from(TILE * TILE);
+        }
+    }
+    sums
+}
+
+/// Tiles in which two sets of seeds differ by more than chance and `bias` (relative) allow; `tests` share the error rate.
+fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], tests: usize, bias: f64) -> Vec<String> {
+    let critical = t_critical(ERROR_RATE, tests, (a.len().min(b.len()) - 1) as f64);
+    (0..TILES)
+        .filter_map(|tile| {
+            let (mean_a, error_a) = mean_and_error(&a.iter().map(|s| s[tile]).collect::<Vec<_>>());
+            let (mean_b, error_b) = mean_and_error(&b.iter().map(|s| s[tile]).collect::<Vec<_>>());
+            let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
+            ((mean_a - mean_b).abs() > allowed)
+                .then(|| format!("tile {tile}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}"))
+        })
+        .collect()
+}
+
+fn by(scene: &Scene, (method, iterations): (Method, u64), radius: f32, max_depth: u32) -> Vec<Vec<f64>> {
+    let settings = |seed| Settings { max_depth, ..settings(iterations, radius, seed) };
+    (0..SEEDS).map(|seed| tiles(&render(scene, method, SIZE, &settings(seed)), 0)).collect()
+}
+
+fn average(images: &[Vec<f64>]) -> f64 {
+    images.iter().flatten().sum::<f64>() / (images.len() * TILES) as f64
+}
+
+/// All `methods` against the first, tile by tile; a tile brighter by `planted` must be noticed.
+fn agree(what: &str, scene: &Scene, methods: &[(Method, u64)], radius: f32, bias: f64, planted: f64) {
+    let reference = by(scene, methods[0], radius, u32::MAX);
+    println!("{what}: {:?} {:.5}", methods[0].0, average(&reference));
+    agree_with(what, scene, &reference, &methods[1..], (radius, u32::MAX), bias, planted);
+}
+
+fn agree_with(
+    what: &str,
+    scene: &Scene,
+    reference: &[Vec<f64>],
+    methods: &[(Method, u64)],
+    (radius, max_depth): (f32, u32),
+    bias: f64,
+    planted: f64,
+) {
+    let tests = TILES * methods.len();
+    for &method in methods {
+        let images = by(scene, method, radius, max_depth);
+        println!("{what}: {:?} {:.5}", method.0, average(&images));
+        let bias = if method.0.merges() { bias } else { 0.0 };
+        let found = disagreeing(&images, reference, tests, bias);
+        assert!(found.is_empty(), "{what}, {:?}: {found:#?}", method.0);
+        let mut wrong = images;
+        for seed in &mut wrong {
+            seed[5] *= 1.0 + planted;
+        }
+        let noticed = !disagreeing(&wrong, reference, tests, bias).is_empty();
+        assert!(noticed, "{what}, {:?}: a tile brighter by {planted} goes unnoticed", method.0);
+    }
+}
+
+fn room(walls: Material) -> Description {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), walls);
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    description
+}
+
+/// Plastic and rough metal in a room: layered lobes, wide and narrow.
+#[test]
+fn glossy_room() {
+    let plastic = Material { base_color: [0.6, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
+    let mut description = room(plastic);
+    let metal =
+        |roughness| Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness, ..Material::default() };
+    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
+    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
+    let scene = build(description);
+    let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm].map(|m| (m, 48));
+    agree("glossy room", &scene, &methods, 0.04, 0.02, 0.15);
+}
+
+/// Smooth and rough glass, with a lens in front of the camera. Light tracing sees nothing behind smooth glass, so it stays out.
+#[test]
+fn glass_room() {
+    let mut description = room(matte(0.5, 0.0));
+    add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
+    let rough = Material { roughness: 0.4, ..glass(1.4) };
+    add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
+    description.cameras[0].aperture_radius = 0.05;
+    description.cameras[0].focus_distance = 2.5;
+    let scene = build(description);
+    let methods = [Method::Path, Method::Bdpt, Method::Bpm, Method::Vcm].map(|m| (m, 64));
+    agree("glass room", &scene, &methods, 0.04, 0.02, 0.2);
+}
+
+/// Everything lit from outside by a bright patch of sky and a sun of finite size, with rough metal in the open.
+#[test]
+fn under_the_sky() {
+    let mut description = Description::default();
+    add(&mut description, "floor", floor(1.5), matte(0.5, 0.0));
+    let block = cuboid(Vec3::new(-0.6, 0.0, -0.6), Vec3::new(-0.1, 0.7, -0.1), false);
+    add(&mut description, "block", block, matte(0.6, 0.0));
+    // Narrow enough for light paths to be aimed at it.
+    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
+    add(&mut description, "ball", sphere(Vec3::new(0.4, 0.35, 0.1), 0.35, 64), metal);
+    let (width, height) = (32, 16);
+    let mut texels = vec![[0.3, 0.4, 0.6]; (width * height) as usize];
+    for y in 2..6 {
+        for x in 3..9 {
+            texels[y * width as usize + x] = [6.0, 5.0, 4.0];
+        }
+    }
+    let source = EnvironmentSource::Image { width, height, texels };
+    description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
+    description.lights.push(PunctualLight { kind: PunctualKind::Sun { angle: 0.2 }, ..sun(2.0) });
+    description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
+    let scene = build(description);
+    let methods = [(Method::Path, 64), (Method::Light, 768), (Method::Bdpt, 64), (Method::Bpm, 512), (Method::Vcm, 64)];
+    agree("under the sky", &scene, &methods, 0.03, 0.03, 0.2);
+}
+
+/// Parallel projection, which no light path can be connected to, and paths of four segments at most.
+#[test]
+fn short_paths_seen_in_parallel() {
+    let mut description = room(matte(0.6, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 64), mirror());
+    description.cameras[0].projection = Projection::Orthographic { xmag: 0.9, ymag: 0.9 };
+    let scene = build(description);
+    let reference = by(&scene, (Method::Path, 48), 0.04, 4);
+    let methods = [Method::Bdpt, Method::Bpm, Method::Vcm].map(|m| (m, 48));
+    agree_with("parallel", &scene, &reference, &methods, (0.04, 4), 0.02, 0.15);
+}
+
+/// Caustics of a point light seen in a mirror and through glass, which only photons find: against progressive photon mapping. Counting photons
+/// twice would double most tiles.
+#[test]
+fn caustics_behind_glass() {
+    let mut description = Description::default();
+    let walls = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true);
+    add(&mut description, "room", walls, matte(0.5, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(-0.4, 0.4, 0.0), 0.4, 128), glass(1.5));
+    let pane = cuboid(Vec3::new(-1.2, 0.1, 1.5), Vec3::new(1.2, 1.9, 1.55), false);
+    add(&mut description, "pane", pane, glass(1.5));
+    let glossy = quad(Vec3::new(0.9, 0.1, -0.9), Vec3::Z * 1.8, Vec3::Y * 1.6);
+    add(&mut description, "mirror", glossy, mirror());
+    description.lights.push(point_light(DVec3::new(0.1, 1.6, 0.3), 3.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.7, 0.0), 50.0));
+    let scene = build(description);
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let radius = 0.04;
+    let by_sppm = |seed| {
+        let settings = Settings { photons: 20_000, ..settings(16, radius, seed) };
+        tiles(&sppm(&scene, &camera, &settings, |_, _| Control::Continue), 0)
+    };
+    let reference: Vec<Vec<f64>> = (0..SEEDS).map(by_sppm).collect();
+    println!("behind glass: sppm {:.5}", average(&reference));
+    let methods = [(Method::Vcm, 160), (Method::Bpm, 160)];
+    agree_with("behind glass", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.3);
+}
+
+// ---------------------------------------------------------------- levels, shards, threads
+
+fn small_room() -> Scene {
+    let mut description = room(matte(0.6, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 64), glass(1.5));
+    build(description)
+}
+
+/// Five levels from one light pass: each agrees with path tracing.
+#[test]
+fn levels_agree() {
+    let scene = small_room();
+    let reference = by(&scene, (Method::Path, 64), 0.1, u32::MAX);
+    let renders: Vec<Rendered> = (0..SEEDS)
+        .map(|seed| render(&scene, Method::Vcm, SIZE, &Settings { levels: Levels::new(5), ..settings(32, 0.08, seed) }))
+        .collect();
+    for level in 0..5 {
+        let images: Vec<Vec<f64>> = renders.iter().map(|r| tiles(r, level)).collect();
+        println!("level {}: {:.5}, paths {:.5}", level + 1, average(&images), average(&reference));
+        let found = disagreeing(&images, &reference, 5 * TILES, 0.02);
+        assert!(found.is_empty(), "level {}: {found:#?}", level + 1);
+    }
+}
+
+/// The same bits from one thread and from three, on a picture that tiles do not fill; and two shards make the whole.
+#[test]
+fn threads_and_shards_change_nothing() {
+    let scene = small_room();
+    let all = |rendered: &Rendered| -> Vec<[f64; 3]> {
+        let levels = rendered.pixels.iter().flat_map(|p| p.levels[..5].iter());
+        levels.map(|l| l.mean.to_array()).collect()
+    };
+    let base = Settings { levels: Levels::new(5), ..settings(6, 0.08, 7) };
+    for method in [Method::Bdpt, Method::Bpm, Method::Vcm] {
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            all(&pool.install(|| render(&scene, method, 40, &base)))
+        };
+        let whole = with(1);
+        assert!(whole == with(3), "{method:?}: threads change the picture");
+        let shard =
+            |index| all(&render(&scene, method, 40, &Settings { shard: Shard { index, count: 2 }, ..base.clone() }));
+        let (a, b) = (shard(0), shard(1));
+        for ((a, b), whole) in a.iter().zip(&b).zip(&whole) {
+            for c in 0..3 {
+                let mean = 0.5 * (a[c] + b[c]);
+                assert!((mean - whole[c]).abs() <= 1e-9 + 1e-9 * whole[c].abs(), "{method:?}: {mean} and {}", whole[c]);
+            }
+        }
+    }
+}

@@ -1,0 +1,545 @@
+//! The oracle of multiple importance sampling: every weight again, from explicit densities of whole paths.
+//!
+//! A recorder sees each contribution that the walks make on random paths in three scenes. The oracle walks the same paths by the same draws, writes down
+//! every vertex, multiplies densities per area for every strategy that could have made the path, and must find the weight that the
+//! recursion gave. Then the recursion is run by hand over the same vertices for all strategies of a path: the weights must sum to one, and no longer do
+//! when a bug is planted in it.
+
+mod support;
+
+use caustique::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
+use caustique::camera::Camera;
+use caustique::light::{EmissionDensity, Emitter};
+use caustique::material::Material;
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::photon::PhotonMap;
+use caustique::random::{Domain, Purpose, Stream};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+use caustique::scene::{Description, Scene};
+use caustique::transport::mis::{self, Eta, MisState, Ratios};
+use caustique::transport::{
+    Bidirectional, Eye, Left, LightPass, Meets, MergeLevels, Next, PathStart, Record, Scattered, Strategies,
+    Surroundings, Technique, Vertex, Visitor, walk,
+};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+
+const SIZE: u32 = 16;
+const TOLERANCE: f64 = 1e-4;
+
+/// A vertex as a walk has met it.
+#[derive(Clone, Copy)]
+struct Met<'s> {
+    p: Vec3,
+    ng: Vec3,
+    shading: Shading<'s>,
+    /// Back along the walk.
+    wo: Vec3,
+    distance: f32,
+    /// How the walk went on.
+    onward: Option<(Vec3, bool, f32)>,
+    emitted: Option<EmissionDensity>,
+}
+
+/// Writes down a walk.
+struct Notes<'a> {
+    scene: &'a Scene,
+    met: Vec<Met<'a>>,
+    escaped: Option<Vec3>,
+}
+
+impl Visitor for Notes<'_> {
+    fn surface(&mut self, v: &Vertex<'_>, _: Option<Scattered>) -> Next {
+        let emitted = self.scene.lights.emitted(&self.scene.materials, v.surface, v.wo).map(|e| e.1);
+        self.met.push(Met {
+            p: v.surface.p,
+            ng: v.surface.ng,
+            shading: Shading { bsdf: Bsdf::new(v.parameters, &self.scene.tables), ..*v.shading },
+            wo: v.wo,
+            distance: v.distance,
+            onward: None,
+            emitted,
+        });
+        Next::Continue(LobeSet::ALL)
+    }
+
+    fn scatter(&mut self, _: &Vertex<'_>, sample: &BsdfSample) {
+        if let Some(last) = self.met.last_mut() {
+            last.onward = Some((sample.wi, sample.lobe == LobeSet::DELTA, sample.pdf_w));
+        }
+    }
+
+    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>) {
+        self.escaped = Some(direction);
+    }
+}
+
+fn notes<'a>(scene: &'a Scene, start: PathStart, stream: Stream, transport: Transport) -> Notes<'a> {
+    let mut notes = Notes { scene, met: Vec::new(), escaped: None };
+    walk(scene, start, stream, transport, 12, &mut notes);
+    notes
+}
+
+/// A surface vertex of a whole path.
+#[derive(Clone, Copy)]
+struct Node<'s> {
+    shading: Shading<'s>,
+    to_light: Vec3,
+    to_eye: Vec3,
+    /// Cosines for arrivals from the light's and from the eye's side (two surfaces where a photon is merged).
+    cos: [f64; 2],
+    delta: bool,
+    /// Density of the direction that a walk has drawn here, towards the light or away. In single precision a grazing direction has too few digits to
+    /// evaluate it again.
+    drawn: Option<(bool, f32)>,
+}
+
+/// A whole path, from the light to the eye.
+struct Whole<'s> {
+    light: EmissionDensity,
+    nodes: Vec<Node<'s>>,
+    /// Squared lengths: `distance2[j]` is that of the segment before node `j`; one more to the camera.
+    distance2: Vec<f64>,
+    /// Density per solid angle of the rays of one pixel.
+    camera_pdf_w: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Strategy {
+    Hit,
+    NextEvent,
+    /// After this many nodes from the light.
+    Connect(usize),
+    Camera,
+    /// At this node, from 0.
+    Merge(usize),
+}
+
+impl<'s> Whole<'s> {
+    /// Appends vertices of a walk, in the order from the light to the eye, each with the segment that the walk came by.
+    fn append<'m>(&mut self, met: impl Iterator<Item = &'m Met<'s>>, eye_side: bool)
+    where
+        's: 'm,
+    {
+        for met in met {
+            self.nodes.push(passed(met, eye_side));
+            self.distance2.push(f64::from(met.distance) * f64::from(met.distance));
+        }
+    }
+
+    fn strategies(&self) -> Vec<Strategy> {
+        let k = self.nodes.len();
+        let mut all = vec![Strategy::Hit, Strategy::NextEvent];
+        all.extend((1..k).map(Strategy::Connect));
+        all.push(Strategy::Camera);
+        all.extend((0..k).map(Strategy::Merge));
+        all
+    }
+
+    /// Density of scattering at node `j`, away from the light or towards it.
+    fn scatters(&self, j: usize, to_light: bool) -> f64 {
+        let node = &self.nodes[j];
+        if node.delta {
+            return 1.0;
+        }
+        if let Some((_, pdf)) = node.drawn.filter(|&(towards, _)| towards == to_light) {
+            return f64::from(pdf);
+        }
+        let (from, to, transport) = if to_light {
+            (node.to_eye, node.to_light, Transport::Radiance)
+        } else {
+            (node.to_light, node.to_eye, Transport::Importance)
+        };
+        f64::from(node.shading.pdf(from, to, transport, LobeSet::ALL))
+    }
+
+    /// Density per area of node `j` walked to from the light.
+    fn light_pdf_a(&self, j: usize) -> f64 {
+        let cos = self.nodes[j].cos[0];
+        match j {
+            0 if self.light.infinite => f64::from(self.light.onward) * cos,
+            0 => f64::from(self.light.onward) * cos / self.distance2[0],
+            _ => self.scatters(j - 1, false) * cos / self.distance2[j],
+        }
+    }
+
+    /// Density per area of node `j` walked to from the eye.
+    fn eye_pdf_a(&self, j: usize) -> f64 {
+        let pdf = if j + 1 == self.nodes.len() { self.camera_pdf_w } else { self.scatters(j + 1, true) };
+        pdf * self.nodes[j].cos[1] / self.distance2[j + 1]
+    }
+
+    /// Number of samples times density of the path by a strategy.
+    fn density(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: Eta) -> f64 {
+        let k = self.nodes.len();
+        let smooth = |j: usize| !self.nodes[j].delta;
+        let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.direct);
+        let eye = |n: usize| (n..k).map(|j| self.eye_pdf_a(j)).product::<f64>();
+        match strategy {
+            Strategy::Hit if self.light.delta => 0.0,
+            Strategy::Hit => {
+                let measure = if self.light.infinite { 1.0 } else { f64::from(self.light.cos) / self.distance2[0] };
+                self.scatters(0, true) * measure * eye(0)
+            }
+            Strategy::NextEvent if smooth(0) => light(0) * eye(0),
+            Strategy::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
+            Strategy::Camera if smooth(k - 1) => light_paths * light(k),
+            Strategy::Merge(m) => {
+                let (from_light, from_eye) = (m as u32 + 1, (k - m) as u32);
+                if !smooth(m) || !which.light_merges(from_light) || !which.eye_merges(from_eye) {
+                    return 0.0;
+                }
+                f64::from(eta.0) * light(m + 1) * eye(m)
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn weight(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: Eta) -> f64 {
+        let sum: f64 = self.strategies().into_iter().map(|s| self.density(s, which, light_paths, eta)).sum();
+        self.density(strategy, which, light_paths, eta) / sum
+    }
+
+    /// Weights of all strategies by the recursion.
+    fn recursive(&self, which: &Strategies, light_paths: f64, eta: Eta, bug: Option<Bug>) -> Vec<f64> {
+        let k = self.nodes.len();
+        let cosine = |c: f64| if bug == Some(Bug::Cosine) { 1.0 } else { c as f32 };
+        let go = |mis: MisState, j: usize, to_light: bool, merges: bool| {
+            let cos = self.nodes[j].cos[usize::from(!to_light)] as f32;
+            let cos = if to_light { self.nodes[j].cos[0] as f32 } else { cos };
+            if self.nodes[j].delta {
+                return mis.scatter_delta(cos);
+            }
+            let (mut forward, mut reverse) = (self.scatters(j, to_light) as f32, self.scatters(j, !to_light) as f32);
+            if bug == Some(Bug::Reverse) {
+                (forward, reverse) = (reverse, forward);
+            }
+            mis.scatter(cos, forward, reverse, merges)
+        };
+        let (mut lights, mut eyes) = (Vec::new(), vec![MisState::default(); k]);
+        let mut mis = MisState::light(&self.light);
+        for j in 0..k {
+            let distance2 = if j == 0 && self.light.infinite { 1.0 } else { self.distance2[j] as f32 };
+            mis = mis.arrive(distance2, cosine(self.nodes[j].cos[0]));
+            lights.push(mis);
+            let from = if bug == Some(Bug::DirectMerged) { 1 } else { j as u32 + 1 };
+            mis = go(mis, j, false, which.light_merges(from) || (bug == Some(Bug::DirectMerged) && which.merge));
+        }
+        let mut mis = MisState::camera(light_paths as f32, self.camera_pdf_w as f32);
+        let mut before_light = mis;
+        for j in (0..k).rev() {
+            mis = mis.arrive(self.distance2[j + 1] as f32, cosine(self.nodes[j].cos[1]));
+            eyes[j] = mis;
+            mis = go(mis, j, true, which.eye_merges((k - j) as u32));
+            before_light = mis;
+        }
+        let possible = |s: Strategy| self.density(s, which, light_paths, eta) > 0.0;
+        let one = |s: Strategy| -> f64 {
+            if !possible(s) {
+                return 0.0;
+            }
+            let reverse = |j: usize, to_light: bool| self.scatters(j, to_light) as f32;
+            f64::from(match s {
+                Strategy::Hit => {
+                    let at = if self.light.infinite {
+                        before_light
+                    } else {
+                        before_light.arrive(self.distance2[0] as f32, self.light.cos)
+                    };
+                    mis::hit(&at, &self.light).weight(eta)
+                }
+                Strategy::NextEvent => {
+                    let d2 = self.distance2[0] as f32;
+                    let solid = if self.light.infinite || self.light.delta { 1.0 } else { d2 / self.light.cos };
+                    let reach = if self.light.infinite { 1.0 } else { 1.0 / d2 };
+                    let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32;
+                    let pdfs = (reverse(0, true), reverse(0, false));
+                    mis::next_event(&eyes[0], pdfs, (self.light.direct * solid, arrival), self.light.delta).weight(eta)
+                }
+                Strategy::Connect(s) => {
+                    let light = mis::End {
+                        mis: &lights[s - 1],
+                        reverse_pdf_w: reverse(s - 1, true),
+                        arrival_pdf_a: self.eye_pdf_a(s - 1) as f32,
+                        merges: which.light_merges(s as u32),
+                    };
+                    let eye = mis::End {
+                        mis: &eyes[s],
+                        reverse_pdf_w: reverse(s, false),
+                        arrival_pdf_a: self.light_pdf_a(s) as f32,
+                        merges: which.eye_merges((k - s) as u32),
+                    };
+                    mis::connect(&light, &eye).weight(eta)
+                }
+                Strategy::Camera => {
+                    let (pdf_a, back) = (self.eye_pdf_a(k - 1) as f32, reverse(k - 1, true));
+                    mis::camera(&lights[k - 1], pdf_a, light_paths as f32, back).weight(eta)
+                }
+                Strategy::Merge(m) => {
+                    mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false)).merge_weight(eta)
+                }
+            })
+        };
+        self.strategies().into_iter().map(one).collect()
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Bug {
+    /// The cosine of an arrival forgotten.
+    Cosine,
+    /// Forward and reverse densities exchanged.
+    Reverse,
+    /// Merges counted where none are made.
+    DirectMerged,
+}
+
+/// What the library has said.
+#[derive(Default)]
+struct Said(Vec<(Technique, Vec3, Ratios)>);
+
+impl Record for Said {
+    fn contribution(&mut self, technique: Technique, _: Rgb, from: Vec3, ratios: Ratios) {
+        self.0.push((technique, from, ratios));
+    }
+}
+
+/// The node that a walk has gone through.
+fn passed<'s>(met: &Met<'s>, eye_side: bool) -> Node<'s> {
+    let (onward, delta, pdf) = met.onward.unwrap_or((Vec3::ZERO, false, 0.0));
+    let (to_light, to_eye) = if eye_side { (onward, met.wo) } else { (met.wo, onward) };
+    Node { delta, drawn: Some((eye_side, pdf)), ..node(met, met, to_light, to_eye) }
+}
+
+/// A node whose light side was met as `light` and whose eye side as `eye`, which scatters.
+fn node<'s>(light: &Met<'s>, eye: &Met<'s>, to_light: Vec3, to_eye: Vec3) -> Node<'s> {
+    let cos = |w: Vec3, met: &Met| f64::from(w.dot(met.ng).abs());
+    Node {
+        shading: eye.shading,
+        to_light,
+        to_eye,
+        cos: [cos(to_light, light), cos(to_eye, eye)],
+        delta: false,
+        drawn: None,
+    }
+}
+
+struct Tally {
+    weights: usize,
+    techniques: std::collections::BTreeMap<&'static str, usize>,
+    sums: usize,
+    bugs: [f64; 3],
+}
+
+/// Compares all that happens on `paths` random pairs of paths.
+fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
+    let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
+    let surroundings = Surroundings::new(scene, camera.position());
+    let eye = Eye { scene, camera: &camera, interior: surroundings.eye, max_depth: 12 };
+    let pixels = (SIZE * SIZE) as f32;
+    let strategies = Strategies::vcm(true);
+    let shared =
+        Bidirectional { eye, surroundings: &surroundings, strategies, light_paths: pixels, merged_paths: 2.0 * pixels };
+    let eta = Eta::new(radius * radius, 2.0 * pixels);
+    // Wider than eta says, so that enough is merged: weights know nothing of distances.
+    let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
+    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; 3] };
+    for path in 0..paths {
+        let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
+        let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
+        let stream = Stream::new(1, pass, Domain::EyeIndependent, u64::from(index));
+        let pixel = (index % SIZE, index / SIZE);
+        let (mut left, mut by_light, mut by_eye) = (Left::default(), Said::default(), Said::default());
+        shared.light_path(&lights, index, false, &mut left, &mut by_light);
+        let map = PhotonMap::build(left.photons.clone());
+        let meets = Meets { vertices: &left.vertices, photons: Some(&map), levels: &levels };
+        shared.eye_path(pixel, stream, &meets, &mut by_eye);
+
+        let start = eye.start(pixel, stream);
+        let eye_notes = notes(scene, start, stream, Transport::Radiance);
+        let emitted = lights.emit(scene, &surroundings, index);
+        let light_notes = emitted.as_ref().map(|e| notes(scene, e.start, e.stream, Transport::Importance));
+        let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);
+        let from_eye = &eye_notes.met[..];
+        let camera_pdf_w = f64::from(camera.pdf_w(start.direction) * pixels);
+        let square = |d: f32| f64::from(d) * f64::from(d);
+        for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
+            let density = emitted.as_ref().map(|e| e.density);
+            let infinity = EmissionDensity { direct: 0.0, onward: 0.0, cos: 1.0, infinite: true, delta: false };
+            let mut whole =
+                Whole { light: density.unwrap_or(infinity), nodes: vec![], distance2: vec![], camera_pdf_w };
+            let (name, strategy) = match technique {
+                Technique::Hit { eye: 1 } => continue,
+                Technique::Hit { eye: 0 } => {
+                    if from_eye.is_empty() {
+                        continue;
+                    }
+                    let direction = eye_notes.escaped.expect("an escape");
+                    let met = from_eye[from_eye.len() - 1];
+                    whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
+                    scene.lights.escape(direction, |_, pdf| whole.light.direct = pdf);
+                    whole.distance2.push(1.0);
+                    whole.append(from_eye[..from_eye.len()].iter().rev(), true);
+                    ("hit", Strategy::Hit)
+                }
+                Technique::Hit { eye: t } => {
+                    let t = t as usize;
+                    whole.light = from_eye[t - 1].emitted.expect("a lamp");
+                    whole.distance2.push(square(from_eye[t - 1].distance));
+                    whole.append(from_eye[..t - 1].iter().rev(), true);
+                    ("hit", Strategy::Hit)
+                }
+                Technique::NextEvent { eye: t } => {
+                    let met = &from_eye[t as usize - 1];
+                    let draws = stream.vertex(t);
+                    let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+                    let sample = scene.lights.sample_direct(&scene.shapes, &scene.materials, met.p, choice, point);
+                    let sample = sample.expect("a light sample");
+                    let mut distance2 = 1.0;
+                    whole.light = match sample.target {
+                        None => EmissionDensity {
+                            direct: sample.pdf_w,
+                            onward: scene.lights.entry_pdf_a(met.p, sample.wi),
+                            ..infinity
+                        },
+                        Some(target) if sample.delta => {
+                            distance2 = f64::from(target.distance_squared(met.p));
+                            let onward = 0.25 * std::f32::consts::FRAC_1_PI;
+                            EmissionDensity { direct: 1.0, onward, cos: 1.0, infinite: false, delta: true }
+                        }
+                        Some(target) => {
+                            // The lamp is flat and of one brightness: any of its triangles will do.
+                            let lamp = scene.lights.emitters().iter().find_map(|emitter| match emitter {
+                                Emitter::Triangle { instance, primitive, .. } => {
+                                    scene.shapes.surface(*instance, *primitive, [0.3, 0.3])
+                                }
+                                _ => None,
+                            });
+                            let lamp = lamp.expect("a lamp");
+                            // Shadow rays end a little off the lamp: back along its normal.
+                            let p = target - lamp.ng * (target - lamp.p).dot(lamp.ng);
+                            distance2 = f64::from(p.distance_squared(met.p));
+                            let emitted = scene.lights.emitted(&scene.materials, &lamp, -sample.wi);
+                            emitted.expect("light from the lamp").1
+                        }
+                    };
+                    assert_eq!(from, sample.target.unwrap_or(sample.wi));
+                    whole.distance2.push(distance2);
+                    whole.append(from_eye[..t as usize].iter().rev(), true);
+                    whole.nodes[0] = node(met, met, sample.wi, met.wo);
+                    ("next event", Strategy::NextEvent)
+                }
+                Technique::Connect { light: s, eye: t } => {
+                    let (s, t) = (s as usize, t as usize);
+                    let (a, b) = (&from_light[s - 1], &from_eye[t - 1]);
+                    let d = (b.p - a.p).normalize();
+                    whole.append(from_light[..s].iter(), false);
+                    whole.nodes[s - 1] = node(a, a, a.wo, d);
+                    whole.distance2.push(f64::from(b.p.distance_squared(a.p)));
+                    whole.append(from_eye[..t].iter().rev(), true);
+                    whole.nodes[s] = node(b, b, -d, b.wo);
+                    ("connect", Strategy::Connect(s))
+                }
+                Technique::Camera { light: s } => {
+                    let s = s as usize;
+                    let met = &from_light[s - 1];
+                    let d = (from - met.p).normalize();
+                    whole.append(from_light[..s].iter(), false);
+                    whole.nodes[s - 1] = node(met, met, met.wo, d);
+                    whole.distance2.push(f64::from(from.distance_squared(met.p)));
+                    whole.camera_pdf_w = f64::from(camera.pdf_w(-d) * pixels);
+                    ("camera", Strategy::Camera)
+                }
+                Technique::Merge { light: s, eye: t } => {
+                    let (s, t) = (s as usize, t as usize);
+                    let (a, b) = (&from_light[s - 1], &from_eye[t - 1]);
+                    assert_eq!(a.p, from);
+                    whole.append(from_light[..s].iter(), false);
+                    whole.nodes.pop();
+                    let merged = node(a, b, a.wo, b.wo);
+                    whole.append(from_eye[..t].iter().rev(), true);
+                    whole.nodes[s - 1] = merged;
+                    ("merge", Strategy::Merge(s - 1))
+                }
+            };
+            let expected = whole.weight(strategy, &strategies, f64::from(pixels), eta);
+            let found = match strategy {
+                Strategy::Merge(_) => ratios.merge_weight(eta),
+                _ => ratios.weight(eta),
+            };
+            let found = f64::from(found);
+            assert!(
+                (found - expected).abs() <= TOLERANCE,
+                "{what}, path {path}, {technique:?}: {found} by recursion, {expected} by densities"
+            );
+            tally.weights += 1;
+            *tally.techniques.entry(name).or_default() += 1;
+            if strategy != Strategy::Hit || whole.strategies().len() > 2 {
+                let sum = |bug| whole.recursive(&strategies, f64::from(pixels), eta, bug).iter().sum::<f64>();
+                let error = (sum(None) - 1.0).abs();
+                assert!(error <= TOLERANCE, "{what}, path {path}, {technique:?}: the weights sum to 1 + {error}");
+                tally.sums += 1;
+                for (bug, worst) in [Bug::Cosine, Bug::Reverse, Bug::DirectMerged].into_iter().zip(&mut tally.bugs) {
+                    *worst = worst.max((sum(Some(bug)) - 1.0).abs());
+                }
+            }
+        }
+    }
+    println!(
+        "{what}: {} weights, {} sums, {:?}; planted bugs {:?}",
+        tally.weights, tally.sums, tally.techniques, tally.bugs
+    );
+    assert!(tally.techniques.len() >= 4 && tally.weights > 1000, "{what}: too little happened");
+    for worst in tally.bugs {
+        assert!(worst > 100.0 * TOLERANCE, "{what}: a planted bug goes unnoticed ({worst})");
+    }
+}
+
+fn room() -> Description {
+    let mut description = Description::default();
+    let plastic = Material { base_color: [0.7, 0.6, 0.5, 1.0], metallic: 0.0, roughness: 0.4, ..Material::default() };
+    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), plastic);
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    description
+}
+
+/// Glossy walls, a mirror, a lamp with an area.
+#[test]
+fn lamp_in_a_glossy_room() {
+    let mut description = room();
+    let lamp = quad(Vec3::new(-0.4, 1.9, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.2, 8.0) });
+    add(&mut description, "mirror", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), mirror());
+    check("glossy room", &build(description), 0.1, 2000);
+}
+
+/// Smooth and rough glass under a point light.
+#[test]
+fn point_light_and_glass() {
+    let mut description = room();
+    add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 64), glass(1.5));
+    add(
+        &mut description,
+        "rough",
+        sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64),
+        Material { roughness: 0.5, ..glass(1.4) },
+    );
+    description.lights.push(point_light(DVec3::new(0.1, 1.7, 0.2), 3.0));
+    check("point light", &build(description), 0.1, 2000);
+}
+
+/// An environment image over rough metal: light from infinity.
+#[test]
+fn under_an_environment() {
+    let mut description = Description::default();
+    let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
+    add(&mut description, "floor", floor, matte(0.5, 0.0));
+    let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
+    add(&mut description, "ball", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
+    let wall = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0);
+    add(&mut description, "wall", wall, matte(0.6, 0.0));
+    let texels = (0..32 * 16).map(|i| [0.2 + (i % 7) as f32, 0.5, 0.3 + (i % 5) as f32]).collect();
+    let source = EnvironmentSource::Image { width: 32, height: 16, texels };
+    description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
+    description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.4, 0.0), 40.0));
+    check("environment", &build(description), 0.1, 4000);
+}
