@@ -4,7 +4,7 @@
 
 set -euo pipefail
 
-SCENE=${CAUSTIQUE_DEMO_SCENE:-scenes/torus.glb}
+SCENE=${CAUSTIQUE_DEMO_SCENE:-scenes/pool.glb}
 
 # shellcheck source=scripts/setup.sh
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"

@@ -112,9 +112,9 @@ fn shipped(text: &str) -> String {
     body.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
-/// Unfinished work and panics that no shipped line may hold.
+/// Unfinished work and panics that no shipped line may hold; printing that panics when nobody listens is one.
 fn forbidden(text: &str) -> Vec<&'static str> {
-    let words = ["todo!(", "unimplemented!(", ".unwrap()", ".unwrap_err()", "dbg!("];
+    let words = ["todo!(", "unimplemented!(", ".unwrap()", ".unwrap_err()", "dbg!(", "println!(", "eprint!("];
     let code = shipped(text);
     words.into_iter().filter(|word| code.contains(word)).collect()
 }
@@ -138,6 +138,7 @@ fn nothing_is_left_undone_or_unwrapped() {
 fn the_scan_finds_planted_faults() {
     assert_eq!(forbidden("fn f() { todo!() }"), ["todo!("]);
     assert_eq!(forbidden("let x = y.unwrap();"), [".unwrap()"]);
+    assert_eq!(forbidden("eprintln!();"), ["println!("]);
     assert_eq!(
         forbidden("// never .unwrap()\nfn f() {}\n#[cfg(test)]\nmod tests { fn t() { x.unwrap() } }"),
         [] as [&str; 0]

@@ -2,6 +2,7 @@
 
 use super::output::{self, PictureArgs};
 use super::progress::duration;
+use super::say;
 use caustique::combine::{Combiner, LevelStack, Model, Runtime};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{self, Layer, LayerSet, Naming, Plane, Role};
@@ -126,10 +127,8 @@ pub fn run(args: &CombineArgs) -> Result<()> {
         let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
         let naming = if blender { Naming::Blender } else { Naming::Plain };
         for name in take_plain_names(&mut set) {
-            eprintln!(
-                "warning: {}: layer \"{name}\" cannot be written under this name and is left out",
-                args.input.display()
-            );
+            let input = args.input.display();
+            say(&format!("warning: {input}: layer \"{name}\" cannot be written under this name and is left out"));
         }
         let clock = Clock::start();
         let facts = network.apply(&mut set).map_err(|error| error.within(args.input.display()))?;
@@ -138,7 +137,7 @@ pub fn run(args: &CombineArgs) -> Result<()> {
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
         args.picture.write_png(&set)?;
-        eprintln!("combined {} levels with {} in {}", network.levels(), network.name, duration(clock.seconds()));
+        say(&format!("combined {} levels with {} in {}", network.levels(), network.name, duration(clock.seconds())));
         Ok(())
     })
 }

@@ -2,7 +2,7 @@
 
 use super::{output, print, print_json};
 use caustique::error::{Error, Kind, Result};
-use caustique::film::LayerSet;
+use caustique::film::{Layer, LayerSet};
 use caustique::image::{Comparison, compare, exr, heat, png};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
     let (mut set, _) = exr::read(path)?;
     if let Some(name) = layer {
-        let names: Vec<String> = set.layers.iter().map(|layer| layer.name.clone()).collect();
+        let names: Vec<String> = set.layers.iter().map(shown).collect();
         set.layers.retain(|layer| layer.name == name);
         let Some(layer) = set.layers.first_mut() else {
             let error = Error::new(Kind::Usage, path.display(), format!("there is no layer \"{name}\""));
@@ -58,6 +58,12 @@ fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
         layer.name.clear();
     }
     Ok(set)
+}
+
+/// The name of a layer; the beauty, which has none, by its channels.
+fn shown(layer: &Layer) -> String {
+    let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
+    if layer.name.is_empty() { components.join(" ") } else { layer.name.clone() }
 }
 
 fn text(comparison: &Comparison) -> String {

@@ -1,4 +1,4 @@
-//! The command line: one file per command. Data goes to stdout, talk to stderr; only this module prints.
+//! The command line: one file per command. Data goes to stdout, talk to stderr; only this file prints.
 
 mod combine;
 mod compare;
@@ -52,8 +52,10 @@ pub fn main() -> ExitCode {
             Some(error) => return fail(&error),
             None => {
                 // Help and version were asked for: data, on stdout.
-                let shown = error.print();
-                return if shown.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+                return match error.print() {
+                    Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => ExitCode::FAILURE,
+                    _ => ExitCode::SUCCESS,
+                };
             }
         },
     };
@@ -72,9 +74,9 @@ pub fn main() -> ExitCode {
 
 /// The two lines of an error, and its exit code.
 fn fail(error: &Error) -> ExitCode {
-    eprintln!("{error}");
+    say(&error.to_string());
     if let Some(hint) = &error.hint {
-        eprintln!("hint: {hint}");
+        say(&format!("hint: {hint}"));
     }
     ExitCode::from(error.exit_code())
 }
@@ -83,6 +85,11 @@ fn fail(error: &Error) -> ExitCode {
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
     builder.build().map_err(|error| Error::new(Kind::Io, "threads", error).hint("ask for fewer with --threads"))
+}
+
+/// Prints a line to stderr. Nobody may be listening any more (a closed pipe, a terminal that is gone): a render goes on.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
 /// Prints data to stdout. A reader that has closed the pipe wants no more: that is no error.

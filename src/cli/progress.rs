@@ -1,5 +1,6 @@
 //! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
 
+use super::say;
 use caustique::render::{Progress, Settings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -81,19 +82,19 @@ impl Reporter {
                 let last = progress.iterations == Some(progress.iteration);
                 if progress.seconds >= self.next_line || last {
                     self.next_line = progress.seconds + PLAIN_EVERY;
-                    eprintln!("{}", sentence(progress));
+                    say(&sentence(progress));
                 }
             }
             Form::Json => {
                 let Progress { iteration, iterations, seconds, remaining, light_paths, error, .. } = *progress;
                 let line = Line { iteration, iterations, seconds, remaining, light_paths, error };
                 if let Ok(line) = serde_json::to_string(&line) {
-                    eprintln!("{line}");
+                    say(&line);
                 }
             }
             Form::Openjd => {
-                eprintln!("openjd_progress: {:.1}", 100.0 * self.fraction(progress));
-                eprintln!("openjd_status: {}", sentence(progress));
+                say(&format!("openjd_progress: {:.1}", 100.0 * self.fraction(progress)));
+                say(&format!("openjd_status: {}", sentence(progress)));
             }
             Form::None => {}
         }

@@ -1,6 +1,7 @@
 //! From a scene file and the options about it to a scene, with its warnings told.
 
 use super::number::{finite, not_negative, rgb};
+use super::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Scene, environment_file, gltf};
@@ -116,7 +117,7 @@ fn environment(description: &mut Description, args: &SceneArgs) -> Result<()> {
 /// Prints a line for each warning; with `--strict` they are an error that lists them all.
 pub fn tell(args: &SceneArgs, warnings: &[String]) -> Result<()> {
     for warning in warnings {
-        eprintln!("warning: {}: {warning}", args.path.display());
+        say(&format!("warning: {}: {warning}", args.path.display()));
     }
     if !args.strict || warnings.is_empty() {
         return Ok(());

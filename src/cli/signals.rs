@@ -1,7 +1,7 @@
-//! Ctrl-C and SIGTERM: the first asks for an end after the current iteration, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end after the current iteration, the second ends the program at once.
 
 use caustique::error::{Error, Kind, Result};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,7 +13,7 @@ impl Interrupt {
     /// Listens from now on.
     pub fn listen() -> Result<Interrupt> {
         let asked = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
+        for signal in [SIGINT, SIGTERM, SIGHUP] {
             // In this order: a signal ends the program if one came before it, and only then is noted itself.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&asked))
                 .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&asked)))

@@ -24,6 +24,8 @@ fn rephrase(text: &str) -> Error {
     let tips: Vec<String> = paragraphs
         .flat_map(str::lines)
         .filter_map(|line| line.trim_start().strip_prefix("tip: "))
+        // How to pass an unknown option as a value: no value of ours looks like one.
+        .filter(|tip| !tip.starts_with("to pass "))
         .map(str::to_string)
         .collect();
     let hint = if tips.is_empty() { "'--help' explains every option".to_string() } else { tips.join("; ") };
@@ -42,6 +44,10 @@ mod tests {
         );
         assert_eq!(error.to_string(), "command line: unexpected argument '--itertions' found");
         assert_eq!(error.hint.as_deref(), Some("a similar argument exists: '--iterations'"));
+        let error = rephrase(
+            "error: unexpected argument '--kernel' found\n\n  tip: to pass '--kernel' as a value, use '-- --kernel'\n\nU",
+        );
+        assert_eq!(error.hint.as_deref(), Some("'--help' explains every option"));
         let error = rephrase("error: the following required arguments were not provided:\n  --output <OUT.exr>\n\nU");
         assert_eq!(
             error.to_string(),

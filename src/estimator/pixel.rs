@@ -64,8 +64,8 @@ impl Pixel {
         let mut values = [Rgb::ZERO; MAX_LEVELS];
         values[0] = independent.radiance(0);
         if let Some(correlated) = correlated {
-            for level in 1..count {
-                values[level] = correlated.radiance(level - 1);
+            for (level, value) in values[1..count].iter_mut().enumerate() {
+                *value = correlated.radiance(level);
             }
         }
         if !values[..count].iter().all(|v| v.is_finite()) {

@@ -50,11 +50,11 @@ impl Surface {
         let ng = instance.normal(e1.cross(e2)).try_normalize()?;
         let blend3 = |values: &[Vec3]| values[triangle[0]] * b0 + values[triangle[1]] * b1 + values[triangle[2]] * b2;
         let mut ns = ng;
-        if !mesh.normals.is_empty() {
-            if let Some(n) = instance.normal(blend3(&mesh.normals)).try_normalize() {
-                // A file may carry normals that disagree with the winding: the winding decides which side is the front.
-                ns = if n.dot(ng) < 0.0 { -n } else { n };
-            }
+        if !mesh.normals.is_empty()
+            && let Some(n) = instance.normal(blend3(&mesh.normals)).try_normalize()
+        {
+            // A file may carry normals that disagree with the winding: the winding decides which side is the front.
+            ns = if n.dot(ng) < 0.0 { -n } else { n };
         }
         let uv = [0, 1].map(|set: usize| {
             let values = &mesh.uvs[set];

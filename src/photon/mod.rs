@@ -4,4 +4,4 @@ mod map;
 mod nearest;
 
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
-pub use nearest::nearest_radius2;
+pub use nearest::{MAX_NEIGHBOURS, nearest_radius2};

@@ -34,7 +34,7 @@ pub struct Rendered {
     pub light_paths: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
-    /// Seconds per phase.
+    /// Core-seconds per phase.
     pub phases: Phases,
     /// Error against time.
     pub history: Vec<History>,
@@ -46,6 +46,9 @@ impl Rendered {
     /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over RGB of
     /// the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + 0.01), the papers' relMSE with the estimate in place of the
     /// squared difference. `None` before two iterations.
+    ///
+    /// A pixel with fewer than two finite samples where others have them is taken for wholly wrong (1), for nothing is known of it; `None` if
+    /// this holds for all.
     ///
     /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance is
     /// large: where such pixels rule the error, the estimate is too small until they have been seen several times.
@@ -62,14 +65,45 @@ impl Rendered {
 /// See [`Rendered::relative_error`].
 pub(super) fn relative_error(pixels: &[Pixel], levels: Levels) -> Option<f64> {
     let (mut variance, mut squared_bias) = (0.0, 0.0);
-    let mut count = 0u64;
+    let (mut known, mut unknown) = (0u64, 0u64);
     for pixel in pixels {
-        let Some(error) = SquaredError::of(pixel, levels.own(), levels.count) else { continue };
+        let Some(error) = SquaredError::of(pixel, levels.own(), levels.count) else {
+            unknown += 1;
+            continue;
+        };
         let mean = pixel.levels[levels.own()].mean.element_sum() / 3.0;
         let scale = 1.0 / (3.0 * (mean * mean + 0.01));
         variance += error.variance.element_sum() * scale;
         squared_bias += error.squared_bias.element_sum() * scale;
-        count += 1;
+        known += 1;
     }
-    (count > 0).then(|| ((variance + squared_bias.max(0.0)) / count as f64).sqrt())
+    let total = variance + squared_bias.max(0.0) + unknown as f64;
+    (known > 0).then(|| (total / (known + unknown) as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rgb;
+
+    /// Two finite samples, equal ones: no error at all.
+    fn certain() -> Pixel {
+        let mut pixel = Pixel::new(1.0);
+        for n in 1..=2 {
+            pixel.iterations = n;
+            pixel.levels[0].add(Rgb::ONE, f64::from(n));
+        }
+        pixel
+    }
+
+    #[test]
+    fn pixels_without_finite_samples_are_errors() {
+        let levels = Levels::new(1);
+        let rejected = Pixel { rejected: 2, ..Pixel::new(1.0) };
+        let once = Pixel { rejected: 1, iterations: 1, ..Pixel::new(1.0) };
+        assert_eq!(relative_error(&[certain(), certain()], levels), Some(0.0));
+        assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], levels), Some(0.5));
+        assert_eq!(relative_error(&[certain(), once, certain(), certain()], levels), Some(0.5));
+        assert_eq!(relative_error(&[rejected, once], levels), None);
+    }
 }

@@ -130,9 +130,7 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
             mesh: placed.mesh,
             material: placed.material,
             object: placed.object,
-            to_world: shared.then(|| {
-                Placement::new(glam::Affine3A::from_mat4(glam::Mat4::from(glam::DMat4::from(to_world).as_mat4())))
-            }),
+            to_world: shared.then(|| Placement::new(glam::Affine3A::from_mat4(glam::DMat4::from(to_world).as_mat4()))),
         });
     }
     shapes

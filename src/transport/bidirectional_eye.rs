@@ -101,7 +101,8 @@ impl<R: Record> EyeWalk<'_, R> {
         };
         let (f, pdf) = shading.evaluate_cos(*wo, light.wi, Transport::Radiance, LobeSet::ALL);
         let value = vertex.throughput * f * light.radiance / light.pdf_w;
-        if !(value.max_element() > 0.0) {
+        let lit = value.max_element() > 0.0;
+        if !lit {
             return;
         }
         let reverse = shading.pdf(light.wi, *wo, Transport::Importance, LobeSet::ALL);
@@ -121,12 +122,14 @@ impl<R: Record> EyeWalk<'_, R> {
         let distance2 = to.length_squared();
         let d = to / distance2.sqrt();
         let (f_eye, pdf_eye) = vertex.shading.evaluate_cos(vertex.wo, d, Transport::Radiance, LobeSet::ALL);
-        if !(f_eye.max_element() > 0.0) {
+        let lit = f_eye.max_element() > 0.0;
+        if !lit {
             return;
         }
         let (f_light, pdf_light) = light.shading.evaluate_cos(light.wo, -d, Transport::Importance, LobeSet::ALL);
         let value = vertex.throughput * f_eye * f_light * light.throughput / distance2;
-        if !(value.max_element() > 0.0) {
+        let lit = value.max_element() > 0.0;
+        if !lit {
             return;
         }
         let (cos_eye, cos_light) = (d.dot(vertex.surface.ng).abs(), d.dot(light.surface.ng).abs());

@@ -77,8 +77,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
         // Density of the rays of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();
         let value = vertex.throughput * f * (pdf_a / light_paths);
-        // Written so that NaN is dropped here, before it costs a ray.
-        if !(value.max_element() > 0.0) {
+        // NaN is dropped here, before it costs a ray.
+        let lit = value.max_element() > 0.0;
+        if !lit {
             return;
         }
         let ratios = if strategies.connect {

@@ -61,8 +61,9 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeS
         scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
     let arriving = scattered * sample.radiance / sample.pdf_w;
-    // Written so that NaN is dropped here, before it costs a ray.
-    if !(arriving.max_element() > 0.0) {
+    // NaN is dropped here, before it costs a ray.
+    let lit = arriving.max_element() > 0.0;
+    if !lit {
         return Rgb::ZERO;
     }
     let origin = surface.spawn(sample.wi);

@@ -99,8 +99,8 @@ impl Visitor for Deposit<'_> {
         // materials and dark texels.
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         if scattered.is_some() && gathers {
-            let flags =
-                u8::from(self.caustic) * PhotonFlags::CAUSTIC | u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
+            let flags = (u8::from(self.caustic) * PhotonFlags::CAUSTIC)
+                | (u8::from(self.unreachable) * PhotonFlags::UNREACHABLE);
             self.photons.push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,

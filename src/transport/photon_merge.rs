@@ -89,7 +89,8 @@ pub(super) fn merge_photons<R: Record>(
         let (f, pdf) = shading.evaluate_cos(wo, photon.wi, Transport::Radiance, LobeSet::ALL);
         // Photons measure irradiance on the geometric surface: the cosine in f belongs to a direction, not to them.
         let value = vertex.throughput * f * photon.flux / photon.wi.dot(ng).abs();
-        if !(value.max_element() > 0.0) {
+        let lit = value.max_element() > 0.0;
+        if !lit {
             return;
         }
         let reverse = shading.pdf(photon.wi, wo, Transport::Importance, LobeSet::ALL);

@@ -1,24 +1,28 @@
 //! `caustique render`: a scene in, an EXR and perhaps a PNG out.
 
+mod memory;
 mod options;
+mod plan;
+mod summary;
 
 pub use options::RenderArgs;
 
 use super::combine::{DEFAULT_MODEL, Named};
-use super::progress::{Reporter, count, duration, percent};
+use super::progress::Reporter;
 use super::signals::Interrupt;
-use super::{output, scene};
+use super::{output, say, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
 use caustique::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
-use caustique::film::{Layer, LayerSet, Selection, output as film};
+use caustique::film::{Layer, LayerSet, Selection, describe, output as film};
 use caustique::image::exr::{self, Attributes};
 use caustique::render::output::shape;
-use caustique::render::{Clock, Control, Rendered, Settings, StopReason, cpu_seconds, peak_memory, sppm};
+use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory, sppm};
 use caustique::scene::Scene;
 use options::Method;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
+use summary::Summary;
 
 /// Kinds of cryptomattes.
 const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
@@ -39,11 +43,13 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let scene = scene::read(&args.scene, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.view())?;
+    memory::check(args, camera.size(), channels(settings))?;
+    let plan = plan::plan(args, &scene, &camera);
     let mut network = network(args)?;
     let talk = args.progress.for_people();
     let interrupt = Interrupt::listen()?;
     if talk && args.method == Method::Auto {
-        eprintln!("method: sppm, chosen by auto");
+        say("method: sppm, chosen by auto");
     }
     let mut reporter = Reporter::new(args.progress, settings);
     let rendered = sppm(&scene, &camera, settings, |progress, _| {
@@ -62,19 +68,67 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let summary = Summary::of(&rendered);
     // The pixels are most of the memory, and all that is wanted of them is in the layers now.
     drop(rendered);
-    let combined = network.as_mut().map(|network| network.apply(&mut set)).transpose()?;
+    let mut refusal = None;
+    let mut combined = None;
+    if let Some(network) = &mut network {
+        match network.apply(&mut set) {
+            Ok(facts) => combined = Some(facts),
+            Err(error) => refusal = Some(error),
+        }
+    }
     let combining = clock.seconds();
-    set = selection.apply(set)?;
+    // A render that is still to be combined keeps what the combiner reads.
+    if refusal.is_none() {
+        set = selection.apply(set)?;
+    }
 
+    header.insert("plan".into(), plan);
+    let name = combined.as_ref().and(network.as_ref()).map(|network| (network.name.as_str(), combining));
     complete(&mut header, args, &scene, combined, cpu_seconds() - cpu_start);
     attributes.insert(exr::ATTRIBUTE, &header)?;
-    exr::write(&args.output, &set, &attributes, args.picture.exr_options(args.exr_naming.into()))?;
-    args.picture.write_png(&set)?;
+    let written = write(args, &set, &attributes);
+    let pictured = args.picture.write_png(&set);
     if talk {
-        summary.tell(args, network.as_ref().map(|network| (network.name.as_str(), combining)), &set);
+        summary.tell(name);
     }
     summary.tell_rejected(args);
+    written?;
+    pictured?;
+    if talk {
+        Summary::tell_files(args, &set);
+    }
+    if let Some(error) = refusal {
+        let output = args.output.display();
+        return Err(error.hint(format!(
+            "the uncombined render is in {output}: 'caustique combine {output} -o OUT.exr' runs the combiner again"
+        )));
+    }
     summary.interrupted(args)
+}
+
+/// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
+///
+/// # Errors
+/// The EXR could not be written where it was asked for; the hint says where it is instead.
+fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Result<()> {
+    let options = args.picture.exr_options(args.exr_naming.into());
+    let Err(error) = exr::write(&args.output, set, attributes, options) else { return Ok(()) };
+    let name = args.output.file_name().unwrap_or("render.exr".as_ref());
+    // A folder of its own: a file of that name may be there.
+    let Ok(folder) = tempfile::Builder::new().prefix("caustique-").tempdir() else { return Err(error) };
+    let rescued = folder.path().join(name);
+    if exr::write(&rescued, set, attributes, options).is_err() {
+        return Err(error);
+    }
+    let _ = folder.keep();
+    Err(error.hint(format!("the render is in {}", rescued.display())))
+}
+
+/// Channels that a render with these settings can have.
+fn channels(settings: &Settings) -> usize {
+    let mut names = film::names(&shape(settings, 1, false));
+    names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
+    names.iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
 
 /// Adds the cryptomattes of objects and materials that are asked for; returns their attributes.
@@ -161,7 +215,7 @@ fn complete(
     let mut put = |key: &str, value: Value| header.insert(key.into(), value);
     put("arguments", json!(args));
     put("warnings", json!(scene.warnings));
-    // The combined picture has no error estimate of its own yet: that of the uncombined one bounds it in practice.
+    // The combined picture has no error estimate of its own.
     put("error_of", "Noisy".into());
     put("combined", combined.unwrap_or(Value::Null));
     if !args.reproducible
@@ -169,72 +223,5 @@ fn complete(
     {
         phases.insert("layers_and_combiner".into(), core_seconds.into());
         header.insert("peak_memory".into(), peak_memory().into());
-    }
-}
-
-/// What is left to say when the pixels are gone.
-struct Summary {
-    iterations: u64,
-    light_paths: u64,
-    seconds: f64,
-    phases: String,
-    error: Option<f64>,
-    rejected: u64,
-    stop: StopReason,
-}
-
-impl Summary {
-    fn of(rendered: &Rendered) -> Summary {
-        let p = rendered.phases;
-        Summary {
-            iterations: rendered.iterations,
-            light_paths: rendered.light_paths,
-            seconds: rendered.seconds,
-            phases: format!(
-                "core-seconds: pilot {:.1}, light {:.1}, map {:.1}, eye {:.1}",
-                p.pilot, p.light, p.map, p.eye
-            ),
-            error: rendered.relative_error(),
-            rejected: rendered.rejected(),
-            stop: rendered.stop,
-        }
-    }
-
-    fn tell(&self, args: &RenderArgs, combined: Option<(&str, f64)>, set: &LayerSet) {
-        let rate = count(self.light_paths as f64 / self.seconds.max(1e-9));
-        eprintln!(
-            "{} iterations in {} ({}), {} light paths, {rate} a second",
-            self.iterations,
-            duration(self.seconds),
-            self.phases,
-            count(self.light_paths as f64)
-        );
-        if let Some(error) = self.error {
-            eprintln!("estimated relative error before combining {}", percent(error));
-        }
-        if let Some((name, seconds)) = combined {
-            eprintln!("combined with {name} in {}", duration(seconds));
-        }
-        eprintln!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30));
-        let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
-        eprintln!("{}: {} x {}, {channels} channels", args.output.display(), set.width, set.height);
-        if let Some(png) = &args.picture.png {
-            eprintln!("{}", png.display());
-        }
-    }
-
-    fn tell_rejected(&self, args: &RenderArgs) {
-        if self.rejected > 0 {
-            let (name, n) = (args.output.display(), self.rejected);
-            eprintln!("warning: {name}: {n} samples were not finite and are left out; the layer Rejected shows where");
-        }
-    }
-
-    fn interrupted(&self, args: &RenderArgs) -> Result<()> {
-        if self.stop != StopReason::Interrupted {
-            return Ok(());
-        }
-        let cause = format!("interrupted after {} iterations, which are written", self.iterations);
-        Err(Error::new(Kind::Interrupted, args.output.display(), cause))
     }
 }

@@ -33,14 +33,14 @@ pub struct RenderArgs {
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
     /// Light paths sent from the lights in each iteration: more give a smoother start, fewer faster iterations
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_PHOTONS, value_parser = value_parser!(u32).range(1..=1_000_000_000), help_heading = "Method")]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_PHOTONS, value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
     pub photons: u32,
     /// Bandwidth levels, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred, from which
     /// the combiner makes one. The combiner that comes with the program takes 5
     #[arg(long, value_name = "M", default_value_t = 5, value_parser = level_count, help_heading = "Method")]
     pub levels: usize,
     /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
-    /// pixels, or a length in scene units, the same everywhere
+    /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere
     #[arg(long, value_name = "knn|footprint|R", default_value = "knn", help_heading = "Method")]
     pub initial_bandwidth: BandwidthChoice,
     /// Photons within the largest bandwidth to begin with, 1 to 1024 [default: 20, with one level 10]
@@ -62,7 +62,7 @@ pub struct RenderArgs {
     pub seed: u64,
 
     /// Stop after so many iterations [default: 64, if nothing else says when to stop]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=4_000_000_000), help_heading = "When to stop")]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Stop after so many seconds of rendering; the running iteration is finished
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
@@ -157,8 +157,8 @@ impl FromStr for BandwidthChoice {
             "knn" => Ok(BandwidthChoice::Knn),
             "footprint" => Ok(BandwidthChoice::Footprint),
             length => match length.parse::<f64>() {
-                Ok(r) if r > 0.0 && r < 1e30 && r > 1e-30 => Ok(BandwidthChoice::Length(r)),
-                Ok(_) => Err("a bandwidth must be above 0 and finite".into()),
+                Ok(r) if (1e-9..=1e9).contains(&r) => Ok(BandwidthChoice::Length(r)),
+                Ok(_) => Err("a length must be from 1e-9 to 1e9".into()),
                 Err(_) => Err("it is neither 'knn' nor 'footprint' nor a length".into()),
             },
         }

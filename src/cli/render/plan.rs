@@ -1,0 +1,74 @@
+//! The plan in the header: the method and why, and for each effect whether the scene calls for it and whether it is simulated.
+
+use super::options::{Method, RenderArgs};
+use caustique::camera::Camera;
+use caustique::light::Emitter;
+use caustique::material::{Material, MediumParameters};
+use caustique::scene::Scene;
+use serde_json::{Value, json};
+
+/// Wider lobes focus no light and show no reflections.
+const WIDEST_ROUGHNESS: f32 = 0.45;
+
+/// Every effect by name: what calls for it (nothing: the scene has none of it), and whether the method simulates it.
+pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
+    let mut worn = vec![false; scene.materials.list.len()];
+    for instance in &scene.shapes.instances {
+        worn[instance.material as usize] = true;
+    }
+    let worn: Vec<&Material> =
+        scene.materials.list.iter().zip(worn).filter(|(_, worn)| *worn).map(|(material, _)| material).collect();
+    let by_material = |has: fn(&Material) -> bool| -> Vec<String> {
+        worn.iter().filter(|material| has(material)).map(|material| format!("material \"{}\"", material.name)).collect()
+    };
+    let when = |present: bool, reason: &str| if present { vec![reason.to_string()] } else { vec![] };
+    let emitters = scene.lights.emitters();
+    let lamps = emitters.iter().any(|emitter| matches!(emitter, Emitter::Triangle { .. }));
+    let environment = scene.lights.sky().environment.is_some();
+    let lit = |because: Vec<String>| if emitters.is_empty() { vec![] } else { because };
+    let caustic = lit(by_material(focuses));
+    let media =
+        when(scene.medium.is_some(), "the scene's medium").into_iter().chain(by_material(|m| m.medium.is_some()));
+    let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.sigma_s.max_element() > 0.0);
+    let scattering = scatters(&scene.medium) || worn.iter().any(|material| scatters(&material.medium));
+
+    // Segments of the shortest path that shows it; `--max-depth` cuts longer ones.
+    let deep = |segments: u32| args.max_depth.is_none_or(|most| most >= segments);
+    let surfaces = lit(when(!worn.is_empty(), "light falls on surfaces"));
+    let effects = [
+        ("emission", when(lamps || environment, "light sources can be seen"), deep(1)),
+        ("direct", surfaces.clone(), deep(2)),
+        ("indirect", surfaces, deep(3)),
+        ("glossy", lit(by_material(narrow)), deep(2)),
+        ("caustic", caustic.clone(), deep(3)),
+        ("sds", caustic, deep(4)),
+        // Media absorb; what they scatter is lost.
+        ("volume", media.collect(), !scattering),
+        ("dispersion", by_material(|m| m.transmission > 0.0 && m.dispersion > 0.0), false),
+        ("depth_of_field", when(camera.has_lens(), "the camera has an aperture"), true),
+        ("environment", when(environment, "light comes from all around"), true),
+        ("alpha", when(scene.survey.alpha, "materials have cut-outs or blend"), true),
+        ("textures", when(!scene.materials.textures.is_empty(), "materials have textures"), true),
+    ];
+    let effects = effects.map(|(name, because, possible)| {
+        let present = !because.is_empty();
+        json!({"name": name, "present": present, "simulated": present && possible, "because": because})
+    });
+    let because = match args.method {
+        Method::Auto => {
+            "auto: the one method here that reaches every class of light paths, caustics behind glass and in mirrors too"
+        }
+        Method::Sppm => "asked for",
+    };
+    json!({"method": "sppm", "because": because, "effects": effects})
+}
+
+/// Reflects or bends light into narrow lobes.
+fn narrow(material: &Material) -> bool {
+    material.roughness < WIDEST_ROUGHNESS || material.metallic_roughness_texture.is_some() || material.clearcoat > 0.0
+}
+
+/// Mirrors and glass, narrow enough to focus light.
+fn focuses(material: &Material) -> bool {
+    narrow(material) && (material.transmission > 0.0 || material.metallic >= 0.5)
+}

@@ -1,0 +1,84 @@
+//! What a render says when its pixels are gone.
+
+use super::options::RenderArgs;
+use crate::cli::progress::{count, duration, percent};
+use crate::cli::say;
+use caustique::error::{Error, Kind, Result};
+use caustique::film::LayerSet;
+use caustique::render::{Rendered, StopReason, peak_memory};
+
+/// The numbers of a render.
+pub struct Summary {
+    iterations: u64,
+    light_paths: u64,
+    seconds: f64,
+    phases: String,
+    error: Option<f64>,
+    rejected: u64,
+    stop: StopReason,
+}
+
+impl Summary {
+    pub fn of(rendered: &Rendered) -> Summary {
+        let p = rendered.phases;
+        Summary {
+            iterations: rendered.iterations,
+            light_paths: rendered.light_paths,
+            seconds: rendered.seconds,
+            phases: format!(
+                "core-seconds: pilot {:.1}, light {:.1}, map {:.1}, eye {:.1}",
+                p.pilot, p.light, p.map, p.eye
+            ),
+            error: rendered.relative_error(),
+            rejected: rendered.rejected(),
+            stop: rendered.stop,
+        }
+    }
+
+    /// For people: `combined` is the network that ran and its wall-clock seconds.
+    pub fn tell(&self, combined: Option<(&str, f64)>) {
+        let rate = count(self.light_paths as f64 / self.seconds.max(1e-9));
+        say(&format!(
+            "{} iterations in {} ({}), {} light paths, {rate} a second",
+            self.iterations,
+            duration(self.seconds),
+            self.phases,
+            count(self.light_paths as f64)
+        ));
+        if let Some(error) = self.error {
+            say(&format!("estimated relative error before combining {}", percent(error)));
+        }
+        if let Some((name, seconds)) = combined {
+            say(&format!("combined with {name} in {}", duration(seconds)));
+        }
+        say(&format!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30)));
+    }
+
+    /// The files that are written.
+    pub fn tell_files(args: &RenderArgs, set: &LayerSet) {
+        let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
+        say(&format!("{}: {} x {}, {channels} channels", args.output.display(), set.width, set.height));
+        if let Some(png) = &args.picture.png {
+            say(&png.display().to_string());
+        }
+    }
+
+    /// A warning if samples were rejected.
+    pub fn tell_rejected(&self, args: &RenderArgs) {
+        if self.rejected > 0 {
+            let (name, n) = (args.output.display(), self.rejected);
+            say(&format!(
+                "warning: {name}: {n} samples were not finite and are left out; the layer Rejected shows where"
+            ));
+        }
+    }
+
+    /// The error of a render that was stopped by a signal.
+    pub fn interrupted(&self, args: &RenderArgs) -> Result<()> {
+        if self.stop != StopReason::Interrupted {
+            return Ok(());
+        }
+        let cause = format!("interrupted after {} iterations, which are written", self.iterations);
+        Err(Error::new(Kind::Interrupted, args.output.display(), cause))
+    }
+}

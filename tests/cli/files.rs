@@ -1,0 +1,189 @@
+//! What a render leaves in its files.
+
+use crate::{Folder, values};
+use serde_json::Value;
+
+#[test]
+fn a_render_leaves_all_layers_and_its_account() {
+    let folder = Folder::new();
+    let outcome = folder.render("-o out.exr --png out.png --iterations 6 --seed 7");
+    assert_eq!(folder.files(), ["out.exr", "out.png"]);
+    for part in [
+        "method: sppm, chosen by auto\n",
+        "\niteration 6 of 6, ",
+        "\npeak memory ",
+        "\nout.exr: 64 x 48, 93 channels\n",
+    ] {
+        assert!(outcome.stderr.contains(part), "{part:?} in {}", outcome.stderr);
+    }
+    let (set, header) = folder.read("out.exr");
+    assert_eq!((set.width, set.height), (64, 48));
+    let mut expected: Vec<String> =
+        ["", "Noisy", "Direct", "Indirect", "Caustic", "Emission", "Error"].map(String::from).into();
+    for k in 1..=5 {
+        expected.extend(["Level", "Variance", "Radius"].map(|stem| format!("{stem}{k}")));
+    }
+    expected.extend(["albedo", "normal", "depth", "Z", "P", "Rejected"].map(String::from));
+    for k in 0..3 {
+        expected.extend(["CryptoObject", "CryptoMaterial"].map(|stem| format!("{stem}0{k}")));
+    }
+    let mut found: Vec<String> = set.layers.iter().map(|layer| layer.name.clone()).collect();
+    expected.sort();
+    found.sort();
+    assert_eq!(found, expected);
+    assert!(set.layers.iter().flat_map(|l| &l.planes).all(|plane| plane.values.iter().all(|v| v.is_finite())));
+
+    // The parts are the image; it is the second largest level; something is combined, something is a caustic.
+    let (noisy, level) = (values(&set, "Noisy"), values(&set, "Level4"));
+    let parts = ["Direct", "Indirect", "Caustic", "Emission"].map(|name| values(&set, name));
+    for i in 0..noisy.len() {
+        for c in 0..3 {
+            let sum: f32 = parts.iter().map(|part| part[i][c]).sum();
+            assert!(
+                (sum - noisy[i][c]).abs() <= 1e-5 * noisy[i][c].abs().max(1e-3),
+                "pixel {i}: {sum} {}",
+                noisy[i][c]
+            );
+        }
+        assert_eq!(noisy[i], level[i]);
+    }
+    let caustic: f32 = parts[2].iter().map(|p| p[0]).sum();
+    assert!(caustic > 0.0 && values(&set, "") != noisy);
+    // Each level's radius is 1/sqrt(2) of the next larger.
+    for k in 1..5 {
+        let (small, large) = (values(&set, &format!("Radius{k}")), values(&set, &format!("Radius{}", k + 1)));
+        assert!(small.iter().zip(&large).all(|(s, l)| (s[0] / l[0] * 2f32.sqrt() - 1.0).abs() < 1e-5));
+    }
+
+    assert_eq!(header["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!((&header["seed"], &header["iterations"], &header["light_paths"]), (&7.into(), &6.into(), &12000.into()));
+    assert_eq!((&header["method"], &header["stopped"]), (&"sppm".into(), &"iterations".into()));
+    assert_eq!(header["arguments"]["scene"], "scene.glb");
+    assert_eq!(header["arguments"]["photons"], 2000);
+    assert_eq!(header["combined"]["model"], "compact");
+    for key in ["seconds", "phases", "threads", "peak_memory", "error", "rejected", "warnings"] {
+        assert!(!header[key].is_null(), "{key} in {header}");
+    }
+    for moment in header["history"].as_array().expect("a history") {
+        for key in ["seconds", "cpu_seconds", "iterations", "light_paths", "error"] {
+            assert!(moment.get(key).is_some(), "{key} in {moment}");
+        }
+    }
+    let json = folder.run("info out.exr --json").json();
+    assert_eq!((&json["width"], &json["height"], &json["seed"]), (&64.into(), &48.into(), &7.into()));
+    assert_eq!(json["layers"].as_array().map(Vec::len), Some(expected.len()));
+    assert_eq!(json["history"], header["history"]);
+    let text = folder.run("info out.exr").stdout;
+    assert!(text.contains("\n          +-----") && text.contains("6 iterations, 12000 light paths"), "{text}");
+}
+
+/// Every effect by name, what calls for it, and whether it is simulated; all phases are core-seconds.
+#[test]
+fn the_header_has_the_plan_and_the_phases() {
+    let folder = Folder::new();
+    folder.render("-o out.exr --iterations 3 --no-combine --max-depth 3");
+    let (_, header) = folder.read("out.exr");
+    let plan = &header["plan"];
+    assert_eq!(plan["method"], "sppm");
+    assert!(plan["because"].as_str().is_some_and(|because| because.starts_with("auto: ")), "{plan}");
+    let effects = plan["effects"].as_array().expect("a list");
+    let of = |key: &str| -> Vec<&str> {
+        let with = effects.iter().filter(|effect| effect[key] == true);
+        with.filter_map(|effect| effect["name"].as_str()).collect()
+    };
+    let names: Vec<&str> = effects.iter().filter_map(|effect| effect["name"].as_str()).collect();
+    let all = "emission direct indirect glossy caustic sds volume dispersion depth_of_field environment alpha textures";
+    assert_eq!(names.join(" "), all);
+    assert_eq!(of("present"), ["direct", "indirect", "glossy", "caustic", "sds"]);
+    // A caustic seen in a mirror has four segments at least.
+    assert_eq!(of("simulated"), ["direct", "indirect", "glossy", "caustic"]);
+    assert_eq!(effects[4]["because"], serde_json::json!(["material \"silver\""]));
+
+    let phases = header["phases"].as_object().expect("phases");
+    let sum: f64 = ["pilot", "light", "map", "eye"].iter().filter_map(|name| phases[*name].as_f64()).sum();
+    let total = header["history"].as_array().and_then(|h| h.last()?["cpu_seconds"].as_f64()).expect("a number");
+    // The clock ticks every 10 ms.
+    assert!((sum - total).abs() < 0.1, "{sum} of {total}");
+}
+
+#[test]
+fn the_same_bytes_with_any_number_of_threads() {
+    let folder = Folder::new();
+    for combine in ["", "--no-combine"] {
+        let files: Vec<Vec<u8>> = (1..=3)
+            .map(|threads| {
+                let name = format!("t{threads}.exr");
+                folder.render(&format!("-o {name} --iterations 3 --threads {threads} --reproducible {combine}"));
+                std::fs::read(folder.path(&name)).expect("the file is there")
+            })
+            .collect();
+        assert!(files[0] == files[1] && files[0] == files[2], "{combine}");
+    }
+    // Two tiles of the combiner, thirty bands of rows.
+    let files = [1, 3].map(|threads| {
+        let name = format!("large{threads}.exr");
+        let size = "--width 600 --height 480 --photons 2000 --iterations 1 --layers beauty --reproducible";
+        let outcome = folder.run(&format!("render scene.glb -o {name} {size} --threads {threads}"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        std::fs::read(folder.path(&name)).expect("the file is there")
+    });
+    assert!(files[0] == files[1]);
+    folder.render("-o seed.exr --iterations 3 --seed 1 --reproducible --no-combine");
+    let ((a, _), (b, _)) = (folder.read("t1.exr"), folder.read("seed.exr"));
+    assert!(values(&a, "Noisy") != values(&b, "Noisy"));
+    let (_, header) = folder.read("t1.exr");
+    for key in ["seconds", "phases", "threads", "peak_memory"] {
+        assert!(header.get(key).is_none(), "{key}");
+    }
+    assert!(header["history"][0].get("seconds").is_none());
+}
+
+/// Shards render disjoint iterations of the same render: their means weigh up to the whole.
+#[test]
+fn shards_share_the_iterations_out() {
+    let folder = Folder::new();
+    folder.render("-o whole.exr --iterations 5 --no-combine");
+    folder.render("-o a.exr --iterations 5 --shard 0/2 --no-combine");
+    folder.render("-o b.exr --iterations 5 --shard 1/2 --no-combine");
+    let ((whole, _), (a, first), (b, second)) = (folder.read("whole.exr"), folder.read("a.exr"), folder.read("b.exr"));
+    assert_eq!((&first["iterations"], &second["iterations"]), (&3.into(), &2.into()));
+    assert_eq!((&first["shard"]["index"], &first["shard"]["count"]), (&0.into(), &2.into()));
+    for layer in ["Noisy", "Level1", "Level5", "Caustic"] {
+        let (whole, a, b) = (values(&whole, layer), values(&a, layer), values(&b, layer));
+        assert!(a != b, "{layer}");
+        for i in 0..whole.len() {
+            for c in 0..3 {
+                let merged = (3.0 * a[i][c] + 2.0 * b[i][c]) / 5.0;
+                assert!((merged - whole[i][c]).abs() <= 1e-5 * whole[i][c].abs().max(1e-3), "{layer}, pixel {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn levels_layers_names_and_bandwidths_as_asked() {
+    let folder = Folder::new();
+    folder.render("-o one.exr --iterations 2 --levels 1 --layers beauty,Radius1 --initial-bandwidth 0.25 --alpha 1");
+    let (set, header) = folder.read("one.exr");
+    let names: Vec<&str> = set.layers.iter().map(|layer| layer.name.as_str()).collect();
+    assert_eq!((names, &header["combined"]), (vec!["", "Radius1"], &Value::Null));
+    assert!(values(&set, "Radius1").iter().all(|r| r[0] == 0.25));
+    folder.render("-o three.exr --iterations 2 --levels 3 --no-combine --exr-naming blender --compression piz");
+    let (set, _) = folder.read("three.exr");
+    assert!(set.get("ViewLayer.Combined").is_some() && set.get("ViewLayer.Level3").is_some());
+    assert!(set.get("ViewLayer.Level4").is_none());
+    let refused = folder.run("render scene.glb -o no.exr --levels 3");
+    let error = "command line: the network compact combines 5 levels, not 3\nhint: add --no-combine, or render with --levels 5\n";
+    assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
+}
+
+/// One iteration cannot tell a variance: the header says so, and nothing in the file is infinite.
+#[test]
+fn one_iteration_says_that_its_variance_is_unknown() {
+    let folder = Folder::new();
+    folder.render("-o out.exr --iterations 1 --no-combine");
+    let (set, header) = folder.read("out.exr");
+    assert_eq!((&header["variance_known"], &header["error"]), (&false.into(), &Value::Null));
+    assert!(set.layers.iter().flat_map(|l| &l.planes).all(|plane| plane.values.iter().all(|v| v.is_finite())));
+    assert!(values(&set, "Error") == values(&set, "Noisy"));
+}

@@ -1,0 +1,176 @@
+//! Progress, stop conditions and signals.
+
+use crate::{Folder, values};
+use caustique::image::exr;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+#[test]
+fn progress_for_programs() {
+    let folder = Folder::new();
+    let outcome = folder.render("-o out.exr --iterations 3 --no-combine --progress json");
+    let lines: Vec<Value> = outcome.stderr.lines().map(|l| serde_json::from_str(l).expect("a JSON line")).collect();
+    assert_eq!(lines.len(), 3);
+    for (i, line) in lines.iter().enumerate() {
+        let keys: Vec<&String> = line.as_object().expect("an object").keys().collect();
+        assert_eq!(keys, ["error", "iteration", "iterations", "light_paths", "remaining", "seconds"]);
+        assert_eq!((&line["iteration"], &line["iterations"]), (&(i + 1).into(), &3.into()));
+        assert_eq!(line["light_paths"], 2000 * (i + 1));
+    }
+    assert!(lines[0]["error"].is_null() && lines[2]["error"].as_f64().is_some_and(|e| e > 0.0));
+
+    let outcome = folder.render("-o out.exr --iterations 2 --no-combine --progress openjd");
+    assert!(outcome.stderr.contains("openjd_progress: 50.0\nopenjd_status: iteration 1 of 2, "), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("openjd_progress: 100.0\n"), "{}", outcome.stderr);
+    assert_eq!(folder.render("-o out.exr --iterations 2 --no-combine --progress none").stderr, "");
+}
+
+#[test]
+fn stop_conditions() {
+    let folder = Folder::new();
+    folder.render("-o time.exr --time 0.2 --no-combine");
+    let (_, header) = folder.read("time.exr");
+    assert_eq!(header["stopped"], "time");
+    folder.render("-o error.exr --target-error 0.9 --no-combine");
+    let (_, header) = folder.read("error.exr");
+    assert_eq!(header["stopped"], "error");
+    assert!(header["error"].as_f64().is_some_and(|e| e <= 0.9), "{header}");
+}
+
+/// Reads stderr until a line that begins with `start`.
+fn wait_for_line(child: &mut Child, start: &str) -> BufReader<impl Read + use<>> {
+    let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
+    loop {
+        let mut line = String::new();
+        assert_ne!(lines.read_line(&mut line).expect("stderr can be read"), 0, "the program ended before {start:?}");
+        if line.starts_with(start) {
+            return lines;
+        }
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill runs");
+    assert!(status.success());
+}
+
+#[test]
+fn a_signal_writes_what_is_finished() {
+    for name in ["-INT", "-TERM", "-HUP"] {
+        let folder = Folder::new();
+        let arguments =
+            "render scene.glb -o out.exr --width 64 --photons 2000 --time 600 --no-combine --progress plain";
+        let mut command = folder.command(arguments);
+        let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+        let mut rest = wait_for_line(&mut child, "iteration 1,");
+        signal(&child, name);
+        let status = child.wait().expect("the program ends");
+        let mut text = String::new();
+        rest.read_to_string(&mut text).expect("stderr can be read");
+        assert_eq!(status.code(), Some(130), "{text}");
+        let (set, header) = folder.read("out.exr");
+        let iterations = header["iterations"].as_u64().expect("a number");
+        assert!(iterations >= 1 && set.get("Level1").is_some());
+        assert_eq!(header["stopped"], "interrupted");
+        let last = format!("out.exr: interrupted after {iterations} iterations, which are written\n");
+        assert!(text.ends_with(&last), "{text}");
+    }
+}
+
+#[test]
+fn a_second_signal_ends_at_once() {
+    let folder = Folder::new();
+    // One iteration of this takes many seconds.
+    let arguments = "render scene.glb -o out.exr --width 64 --photons 20000000 --no-combine --progress plain";
+    let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let _rest = wait_for_line(&mut child, "method: ");
+    signal(&child, "-INT");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(child.try_wait().expect("its state is known"), None, "one signal must not end it at once");
+    signal(&child, "-INT");
+    let mut waited = 0;
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("its state is known") {
+            break status;
+        }
+        waited += 1;
+        assert!(waited < 100, "the second signal did not end it");
+        std::thread::sleep(Duration::from_millis(100));
+    };
+    assert_eq!(status.code(), Some(130));
+    assert_eq!(folder.files(), [""; 0]);
+}
+
+/// A render does not depend on anyone who reads what it says.
+#[test]
+fn a_closed_stderr_ends_no_render() {
+    for form in ["plain", "json", "openjd"] {
+        let folder = Folder::new();
+        let arguments =
+            format!("render scene.glb -o out.exr --width 64 --photons 2000 --iterations 20 --progress {form}");
+        let mut child = folder.command(&arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+        drop(child.stderr.take());
+        assert_eq!(child.wait().expect("it ends").code(), Some(0), "{form}");
+        assert_eq!(folder.read("out.exr").1["iterations"], 20);
+    }
+}
+
+#[test]
+fn a_closed_stdout_is_no_error() {
+    let folder = Folder::new();
+    for arguments in ["render --help", "info scene.glb"] {
+        let mut command = folder.command(arguments);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]), "{arguments}");
+    }
+}
+
+/// The network is sound until it runs: tiles at multiples of 3 do not fit its grids of 4.
+#[test]
+fn a_combiner_that_fails_leaves_the_render() {
+    let folder = Folder::new();
+    let mut network = include_bytes!("../../src/combine/models/compact.onnx").to_vec();
+    let stride = b"caustique.stride\x12\x014";
+    let at = network.windows(stride.len()).position(|part| part == stride).expect("the network has a stride");
+    network[at + stride.len() - 1] = b'3';
+    std::fs::write(folder.path("odd.onnx"), network).expect("it can be written");
+    let render = "render scene.glb -o out.exr --png out.png --width 65 --height 48 --photons 2000 --iterations 2";
+    let outcome = folder.run(&format!("{render} --layers beauty --model odd.onnx --progress none"));
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("odd.onnx"), "{}", outcome.stderr);
+    let hint =
+        "hint: the uncombined render is in out.exr: 'caustique combine out.exr -o OUT.exr' runs the combiner again\n";
+    assert!(outcome.stderr.ends_with(hint), "{}", outcome.stderr);
+    assert_eq!(folder.files(), ["odd.onnx", "out.exr", "out.png"]);
+    let (set, header) = folder.read("out.exr");
+    assert!(header["combined"].is_null() && values(&set, "") == values(&set, "Level4"));
+    let again = folder.run("combine out.exr -o again.exr");
+    assert_eq!(again.code, Some(0), "{}", again.stderr);
+}
+
+/// Where the output cannot be written at the end, the render is kept among the temporary files.
+#[test]
+fn a_folder_that_is_gone_loses_no_render() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("gone")).expect("it can be made");
+    std::fs::create_dir(folder.path("temporary")).expect("it can be made");
+    let arguments =
+        "render scene.glb -o gone/out.exr --width 64 --photons 2000 --time 600 --no-combine --progress json";
+    let mut command = folder.command(arguments);
+    command.env("TMPDIR", folder.path("temporary"));
+    let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut rest = wait_for_line(&mut child, "{\"iteration\":");
+    std::fs::remove_dir_all(folder.path("gone")).expect("it can be removed");
+    signal(&child, "-INT");
+    let mut text = String::new();
+    rest.read_to_string(&mut text).expect("stderr can be read");
+    assert_eq!(child.wait().expect("it ends").code(), Some(1), "{text}");
+    assert!(text.contains("\ngone/out.exr: "), "{text}");
+    let (_, rescued) = text.trim_end().rsplit_once("hint: the render is in ").expect("the hint names a file");
+    assert!(rescued.starts_with(&*folder.path("temporary").to_string_lossy()), "{rescued}");
+    assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("Level5").is_some()));
+}

@@ -1,0 +1,228 @@
+//! What the command line refuses, word for word, and what it offers.
+
+use crate::{Folder, Outcome};
+
+/// Every error is `place: cause`, then `hint: remedy`, and nothing else, before any work is done.
+#[test]
+fn errors_word_for_word() {
+    let folder = Folder::new();
+    let render = "render scene.glb -o out.exr --no-combine";
+    let help = "'--help' explains every option";
+    let cases: [(&str, i32, &str, &str); 26] = [
+        ("", 2, "command line: a command is missing", "'caustique --help' lists the commands"),
+        ("rendr", 2, "command line: unrecognized subcommand 'rendr'", "a similar subcommand exists: 'render'"),
+        (
+            "render scene.glb",
+            2,
+            "command line: the following required arguments were not provided: --output <OUT.exr>",
+            help,
+        ),
+        (
+            &format!("{render} --itertions 3"),
+            2,
+            "command line: unexpected argument '--itertions' found",
+            "a similar argument exists: '--iterations'",
+        ),
+        (&format!("{render} --kernel box"), 2, "command line: unexpected argument '--kernel' found", help),
+        (
+            &format!("{render} --initial-bandwidth 1e-10"),
+            2,
+            "command line: invalid value '1e-10' for '--initial-bandwidth <knn|footprint|R>': a length must be from 1e-9 to 1e9",
+            help,
+        ),
+        (
+            &format!("{render} --initial-bandwidth inf"),
+            2,
+            "command line: invalid value 'inf' for '--initial-bandwidth <knn|footprint|R>': a length must be from 1e-9 to 1e9",
+            help,
+        ),
+        (
+            &format!("{render} --photons 50000001"),
+            2,
+            "command line: invalid value '50000001' for '--photons <N>': 50000001 is not in 1..=50000000",
+            help,
+        ),
+        (
+            &format!("{render} --iterations 2000000001"),
+            2,
+            "command line: invalid value '2000000001' for '--iterations <N>': 2000000001 is not in 1..=2000000000",
+            help,
+        ),
+        (
+            &format!("{render} --alpha 2"),
+            2,
+            "command line: invalid value '2' for '--alpha <A>': it must be in (0, 1]",
+            help,
+        ),
+        (
+            &format!("{render} --alpha nan"),
+            2,
+            "command line: invalid value 'nan' for '--alpha <A>': it is not a finite number",
+            help,
+        ),
+        (
+            &format!("{render} --knn 1025"),
+            2,
+            "command line: invalid value '1025' for '--knn <K>': 1025 is not in 1..=1024",
+            help,
+        ),
+        (
+            &format!("{render} --levels 9"),
+            2,
+            "command line: invalid value '9' for '--levels <M>': it must be a whole number from 1 to 5",
+            help,
+        ),
+        (
+            &format!("{render} --method vcm"),
+            2,
+            "command line: invalid value 'vcm' for '--method <METHOD>' [possible values: auto, sppm]",
+            help,
+        ),
+        (
+            &format!("{render} --shard 2/2"),
+            2,
+            "command line: invalid value '2/2' for '--shard <I/N>': shards of 2 are 0 to 1",
+            help,
+        ),
+        (
+            &format!("{render} --shard 5/8 --iterations 4"),
+            2,
+            "command line: shard 5 of 8 holds none of 4 iterations",
+            "use fewer shards or more --iterations",
+        ),
+        (
+            &format!("{render} --knn 5 --initial-bandwidth 0.1"),
+            2,
+            "command line: --knn has no effect with this --initial-bandwidth",
+            "leave one of the two out",
+        ),
+        (
+            &format!("{render} --env 1,2"),
+            2,
+            "command line: invalid value '1,2' for '--env <FILE|R,G,B>': a colour has three numbers R,G,B, not 2",
+            help,
+        ),
+        (&format!("{render} --layers albeod"), 2, "--layers: no layer \"albeod\"", "did you mean \"albedo\"?"),
+        (&format!("{render} --layers Level6"), 2, "--layers: no layer \"Level6\"", "did you mean \"Level1\"?"),
+        (
+            "render nope.glb -o out.exr --no-combine",
+            1,
+            "nope.glb: No such file or directory (os error 2)",
+            "check the path of the scene file and your right to read it",
+        ),
+        ("render scene.glb -o no/out.exr", 1, "no/out.exr: its folder does not exist", "mkdir -p no"),
+        (
+            "render scene.glb -o out.png",
+            2,
+            "out.png: the name does not end in .exr",
+            "the output is an EXR; --png writes a picture to look at beside it",
+        ),
+        ("render scene.glb -o out.exr --png no/out.png", 1, "no/out.png: its folder does not exist", "mkdir -p no"),
+        (
+            &format!("{render} --camera Camrea"),
+            2,
+            "scene.glb: there is no camera \"Camrea\"",
+            "it has \"Camera\", \"Side\"",
+        ),
+        (
+            &format!("{render} --env-strength 2"),
+            2,
+            "scene.glb: --env-strength: the scene has no environment",
+            "give one with --env",
+        ),
+    ];
+    for (arguments, code, error, hint) in cases {
+        let outcome = folder.run(arguments);
+        assert_eq!(outcome.stderr, format!("{error}\nhint: {hint}\n"), "{arguments}");
+        assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(code), ""), "{arguments}");
+    }
+    assert_eq!(folder.files(), [""; 0]);
+}
+
+/// The output is checked before the scene is even read, and an older file there is left alone.
+#[test]
+fn outputs_are_checked_first() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("broken.glb"), "no scene at all").expect("it can be written");
+    std::fs::create_dir(folder.path("folder.exr")).expect("it can be made");
+    let outcome = folder.run("render broken.glb -o folder.exr");
+    assert_eq!(
+        (outcome.code, outcome.stderr.as_str()),
+        (Some(1), "folder.exr: is a folder\nhint: name a file in it\n")
+    );
+    std::fs::write(folder.path("old.exr"), "old").expect("it can be written");
+    let outcome = folder.run("render nope.glb -o old.exr");
+    assert_eq!(outcome.code, Some(1));
+    assert_eq!(std::fs::read(folder.path("old.exr")).expect("it is there"), b"old");
+}
+
+#[test]
+fn help_and_version_are_data_and_offer_only_what_exists() {
+    let folder = Folder::new();
+    let help = folder.run("render --help");
+    assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));
+    for option in ["--photons", "--exr-naming", "--target-error", "--strict", "--reproducible"] {
+        assert!(help.stdout.contains(option), "{option}");
+    }
+    for absent in ["--cppm", "--effects", "--checkpoint", "--kernel", "bdpt"] {
+        assert!(!help.stdout.contains(absent), "{absent}");
+    }
+    let commands = folder.run("--help").stdout;
+    for (command, listed) in [("combine", true), ("compare", true), ("doctor", true), ("plan", false), ("merge", false)]
+    {
+        assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
+    }
+    assert_eq!(folder.run("--version").stdout, concat!("caustique ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+/// Libraries that are missing are found before rendering, named, and a way around is offered.
+#[test]
+fn missing_libraries() {
+    let folder = Folder::new();
+    let missing = |variable: &str, arguments: &str| {
+        let mut command = folder.command(arguments);
+        command.env(variable, "/no/such/library.so");
+        Outcome::of(command)
+    };
+    let render = "render scene.glb -o out.exr --width 32 --iterations 1 --photons 100";
+    let outcome = missing("CAUSTIQUE_ONNXRUNTIME", render);
+    assert_eq!(outcome.code, Some(1));
+    let lines: Vec<&str> = outcome.stderr.lines().collect();
+    assert_eq!(lines[0], "CAUSTIQUE_ONNXRUNTIME=/no/such/library.so: no such file");
+    assert!(lines[1].starts_with("hint: on Debian 13: apt-get install libonnxruntime1.21;"), "{}", lines[1]);
+    assert!(lines[1].ends_with("; or add --no-combine to do without the combiner"), "{}", lines[1]);
+    assert_eq!((lines.len(), folder.files().len()), (2, 0));
+    assert_eq!(missing("CAUSTIQUE_ONNXRUNTIME", &format!("{render} --no-combine")).code, Some(0));
+
+    let outcome = missing("CAUSTIQUE_EMBREE", render);
+    assert_eq!(outcome.code, Some(1));
+    assert!(outcome.stderr.contains("Embree") && outcome.stderr.contains("\nhint: "), "{}", outcome.stderr);
+
+    for (variable, key, name) in
+        [("CAUSTIQUE_EMBREE", "embree", "Embree"), ("CAUSTIQUE_ONNXRUNTIME", "onnxruntime", "ONNX Runtime")]
+    {
+        let outcome = missing(variable, "doctor --json");
+        assert_eq!(outcome.code, Some(1));
+        let other = if key == "embree" { "onnxruntime" } else { "embree" };
+        let json = outcome.json();
+        assert_eq!(json[key]["found"], false);
+        assert!(json[key]["hint"].as_str().is_some_and(|hint| hint.contains("Debian")), "{json}");
+        assert_eq!(json[other]["found"], true, "{json}");
+        assert!(json[other]["version"].as_str().is_some_and(|version| version.contains('.')), "{json}");
+        assert!(outcome.stderr.starts_with(&format!("doctor: cannot use {name}\nhint: ")), "{}", outcome.stderr);
+    }
+    let well = folder.run("doctor");
+    assert_eq!((well.code, well.stderr.as_str()), (Some(0), ""));
+}
+
+/// What cannot fit into memory is refused before rendering.
+#[test]
+fn a_picture_larger_than_memory() {
+    let folder = Folder::new();
+    let outcome = folder.run("render scene.glb -o out.exr --width 32768 --height 32768 --no-combine");
+    let error = "command line: 32768 x 32768 pixels and 100000 light paths an iteration need about ";
+    assert!(outcome.stderr.starts_with(error), "{}", outcome.stderr);
+    let hint = "hint: use a smaller --width and --height, or fewer --photons\n";
+    assert!(outcome.stderr.ends_with(hint), "{}", outcome.stderr);
+    assert_eq!((outcome.code, folder.files()), (Some(2), vec![]));
+}
