@@ -10,3 +10,9 @@ pub type Rgb = Vec3;
 pub fn luminance(c: Rgb) -> f32 {
     0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z
 }
+
+/// Whether there is any light: false for black, and for NaN.
+#[inline]
+pub fn is_lit(c: Rgb) -> bool {
+    c.max_element() > 0.0
+}

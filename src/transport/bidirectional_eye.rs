@@ -9,7 +9,7 @@ use super::segment::transmittance;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::EmissionDensity;
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::PhotonMap;
 use crate::random::{Purpose, Stream, mix};
 use crate::scene::Scene;
@@ -101,8 +101,7 @@ impl<R: Record> EyeWalk<'_, R> {
         };
         let (f, pdf) = shading.evaluate_cos(*wo, light.wi, Transport::Radiance, LobeSet::ALL);
         let value = vertex.throughput * f * light.radiance / light.pdf_w;
-        let lit = value.max_element() > 0.0;
-        if !lit {
+        if !is_lit(value) {
             return;
         }
         let reverse = shading.pdf(light.wi, *wo, Transport::Importance, LobeSet::ALL);
@@ -122,14 +121,12 @@ impl<R: Record> EyeWalk<'_, R> {
         let distance2 = to.length_squared();
         let d = to / distance2.sqrt();
         let (f_eye, pdf_eye) = vertex.shading.evaluate_cos(vertex.wo, d, Transport::Radiance, LobeSet::ALL);
-        let lit = f_eye.max_element() > 0.0;
-        if !lit {
+        if !is_lit(f_eye) {
             return;
         }
         let (f_light, pdf_light) = light.shading.evaluate_cos(light.wo, -d, Transport::Importance, LobeSet::ALL);
         let value = vertex.throughput * f_eye * f_light * light.throughput / distance2;
-        let lit = value.max_element() > 0.0;
-        if !lit {
+        if !is_lit(value) {
             return;
         }
         let (cos_eye, cos_light) = (d.dot(vertex.surface.ng).abs(), d.dot(light.surface.ng).abs());

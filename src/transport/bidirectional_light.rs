@@ -8,7 +8,7 @@ use super::mis::{self, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
-use crate::math::Rgb;
+use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
@@ -77,9 +77,8 @@ impl<R: Record> LightWalk<'_, '_, R> {
         // Density of the rays of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();
         let value = vertex.throughput * f * (pdf_a / light_paths);
-        // NaN is dropped here, before it costs a ray.
-        let lit = value.max_element() > 0.0;
-        if !lit {
+        // Written so that NaN is dropped here, before it costs a ray.
+        if !is_lit(value) {
             return;
         }
         let ratios = if strategies.connect {

@@ -8,7 +8,7 @@
 use super::segment::{End, next_surface, transmittance};
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
-use crate::math::Rgb;
+use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
 use crate::scene::Scene;
 
@@ -62,8 +62,7 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeS
     }
     let arriving = scattered * sample.radiance / sample.pdf_w;
     // NaN is dropped here, before it costs a ray.
-    let lit = arriving.max_element() > 0.0;
-    if !lit {
+    if !is_lit(arriving) {
         return Rgb::ZERO;
     }
     let origin = surface.spawn(sample.wi);

@@ -4,7 +4,7 @@ use super::bidirectional::{MergeLevels, Record, Technique};
 use super::mis::{self, MisState};
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap};
 use std::f32::consts::FRAC_1_PI;
 
@@ -89,8 +89,7 @@ pub(super) fn merge_photons<R: Record>(
         let (f, pdf) = shading.evaluate_cos(wo, photon.wi, Transport::Radiance, LobeSet::ALL);
         // Photons measure irradiance on the geometric surface: the cosine in f belongs to a direction, not to them.
         let value = vertex.throughput * f * photon.flux / photon.wi.dot(ng).abs();
-        let lit = value.max_element() > 0.0;
-        if !lit {
+        if !is_lit(value) {
             return;
         }
         let reverse = shading.pdf(photon.wi, wo, Transport::Importance, LobeSet::ALL);
