@@ -331,7 +331,7 @@ fn under_the_sky() {
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
     let scene = build(description);
     let methods = [(Method::Path, 64), (Method::Light, 768), (Method::Bdpt, 64), (Method::Bpm, 512), (Method::Vcm, 64)];
-    agree("under the sky", &scene, &methods, 0.03, 0.03, 0.2);
+    agree("under the sky", &scene, &methods, 0.05, 0.03, 0.2);
 }
 
 /// Parallel projection, which no light path can be connected to, and paths of four segments at most.
