@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p caustique-embree --example rays [THREADS]`; `CAUSTIQUE_EMBREE` chooses the library.
 
+#![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
+
 #[path = "../tests/support/mod.rs"]
 #[allow(dead_code)]
 mod support;
