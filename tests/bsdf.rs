@@ -13,6 +13,7 @@ use caustique::random::mix;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
+use support::bsdf;
 use support::stats::{chi_squared_p, sidak};
 
 const ERROR_RATE: f64 = 1e-3;
@@ -129,7 +130,7 @@ fn drawn_albedo(bsdf: &Bsdf, wo: Vec3, transport: Transport, side: u32) -> Rgb {
 
 /// How far a white surface is from white, at worst over [`COSINES`].
 fn furnace_error(p: &Parameters) -> f32 {
-    let bsdf = Bsdf::new(p, &TABLES);
+    let bsdf = bsdf(p, &TABLES);
     let worst = |worst: f32, mu: f32| {
         let off = |side| {
             let albedo = drawn_albedo(&bsdf, outgoing(mu, 0.7), Transport::Importance, side);
@@ -264,7 +265,7 @@ const TRIAD_DRAWS: usize = 10_000;
 fn directions_follow_their_density() {
     let mut cases = vec![];
     for (name, p) in triads() {
-        let bsdf = Bsdf::new(&p, &TABLES);
+        let bsdf = bsdf(&p, &TABLES);
         for mu in [0.9, 0.04, -0.4f32] {
             for set in [LobeSet::ALL, LobeSet::BROAD, LobeSet::SHARP, LobeSet::SHARP | LobeSet::DELTA] {
                 // A set that holds the same lobes as ALL says nothing new.
@@ -334,7 +335,7 @@ fn planted_bugs_in_densities_are_found() {
     let least = sidak(ERROR_RATE, 1000);
     let found = |p: Parameters, bug: Bug| {
         let swapped = Parameters { alpha_x: p.alpha_y, alpha_y: p.alpha_x, ..p };
-        let planted = Planted(Bsdf::new(&p, &TABLES), Bsdf::new(&swapped, &TABLES), bug);
+        let planted = Planted(bsdf(&p, &TABLES), bsdf(&swapped, &TABLES), bug);
         let wo = outgoing(0.6, 0.5);
         let lobes = planted.0.lobes();
         let (p, difference) = triad(&planted, wo, lobes, 4 * TRIAD_DRAWS, 99);
@@ -400,18 +401,18 @@ fn directions_can_be_exchanged() {
     for (name, p) in all() {
         // The half vector of refraction by an index near 1 is a small difference: its rounding shows where the lobe is narrow.
         let allowed = if p.alpha_x < 0.05 { 0.2 } else { 1e-2 };
-        let worst = asymmetry(&Bsdf::new(&p, &TABLES), &p);
+        let worst = asymmetry(&bsdf(&p, &TABLES), &p);
         assert!(worst < allowed, "{name}: off by {worst}");
     }
     let p = glass(0.3, 1.5);
-    assert!(asymmetry(&WithoutEta(Bsdf::new(&p, &TABLES)), &p) > 0.5, "a missing eta^2 passes");
+    assert!(asymmetry(&WithoutEta(bsdf(&p, &TABLES)), &p) > 0.5, "a missing eta^2 passes");
 }
 
 /// Smooth glass, water to air: Fresnel's and Snell's numbers, and the factor 1/eta^2, from both sides and both ways.
 #[test]
 fn smooth_glass_by_the_book() {
     let p = glass(0.0, 1.5);
-    let bsdf = Bsdf::new(&p, &TABLES);
+    let bsdf = bsdf(&p, &TABLES);
     assert_eq!(bsdf.lobes(), LobeSet::DELTA);
     for (transport, radiance) in [(Transport::Radiance, true), (Transport::Importance, false)] {
         for (wo, eta) in [(outgoing(0.6, 0.0), 1.5f32), (-outgoing(0.9, 0.0), 1.0 / 1.5)] {
@@ -453,7 +454,7 @@ fn smooth_glass_by_the_book() {
 #[test]
 fn reflectance_at_normal_incidence_is_the_extensions() {
     let mirror = |p: Parameters| {
-        let bsdf = Bsdf::new(&p, &TABLES);
+        let bsdf = bsdf(&p, &TABLES);
         let s = bsdf.sample(Vec3::Z, Transport::Radiance, LobeSet::DELTA, 0.5, Vec2::splat(0.5)).expect("a direction");
         s.weight * s.pdf_w
     };
@@ -472,16 +473,16 @@ fn reflectance_at_normal_incidence_is_the_extensions() {
 /// Classes: every lobe is in one, and asking for the classes one by one gives what asking for all gives.
 #[test]
 fn classes_share_the_lobes_out() {
-    assert_eq!(Bsdf::new(&metal(DELTA_ALPHA * 0.9), &TABLES).lobes(), LobeSet::DELTA);
-    assert_eq!(Bsdf::new(&metal(SHARP_ALPHA * 0.9), &TABLES).lobes(), LobeSet::SHARP);
-    assert_eq!(Bsdf::new(&metal(SHARP_ALPHA * 1.1), &TABLES).lobes(), LobeSet::BROAD);
-    assert_eq!(Bsdf::new(&plastic(0.1, 1.5), &TABLES).lobes(), LobeSet::SMOOTH);
-    assert_eq!(Bsdf::new(&plastic(0.0, 1.5), &TABLES).lobes(), LobeSet::DELTA | LobeSet::BROAD);
-    assert_eq!(Bsdf::new(&glass(0.5, 1.0), &TABLES).lobes(), LobeSet::DELTA);
+    assert_eq!(bsdf(&metal(DELTA_ALPHA * 0.9), &TABLES).lobes(), LobeSet::DELTA);
+    assert_eq!(bsdf(&metal(SHARP_ALPHA * 0.9), &TABLES).lobes(), LobeSet::SHARP);
+    assert_eq!(bsdf(&metal(SHARP_ALPHA * 1.1), &TABLES).lobes(), LobeSet::BROAD);
+    assert_eq!(bsdf(&plastic(0.1, 1.5), &TABLES).lobes(), LobeSet::SMOOTH);
+    assert_eq!(bsdf(&plastic(0.0, 1.5), &TABLES).lobes(), LobeSet::DELTA | LobeSet::BROAD);
+    assert_eq!(bsdf(&glass(0.5, 1.0), &TABLES).lobes(), LobeSet::DELTA);
     let black = Parameters { base_color: Rgb::ZERO, ..Parameters::default() };
-    assert_eq!(Bsdf::new(&black, &TABLES).lobes(), LobeSet::NONE);
+    assert_eq!(bsdf(&black, &TABLES).lobes(), LobeSet::NONE);
     for (name, p) in all() {
-        let bsdf = Bsdf::new(&p, &TABLES);
+        let bsdf = bsdf(&p, &TABLES);
         for (o, i) in pairs(50, 5) {
             let f = |set| bsdf.eval(o, i, Transport::Radiance, set);
             let (sum, all) = (f(LobeSet::BROAD) + f(LobeSet::SHARP), f(LobeSet::ALL));
@@ -504,7 +505,7 @@ fn classes_share_the_lobes_out() {
 #[test]
 fn albedo_is_near_the_truth() {
     for (name, p) in all() {
-        let bsdf = Bsdf::new(&p, &TABLES);
+        let bsdf = bsdf(&p, &TABLES);
         for mu in [1.0, 0.5, -0.5] {
             let wo = outgoing(mu, 1.0);
             let (told, drawn) = (bsdf.albedo(wo, LobeSet::ALL), drawn_albedo(&bsdf, wo, Transport::Importance, 64));
@@ -530,7 +531,7 @@ fn extremes_stay_finite() {
     for (name, p) in all() {
         for alpha in [p.alpha_x, DELTA_ALPHA, 1e-5] {
             let p = Parameters { alpha_x: alpha, ..p };
-            let bsdf = Bsdf::new(&p, &TABLES);
+            let bsdf = bsdf(&p, &TABLES);
             for wo in directions {
                 assert!(bsdf.albedo(wo, LobeSet::ALL).is_finite(), "{name} {alpha} {wo}");
                 for transport in [Transport::Radiance, Transport::Importance] {

@@ -2,7 +2,7 @@
 
 mod support;
 
-use caustique::bsdf::{Bsdf, Coverings, EnergyTables, LobeSet, Parameters, Shading, Transport};
+use caustique::bsdf::{Coverings, EnergyTables, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;
 use caustique::material::Material;
 use caustique::math::{Frame, Rgb, Vec2, Vec3, Vec4};
@@ -99,7 +99,7 @@ fn unlit_gives_its_base_colour_and_scatters_nothing() {
     let material = Material { unlit: true, base_color: [0.2, 0.4, 0.6, 1.0], ..Material::default() };
     assert_eq!(material.emitted(&surface(), &[]), Rgb::new(0.2, 0.4, 0.6));
     let tables = EnergyTables::for_materials(std::slice::from_ref(&material));
-    assert_eq!(Bsdf::new(&material.parameters(&surface(), &[], 1.5), &tables).lobes(), LobeSet::NONE);
+    assert_eq!(support::bsdf(&material.parameters(&surface(), &[], 1.5), &tables).lobes(), LobeSet::NONE);
 }
 
 #[test]
@@ -127,9 +127,11 @@ fn normal_maps_turn_the_frame_and_stay_on_the_side() {
     assert_eq!(with(0).shading_frame(&bare, &textures).n, Vec3::Z);
 }
 
-fn tilted(p: &Parameters, tables: &EnergyTables, check: impl Fn(&Shading)) {
+/// Calls `check` with the normal and what makes the shading of a direction.
+fn tilted(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, &dyn Fn(Vec3) -> Shading<'static>)) {
     let n = Vec3::new(0.5, 0.1, 0.8).normalize();
-    check(&Shading { frame: Frame::from_normal(n), ng: Vec3::Z, bsdf: Bsdf::new(p, tables) });
+    let bsdf = support::bsdf(p, tables);
+    check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo));
 }
 
 fn direction(k: u64) -> Vec3 {
@@ -148,15 +150,15 @@ fn shading_normals_keep_light_and_eye_agreed() {
     let plastic = Parameters { specular: 1.0, alpha_x: 0.3, alpha_y: 0.3, ..Parameters::default() };
     let glass = Parameters { transmission: 1.0, ..plastic };
     for p in [Parameters::default(), plastic, glass] {
-        tilted(&p, &tables, |shading| {
+        tilted(&p, &tables, |_, shading| {
             for k in 0..4000 {
                 let (wo, wi) = (direction(2 * k), direction(2 * k + 1));
-                let radiance = shading.eval_cos(wo, wi, Transport::Radiance, LobeSet::ALL);
-                let importance = shading.eval_cos(wi, wo, Transport::Importance, LobeSet::ALL);
+                let radiance = shading(wo).eval_cos(wi, Transport::Radiance, LobeSet::ALL);
+                let importance = shading(wi).eval_cos(wo, Transport::Importance, LobeSet::ALL);
                 // Radiance: f*(wi -> wo) |cos_g wi|; importance: f*(wi -> wo) |cos_g wo|.
                 let (a, b) = (radiance * wo.z.abs(), importance * wi.z.abs());
                 assert!((a - b).abs().max_element() <= 2e-3 * a.max(b).max_element(), "{wo} {wi}: {a} {b}");
-                let gathered = shading.gather(wo, wi, LobeSet::ALL) * wi.z.abs();
+                let gathered = shading(wo).gather(wi, LobeSet::ALL) * wi.z.abs();
                 assert!((gathered - radiance).abs().max_element() <= 1e-4 * radiance.max_element());
                 if p.transmission == 0.0 && wo.z * wi.z < 0.0 {
                     assert_eq!(radiance, Rgb::ZERO, "light leaks");
@@ -165,9 +167,9 @@ fn shading_normals_keep_light_and_eye_agreed() {
         });
     }
     // The check has power: plain f |cos_s| both ways does not satisfy it.
-    tilted(&Parameters::default(), &tables, |shading| {
+    tilted(&Parameters::default(), &tables, |n, _| {
         let (wo, wi) = (Vec3::new(0.3, 0.2, 0.93).normalize(), Vec3::new(-0.6, 0.3, 0.74).normalize());
-        let f = |i: Vec3| i.dot(shading.frame.n).abs();
+        let f = |i: Vec3| i.dot(n).abs();
         assert!((f(wi) * wo.z - f(wo) * wi.z).abs() > 0.05);
     });
 }
@@ -182,15 +184,16 @@ fn drawn_weights_are_the_integral() {
         (plastic, Transport::Radiance),
         (plastic, Transport::Importance),
     ] {
-        tilted(&p, &tables, |shading| {
+        tilted(&p, &tables, |_, shading| {
             let wo = Vec3::new(-0.2, 0.4, 0.6).normalize();
+            let shading = shading(wo);
             let u = |k: u64, salt: u64| (mix(mix(k) ^ salt) >> 40) as f32 / 16_777_216.0;
             let drawn: Vec<f64> = (0..40_000)
                 .map(|k| {
-                    let s = shading.sample(wo, transport, LobeSet::ALL, u(k, 7), Vec2::new(u(k, 8), u(k, 9)));
+                    let s = shading.sample(transport, LobeSet::ALL, u(k, 7), Vec2::new(u(k, 8), u(k, 9)));
                     s.map_or(0.0, |s| {
-                        let f = shading.eval_cos(wo, s.wi, transport, LobeSet::ALL);
-                        let pdf = shading.pdf(wo, s.wi, transport, LobeSet::ALL);
+                        let f = shading.eval_cos(s.wi, transport, LobeSet::ALL);
+                        let pdf = shading.pdf(s.wi, transport, LobeSet::ALL);
                         assert!((s.weight * pdf - f).abs().max_element() < 1e-3 * f.max_element().max(pdf * 1e-3));
                         f64::from(s.weight.x)
                     })
@@ -205,7 +208,7 @@ fn drawn_weights_are_the_integral() {
                     let phi = std::f32::consts::TAU * (j as f32 + 0.5) / n as f32;
                     let r = (1.0 - z * z).sqrt();
                     let wi = Vec3::new(r * phi.cos(), r * phi.sin(), z);
-                    integral += f64::from(shading.eval_cos(wo, wi, transport, LobeSet::ALL).x);
+                    integral += f64::from(shading.eval_cos(wi, transport, LobeSet::ALL).x);
                 }
             }
             integral *= 4.0 * std::f64::consts::PI / f64::from(n * n);

@@ -7,7 +7,8 @@
 
 mod support;
 
-use caustique::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
+use bumpalo::Bump;
+use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
 use caustique::light::{EmissionDensity, Emitter};
 use caustique::material::Material;
@@ -18,7 +19,7 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
-    Bidirectional, Eye, Left, LightPass, Meets, MergeLevels, Next, PathStart, Record, Scattered, Strategies,
+    Bidirectional, Eye, Left, LightPass, LightVertices, Meets, MergeLevels, Next, PathStart, Record, Scattered, Strategies,
     Surroundings, Technique, Vertex, Visitor, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
@@ -47,13 +48,13 @@ struct Notes<'a> {
     escaped: Option<Vec3>,
 }
 
-impl Visitor for Notes<'_> {
-    fn surface(&mut self, v: &Vertex<'_>, _: Option<Scattered>) -> Next {
+impl<'a> Visitor<'a> for Notes<'a> {
+    fn surface(&mut self, v: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         let emitted = self.scene.lights.emitted(&self.scene.materials, v.surface, v.wo).map(|e| e.1);
         self.met.push(Met {
             p: v.surface.p,
             ng: v.surface.ng,
-            shading: Shading { bsdf: Bsdf::new(v.parameters, &self.scene.tables), ..*v.shading },
+            shading: *v.shading,
             wo: v.wo,
             distance: v.distance,
             onward: None,
@@ -62,7 +63,7 @@ impl Visitor for Notes<'_> {
         Next::Continue(LobeSet::ALL)
     }
 
-    fn scatter(&mut self, _: &Vertex<'_>, sample: &BsdfSample) {
+    fn scatter(&mut self, _: &Vertex<'_, 'a>, sample: &BsdfSample) {
         if let Some(last) = self.met.last_mut() {
             last.onward = Some((sample.wi, sample.lobe == LobeSet::DELTA, sample.pdf_w));
         }
@@ -73,9 +74,9 @@ impl Visitor for Notes<'_> {
     }
 }
 
-fn notes<'a>(scene: &'a Scene, start: PathStart, stream: Stream, transport: Transport) -> Notes<'a> {
+fn notes<'a>(scene: &'a Scene, arena: &'a Bump, start: PathStart, stream: Stream, transport: Transport) -> Notes<'a> {
     let mut notes = Notes { scene, met: Vec::new(), escaped: None };
-    walk(scene, start, stream, transport, 12, &mut notes);
+    walk(scene, arena, start, stream, transport, 12, &mut notes);
     notes
 }
 
@@ -149,7 +150,8 @@ impl<'s> Whole<'s> {
         } else {
             (node.to_light, node.to_eye, Transport::Importance)
         };
-        f64::from(node.shading.pdf(from, to, transport, LobeSet::ALL))
+        let Shading { frame, ng, bsdf, .. } = node.shading;
+        f64::from(Shading::new(frame, ng, bsdf, from).pdf(to, transport, LobeSet::ALL))
     }
 
     /// Density per area of node `j` walked to from the light.
@@ -348,16 +350,18 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
         let stream = Stream::new(1, pass, Domain::EyeIndependent, u64::from(index));
         let pixel = (index % SIZE, index / SIZE);
+        let arena = Bump::new();
+        let mut vertices = LightVertices::new_in(&arena);
         let (mut left, mut by_light, mut by_eye) = (Left::default(), Said::default(), Said::default());
-        shared.light_path(&lights, index, false, &mut left, &mut by_light);
+        shared.light_path(&arena, &lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
-        let meets = Meets { vertices: &left.vertices, photons: Some(&map), levels: &levels };
-        shared.eye_path(pixel, stream, &meets, &mut by_eye);
+        let meets = Meets { vertices: &vertices, photons: Some(&map), levels: &levels };
+        shared.eye_path(&arena, pixel, stream, &meets, &mut by_eye);
 
         let start = eye.start(pixel, stream);
-        let eye_notes = notes(scene, start, stream, Transport::Radiance);
+        let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);
         let emitted = lights.emit(scene, &surroundings, index);
-        let light_notes = emitted.as_ref().map(|e| notes(scene, e.start, e.stream, Transport::Importance));
+        let light_notes = emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, Transport::Importance));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);
         let from_eye = &eye_notes.met[..];
         let camera_pdf_w = f64::from(camera.pdf_w(start.direction) * pixels);

@@ -6,7 +6,7 @@
 
 use super::energy::{COAT_ETA, EnergyTables};
 use super::fresnel::{dielectric, reflect};
-use super::layered::class_of;
+use super::interface::class_of;
 use super::microfacet::{Ggx, g1, g2_reflection};
 use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
@@ -14,21 +14,21 @@ use crate::math::{Rgb, Vec2, Vec3};
 
 /// Sheen and clear coat.
 #[derive(Clone, Copy, Debug)]
-pub struct Cover<'a> {
+pub struct Cover {
     coat: f32,
     coat_ggx: Ggx,
     /// Class of the coat's lobe.
     pub coat_class: LobeSet,
-    coat_albedo: Profile<'a>,
+    coat_albedo: Profile,
     sheen: Rgb,
     sheen_alpha: f32,
-    sheen_albedo: Profile<'a>,
+    sheen_albedo: Profile,
 }
 
-impl<'a> Cover<'a> {
+impl Cover {
     /// `None` where nothing lies on top.
     #[inline]
-    pub fn new(p: &Parameters, tables: &'a EnergyTables) -> Option<Cover<'a>> {
+    pub fn new(p: &Parameters, tables: &EnergyTables) -> Option<Cover> {
         if !p.is_covered() {
             return None;
         }
@@ -58,8 +58,15 @@ impl<'a> Cover<'a> {
         set
     }
 
+    /// There is a coat.
     #[inline]
-    fn has_sheen(&self) -> bool {
+    pub fn has_coat(&self) -> bool {
+        self.coat > 0.0
+    }
+
+    /// There is sheen.
+    #[inline]
+    pub fn has_sheen(&self) -> bool {
         self.sheen.max_element() > 0.0
     }
 
@@ -92,14 +99,14 @@ impl<'a> Cover<'a> {
 
     /// Albedos of coat and sheen.
     #[inline]
-    pub fn albedos(&self, cos: f32, mu: Position, set: LobeSet) -> [Rgb; 2] {
+    pub fn albedos(&self, cos: f32, mu: Position) -> [Rgb; 2] {
         let mut albedos = [Rgb::ZERO; 2];
-        if self.coat > 0.0 && set.has(self.coat_class) {
+        if self.coat > 0.0 {
             let exact = self.coat_class == LobeSet::DELTA;
             let albedo = if exact { dielectric(cos, COAT_ETA).0 } else { self.coat_albedo.at(mu) };
             albedos[0] = Rgb::splat(self.coat * albedo);
         }
-        if self.has_sheen() && set.has(LobeSet::BROAD) {
+        if self.has_sheen() {
             albedos[1] = self.sheen * (self.sheen_albedo(mu) * (1.0 - self.coat * self.coat_albedo.at(mu)));
         }
         albedos

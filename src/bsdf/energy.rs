@@ -1,7 +1,7 @@
 //! Directional albedos of the lobes, tabulated, so that what single scattering loses can be given back
 //! \[Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"\], and layers share light.
 
-use super::fresnel::{grazing_weight, is_matched, reflect, refract};
+use super::fresnel::{Smooth, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
 use super::profile::{Grid, NODES, Position, Profile, node};
 use super::sheen;
@@ -23,7 +23,7 @@ pub(super) struct SideTables {
     pub reflected: Grid,
     /// Both: constant, per F0, per F90; the fourth is unused.
     pub scattered: Grid,
-    /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of [`grazing_weight`].
+    /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of [`Smooth::grazing_weight`].
     pub average_total: f32,
     /// See `average_total`.
     pub average_grazing: f32,
@@ -115,13 +115,14 @@ fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
 
 impl SideTables {
     fn new(eta: f32) -> SideTables {
+        let smooth = Smooth::new(eta);
         // Total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and weighted.
         let table = tabulate(
             || [0.0f32; 5],
             |sums, ggx, wo, lambda_o, h, weight| {
                 let cos = wo.dot(h).clamp(0.0, 1.0);
                 let r = weight * reflected_share(ggx, wo, lambda_o, h).1;
-                let Some((grazing, cos_t)) = grazing_weight(cos, eta) else {
+                let Some((grazing, cos_t)) = smooth.grazing_weight(cos) else {
                     sums[0] += r;
                     return;
                 };
@@ -138,7 +139,7 @@ impl SideTables {
         let (mut total, mut grazing) = (0.0f64, 0.0f64);
         for i in 0..n {
             let mu = ((i as f32 + 0.5) / n as f32).sqrt();
-            match grazing_weight(mu, eta) {
+            match smooth.grazing_weight(mu) {
                 None => total += 1.0,
                 Some((g, _)) => grazing += f64::from(g),
             }
@@ -154,25 +155,25 @@ impl SideTables {
 
     /// Share of what arrives that the facets of a perfect reflector scatter less than all of: what compensation gives back.
     #[inline]
-    pub fn white_loss(&self, alpha: Position) -> Profile<'_> {
+    pub fn white_loss(&self, alpha: Position) -> Profile {
         Profile::new(&self.reflected, alpha, 1.0, -Vec4::X)
     }
 
     /// Albedo of reflection.
     #[inline]
-    pub fn reflection(&self, alpha: Position, f0: f32, f90: f32) -> Profile<'_> {
+    pub fn reflection(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
         Profile::new(&self.reflected, alpha, 0.0, Vec4::new(0.0, 1.0, f0, f90))
     }
 
     /// What neither reflection nor compensation by `multiple` of the white loss reflects.
     #[inline]
-    pub fn let_through(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile<'_> {
+    pub fn let_through(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile {
         Profile::new(&self.reflected, alpha, 1.0 - multiple, Vec4::new(multiple, -1.0, -f0, -f90))
     }
 
     /// What reflection and transmission together lose.
     #[inline]
-    pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile<'_> {
+    pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
         Profile::new(&self.scattered, alpha, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
     }
 
@@ -185,7 +186,7 @@ impl SideTables {
 
 impl CoverTables {
     /// `cover(k)` is the albedo of the covering at node `k` of its roughness.
-    fn new<'a>(cover: impl Fn(usize) -> Profile<'a>) -> CoverTables {
+    fn new(cover: impl Fn(usize) -> Profile) -> CoverTables {
         let profiles: [Profile; COVER_NODES] = std::array::from_fn(&cover);
         let table = tabulate(
             || [0.0f32; COVER_NODES],
@@ -202,7 +203,7 @@ impl CoverTables {
         CoverTables([0, 3, 6].map(|k| grid(&table, |s| Vec4::new(s[k], s[k + 1], s[k + 2], s[k + 3]))))
     }
 
-    fn profile(&self, alpha: Position, cover_alpha: f32) -> Profile<'_> {
+    fn profile(&self, alpha: Position, cover_alpha: f32) -> Profile {
         let x = cover_alpha.clamp(0.0, 1.0).sqrt() * (COVER_NODES - 1) as f32;
         let group = ((x / 3.0) as usize).min(2);
         let x = x - 3.0 * group as f32;
@@ -262,27 +263,27 @@ impl EnergyTables {
 
     /// Share of what arrives that facets lose even if they reflect perfectly.
     #[inline]
-    pub(super) fn white_loss(&self, alpha: Position) -> Profile<'_> {
+    pub(super) fn white_loss(&self, alpha: Position) -> Profile {
         self.interfaces.first().map_or(Profile::constant(0.0), |t| t.thin.white_loss(alpha))
     }
 
     /// Albedo of a clear coat.
     #[inline]
-    pub(super) fn coat_albedo(&self, alpha: Position) -> Profile<'_> {
+    pub(super) fn coat_albedo(&self, alpha: Position) -> Profile {
         let f0 = super::fresnel::normal_incidence(COAT_ETA);
         self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.reflection(alpha, f0, 1.0))
     }
 
     /// Albedo of white sheen.
     #[inline]
-    pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile<'_> {
+    pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile {
         self.sheen.as_ref().map_or(Profile::constant(0.0), |grid| Profile::new(grid, alpha, 0.0, Vec4::X))
     }
 
     /// Facets below a covering of albedo E are seen through `1 - max(E(o), E(i))`, which is exact for mirrors and keeps the exchange of
     /// directions. Rough ones then lose `integral f max(E(i) - E(o), 0) cos` of what `1 - E(o)` would let them keep: this profile.
     #[inline]
-    pub(super) fn covered_loss(&self, covering: Covering, alpha: Position, cover_alpha: f32) -> Profile<'_> {
+    pub(super) fn covered_loss(&self, covering: Covering, alpha: Position, cover_alpha: f32) -> Profile {
         let tables = match covering {
             Covering::Coat => &self.below_coat,
             Covering::Sheen => &self.below_sheen,

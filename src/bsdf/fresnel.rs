@@ -55,23 +55,48 @@ pub fn schlick_weight(cos: f32) -> f32 {
     sqr(sqr(x)) * x
 }
 
-/// Where the exact reflectance lies between its value at normal incidence (0) and at grazing incidence (1): lets
-/// KHR_materials_specular's F0 and F90 shape the exact curve, as they shape Schlick's in the extension's text.
-/// Returns the weight of F90 and the cosine of the refracted ray; `None` at total internal reflection.
-#[inline]
-pub fn grazing_weight(cos_o: f32, eta: f32) -> Option<(f32, f32)> {
-    if is_matched(eta) {
-        return Some((0.0, cos_o));
+/// A smooth interface seen from one side, ready for many angles.
+#[derive(Clone, Copy, Debug)]
+pub struct Smooth {
+    /// Index on the far side over the index on the near side.
+    pub eta: f32,
+    inverse_eta2: f32,
+    /// Reflectance at normal incidence, and one over the rest.
+    normal: f32,
+    inverse_rest: f32,
+}
+
+impl Smooth {
+    /// From the relative index.
+    pub fn new(eta: f32) -> Smooth {
+        let normal = normal_incidence(eta);
+        Smooth { eta, inverse_eta2: 1.0 / (eta * eta), normal, inverse_rest: 1.0 / (1.0 - normal) }
     }
-    if eta > MIRROR_ETA {
-        return Some((schlick_weight(cos_o), 1.0));
+
+    /// Where the exact reflectance lies between its value at normal incidence (0) and at grazing incidence (1): lets
+    /// KHR_materials_specular's F0 and F90 shape the exact curve, as they shape Schlick's in the extension's text.
+    /// Returns the weight of F90 and the cosine of the refracted ray; `None` at total internal reflection.
+    #[inline]
+    pub fn grazing_weight(&self, cos_o: f32) -> Option<(f32, f32)> {
+        let eta = self.eta;
+        if is_matched(eta) {
+            return Some((0.0, cos_o));
+        }
+        if eta > MIRROR_ETA {
+            return Some((schlick_weight(cos_o), 1.0));
+        }
+        let sin2_t = (1.0 - cos_o * cos_o).max(0.0) * self.inverse_eta2;
+        // Not a number: from inside of what reflects all light.
+        if sin2_t >= 1.0 || sin2_t.is_nan() {
+            return None;
+        }
+        let cos_t = (1.0 - sin2_t).sqrt();
+        // Fresnel's equations as in `dielectric`, over one denominator.
+        let (near, far) = (eta * cos_o, eta * cos_t);
+        let (a, b) = ((near - cos_t) * (cos_o + far), (near + cos_t) * (cos_o - far));
+        let f = 0.5 * (sqr(a) + sqr(b)) / sqr((near + cos_t) * (cos_o + far));
+        Some((((f - self.normal) * self.inverse_rest).clamp(0.0, 1.0), cos_t))
     }
-    let (f, cos_t) = dielectric(cos_o, eta);
-    if cos_t <= 0.0 && eta < 1.0 {
-        return None;
-    }
-    let f0 = normal_incidence(eta);
-    Some((((f - f0) / (1.0 - f0)).clamp(0.0, 1.0), cos_t))
 }
 
 /// Mirror image of `w` about the unit vector `h`.

@@ -10,13 +10,11 @@
 //! What single scattering between facets loses is given back by a separable lobe, for glass on both sides in the ratio
 //! that keeps it reciprocal \[Kulla and Conty 2017\]. The lobe belongs to the class of the lobe it completes.
 
-use super::cover::Cover;
-use super::energy::{Covering, EnergyTables, SideTables};
-use super::fresnel::{grazing_weight, is_matched, normal_incidence, schlick};
-use super::microfacet::Ggx;
-use super::profile::{Position, Profile};
-use super::{DELTA_ALPHA, LobeSet, Parameters, SHARP_ALPHA};
-use crate::math::{Rgb, Vec3, sqr};
+use super::fresnel::schlick;
+use super::interface::{Interface, RoughGlass, again};
+use super::profile::Position;
+use super::LobeSet;
+use crate::math::{Rgb, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Directions nearer to the surface than this (cosine) are in it: nothing comes from there. Below it, products of cosines underflow.
@@ -28,47 +26,52 @@ pub(super) fn mean(c: Rgb) -> f32 {
     c.element_sum() * (1.0 / 3.0)
 }
 
-/// Class of a GGX lobe.
-#[inline]
-pub(super) fn class_of(alpha_x: f32, alpha_y: f32) -> LobeSet {
-    let widest = alpha_x.max(alpha_y);
-    if widest < DELTA_ALPHA {
-        LobeSet::DELTA
-    } else if (alpha_x * alpha_y).sqrt() < SHARP_ALPHA {
-        LobeSet::SHARP
-    } else {
-        LobeSet::BROAD
-    }
+/// See the module's documentation.
+#[derive(Clone, Copy, Debug)]
+pub struct Layered<'a> {
+    pub(super) interface: &'a Interface,
+    /// Classes of lobes that are there.
+    pub(super) lobes: LobeSet,
+    pub(super) has_facets: bool,
+    pub(super) base: Rgb,
+    pub(super) metal: f32,
+    pub(super) matte: f32,
+    pub(super) glass: f32,
+    /// Weight of the straight lobe.
+    pub(super) straight: Rgb,
+    /// Diffuse: `diffuse * through(o) * through(i)`; `diffuse_albedo * through(o)` is its albedo.
+    pub(super) diffuse: Rgb,
+    pub(super) diffuse_albedo: Rgb,
+    /// Compensation for reflecting facets: `returned * loss(o) * loss(i)`, and for thin walls `passed` likewise on the other side;
+    /// times pi times the average of `loss` they are albedos.
+    pub(super) returned: Rgb,
+    pub(super) passed: Rgb,
+    /// Average reflectance of the facets below a covering.
+    pub(super) below: Rgb,
 }
 
 /// Shares of the lobes among the directions drawn for one `wo` and one set of classes; they sum to 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shares {
     /// Facets: reflected or transmitted, as Fresnel says at the facet drawn.
-    pub(super) facets: f32,
+    pub facets: f32,
     /// Compensation on the side of `wo`.
-    pub(super) returned: f32,
+    pub returned: f32,
     /// Compensation on the other side.
-    pub(super) passed: f32,
+    pub passed: f32,
     /// Diffuse reflection.
-    pub(super) diffuse: f32,
+    pub diffuse: f32,
     /// Straight through an index-matched boundary.
-    pub(super) straight: f32,
+    pub straight: f32,
     /// What facets lose below a covering, on the side of `wo`.
-    pub(super) below: f32,
+    pub below: f32,
     /// Clear coat.
-    pub(super) coat: f32,
+    pub coat: f32,
     /// Sheen.
-    pub(super) sheen: f32,
+    pub sheen: f32,
 }
 
 impl Shares {
-    #[inline]
-    fn new(albedos: [Rgb; 8]) -> Shares {
-        let [facets, returned, passed, diffuse, straight, below, coat, sheen] = albedos.map(mean);
-        Shares { facets, returned, passed, diffuse, straight, below, coat, sheen }
-    }
-
     /// Scaled to sum to 1; `None` where nothing scatters.
     #[inline]
     fn normalised(mut self) -> Option<Shares> {
@@ -92,227 +95,111 @@ impl Shares {
     }
 }
 
-/// See the module's documentation.
+/// A surface seen along one direction: what all directions of light have in common there.
 #[derive(Clone, Copy, Debug)]
-pub struct Layered<'a> {
-    pub(super) ggx: Ggx,
-    pub(super) class: LobeSet,
-    pub(super) thin: bool,
-    pub(super) has_facets: bool,
-    pub(super) base: Rgb,
-    pub(super) metal: f32,
-    pub(super) matte: f32,
-    pub(super) glass: f32,
-    /// Index of refraction below over above.
-    pub(super) eta: f32,
-    /// Reflectance of the dielectric at normal and grazing incidence.
-    pub(super) f0: Rgb,
-    pub(super) f90: f32,
-    /// Weight of the straight lobe.
-    pub(super) straight: Rgb,
-    /// Diffuse: `diffuse * through(o) * through(i)`; `diffuse_albedo * through(o)` is its albedo.
-    pub(super) diffuse: Rgb,
-    pub(super) diffuse_albedo: Rgb,
-    pub(super) through: Profile<'a>,
-    /// Compensation for reflecting facets: `returned * loss(o) * loss(i)`, and for thin walls `passed` likewise on the other side;
-    /// times pi times the average of `loss` they are albedos.
-    pub(super) loss: Profile<'a>,
-    pub(super) returned: Rgb,
-    pub(super) passed: Rgb,
-    /// Compensation for solid glass, by side: what is lost from above and from below.
-    pub(super) glass_loss: [Profile<'a>; 2],
-    /// Albedo of its reflecting facets, by side.
-    pub(super) glass_reflected: [Profile<'a>; 2],
-    /// Reflected compensation: `glass_returned[side] * loss(o) * loss(i)`.
-    pub(super) glass_returned: [f32; 2],
-    /// Transmitted compensation over the squared index of the side transmitted to (with 1 above): the same from both sides.
-    pub(super) glass_passed: Rgb,
-    pub(super) cover: Option<Covered<'a>>,
+pub(super) struct Seen {
+    /// The direction, from the side it is on.
+    pub o: Vec3,
+    /// 0: it is above; 1: below.
+    pub side: usize,
+    pub at: Position,
+    /// [`super::microfacet::Ggx::root`] of it.
+    pub root: f32,
+    /// Profiles of the interface along it.
+    pub loss: f32,
+    pub through: f32,
+    /// Estimates of the lobes' albedos, all classes of lobes: their means,
+    means: Shares,
+    /// and by class: facets with their compensation, diffuse, straight, coat, sheen.
+    albedos: [Rgb; 5],
 }
 
-/// A covering, and what it does to the lobes below.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Covered<'a> {
-    pub(super) cover: Cover<'a>,
-    /// Normalisation of separable lobes below: average profile over average of the profile times what passes, for the profiles `through`,
-    /// `loss` and `glass_loss`.
-    pub(super) through: f32,
-    pub(super) loss: f32,
-    pub(super) glass_loss: [f32; 2],
-    /// What facets lose below coat and sheen: `below[k] * profile(o) * profile(i)`, with albedo `pi * average * below * profile(o)`.
-    pub(super) below: [Rgb; 2],
-    pub(super) profiles: [Profile<'a>; 2],
+impl Seen {
+    /// Where only the direction matters.
+    #[inline]
+    pub(super) fn plain(wo: Vec3) -> Seen {
+        Seen {
+            o: Vec3::new(wo.x, wo.y, wo.z.abs()),
+            side: usize::from(wo.z < 0.0),
+            at: Position::default(),
+            root: 0.0,
+            loss: 0.0,
+            through: 1.0,
+            means: Shares::default(),
+            albedos: [Rgb::ZERO; 5],
+        }
+    }
+
+    /// The direction itself.
+    #[inline]
+    pub(super) fn wo(&self) -> Vec3 {
+        if self.side == 1 { Vec3::new(self.o.x, self.o.y, -self.o.z) } else { self.o }
+    }
 }
 
 impl<'a> Layered<'a> {
+    /// The surface of `base` colour, `metallic` and transmitting in these shares, at `interface`.
     #[inline]
-    pub(super) fn new(p: &Parameters, tables: &'a EnergyTables) -> Layered<'a> {
-        let class = class_of(p.alpha_x, p.alpha_y);
-        // A lobe that is narrow along one axis only is still sampled as a lobe.
-        let ggx = Ggx { alpha_x: p.alpha_x.max(DELTA_ALPHA), alpha_y: p.alpha_y.max(DELTA_ALPHA) };
-        let rough = class != LobeSet::DELTA;
-        // The tables are isotropic: a stretched lobe takes what one of the same mean square slope loses. At normal incidence that
-        // is right within 3 %; at grazing angles a metal stretched fourfold is off by up to -18 % across and +6 % along.
-        let mean_square = 0.5 * (sqr(ggx.alpha_x) + sqr(ggx.alpha_y));
-        let alpha = Position::new(if rough { mean_square.sqrt() } else { 0.0 });
-        let metal = p.metallic;
-        let glass = (1.0 - metal) * p.transmission;
-        let matte = (1.0 - metal) * (1.0 - p.transmission);
-        let base = p.base_color;
-        let sides = tables.sides(p.eta);
-        let (f0, f90) = match sides {
-            Some(_) => ((p.specular_color * normal_incidence(p.eta)).min(Rgb::ONE) * p.specular, p.specular),
-            None => (Rgb::ZERO, 0.0),
-        };
-        let matched = is_matched(p.eta);
-        let nothing = Profile::constant(0.0);
-        let mut b = Layered {
-            ggx,
-            class,
-            thin: p.thin,
-            has_facets: metal > 0.0 || (!matched && (glass > 0.0 || (matte > 0.0 && p.specular > 0.0))),
+    pub(super) fn new(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface) -> Layered<'a> {
+        let Interface { matched, class, thin, average, .. } = *interface;
+        let metal = metallic;
+        let glass = (1.0 - metal) * transmission;
+        let matte = (1.0 - metal) * (1.0 - transmission);
+        let has_facets = metal > 0.0 || (!matched && (glass > 0.0 || (matte > 0.0 && interface.f90 > 0.0)));
+        let straight = if matched { base * glass } else { Rgb::ZERO };
+        let glass = if matched { 0.0 } else { glass };
+        let (mut returned, mut passed) = (Rgb::ZERO, Rgb::ZERO);
+        let metal_average = base + (Rgb::ONE - base) * (1.0 / 21.0);
+        if class != LobeSet::DELTA {
+            let lost = interface.loss.average;
+            let scale = FRAC_1_PI / lost.max(1e-9);
+            returned = interface.again * (matte * scale);
+            if metal > 0.0 {
+                returned += again(metal_average, 1.0 - lost) * (metal * scale);
+            }
+            if thin {
+                returned += average * (glass * scale);
+                passed = base * ((1.0 - average.max_element()) * glass * scale);
+            }
+        }
+        let diffuse_albedo = base * matte;
+        let diffuse = diffuse_albedo * (FRAC_1_PI / interface.through.average.max(1e-9));
+        let mut lobes = LobeSet::NONE;
+        if has_facets {
+            lobes = lobes | class;
+        }
+        if diffuse.max_element() > 0.0 {
+            lobes = lobes | LobeSet::BROAD;
+        }
+        if straight.max_element() > 0.0 {
+            lobes = lobes | LobeSet::DELTA;
+        }
+        let mut below = Rgb::ZERO;
+        if let Some(covered) = &interface.cover {
+            lobes = lobes | covered.cover.lobes();
+            below = metal_average * metal + average * (1.0 - metal);
+        }
+        Layered {
+            interface,
+            lobes,
+            has_facets,
             base,
             metal,
             matte,
-            glass: if matched { 0.0 } else { glass },
-            eta: p.eta,
-            f0,
-            f90,
-            straight: if matched { base * glass } else { Rgb::ZERO },
-            diffuse: Rgb::ZERO,
-            diffuse_albedo: Rgb::ZERO,
-            through: nothing,
-            loss: if rough { tables.white_loss(alpha) } else { nothing },
-            returned: Rgb::ZERO,
-            passed: Rgb::ZERO,
-            glass_loss: [nothing; 2],
-            glass_reflected: [nothing; 2],
-            glass_returned: [0.0; 2],
-            glass_passed: Rgb::ZERO,
-            cover: None,
-        };
-        // Average reflectances of the dielectric from above.
-        let average = sides.map_or(Rgb::ZERO, |[above, _]| {
-            let of = |f0: f32| above.average_reflectance(f0, f90);
-            Rgb::new(of(f0.x), of(f0.y), of(f0.z))
-        });
-        // Reflection of light that facets scatter more than once [Kulla and Conty 2017], as a share of what is lost.
-        let kept = 1.0 - b.loss.average;
-        let again = |f: Rgb| f * f * kept / (Rgb::ONE - f * (1.0 - kept));
-        let metal_average = base + (Rgb::ONE - base) * (1.0 / 21.0);
-        if rough {
-            let scale = FRAC_1_PI / b.loss.average.max(1e-9);
-            b.returned = (again(metal_average) * metal + again(average) * matte) * scale;
-            if p.thin {
-                b.returned += average * (b.glass * scale);
-                b.passed = base * ((1.0 - average.max_element()) * b.glass * scale);
-            }
-        }
-        let f0_max = f0.max_element();
-        if matte > 0.0 && base.max_element() > 0.0 {
-            let multiple = if rough { again(average).max_element() } else { 0.0 };
-            b.through =
-                sides.map_or(Profile::constant(1.0), |[above, _]| above.let_through(alpha, f0_max, f90, multiple));
-            b.diffuse_albedo = base * matte;
-            b.diffuse = b.diffuse_albedo * (FRAC_1_PI / b.through.average.max(1e-9));
-        }
-        if let (true, true, false, Some(sides)) = (b.glass > 0.0, rough, p.thin, sides) {
-            b.compensate_glass(alpha, sides);
-        }
-        if let Some(cover) = Cover::new(p, tables) {
-            let reflected = metal_average * metal + average * (1.0 - metal);
-            b.cover_with(cover, p, alpha, if rough { reflected } else { Rgb::ZERO }, tables);
-        }
-        b
-    }
-
-    fn compensate_glass(&mut self, alpha: Position, sides: [&'a SideTables; 2]) {
-        let (f0, f90) = (self.f0.max_element(), self.f90);
-        self.glass_loss = sides.map(|s| s.glass_loss(alpha, f0, f90));
-        self.glass_reflected = sides.map(|s| s.reflection(alpha, f0, f90));
-        // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average those of the other side;
-        // k makes no share larger than the average transmittance of the smooth interface, which is in proportion to n^2 already.
-        let transmitted = sides.map(|s| 1.0 - s.average_reflectance(f0, f90));
-        let averages = self.glass_loss.map(|l| l.average);
-        let k = (transmitted[0] / sqr(self.eta)).min(transmitted[1]) / averages[0].max(averages[1]).max(1e-9);
-        for side in 0..2 {
-            let passes = k * self.index2(1 - side) * averages[1 - side];
-            self.glass_returned[side] = self.glass * (1.0 - passes) * FRAC_1_PI / averages[side].max(1e-9);
-        }
-        self.glass_passed = self.base * (self.glass * k * FRAC_1_PI);
-    }
-
-    /// Puts `cover` on top; `reflected` is the average reflectance of the facets.
-    fn cover_with(
-        &mut self,
-        cover: Cover<'a>,
-        p: &Parameters,
-        alpha: Position,
-        reflected: Rgb,
-        tables: &'a EnergyTables,
-    ) {
-        let norm = |profile: &Profile| match profile.average {
-            average if average > 1e-9 => average / profile.average_with(|mu| cover.passes(mu)).max(1e-9),
-            _ => 1.0,
-        };
-        let profiles = [(Covering::Coat, p.clearcoat_alpha), (Covering::Sheen, p.sheen_alpha)]
-            .map(|(covering, cover_alpha)| tables.covered_loss(covering, alpha, cover_alpha));
-        let strengths = cover.strengths();
-        let below = [0, 1].map(|k| reflected * (strengths[k] * FRAC_1_PI / profiles[k].average.max(1e-9)));
-        self.cover = Some(Covered {
-            cover,
-            through: norm(&self.through),
-            loss: norm(&self.loss),
-            glass_loss: [norm(&self.glass_loss[0]), norm(&self.glass_loss[1])],
+            glass,
+            straight,
+            diffuse,
+            diffuse_albedo,
+            returned,
+            passed,
             below,
-            profiles,
-        });
-    }
-
-    /// Squared index of refraction of a side: 0 above (index 1), 1 below.
-    #[inline]
-    pub(super) fn index2(&self, side: usize) -> f32 {
-        if side == 0 { 1.0 } else { sqr(self.eta) }
-    }
-
-    /// Classes of lobes that are there.
-    #[inline]
-    pub(super) fn lobes(&self) -> LobeSet {
-        let mut set = LobeSet::NONE;
-        if self.has_facets {
-            set = set | self.class;
         }
-        if self.diffuse.max_element() > 0.0 {
-            set = set | LobeSet::BROAD;
-        }
-        if self.straight.max_element() > 0.0 {
-            set = set | LobeSet::DELTA;
-        }
-        self.cover.map_or(set, |c| set | c.cover.lobes())
     }
 
-    /// Its glass is compensated by tables of its own.
+    /// Compensation of solid glass, where there is any.
     #[inline]
-    pub(super) fn is_rough_solid(&self) -> bool {
-        self.glass > 0.0 && !self.thin && self.class != LobeSet::DELTA
-    }
-
-    /// Index behind the facets over the one before them, seen from `side`.
-    #[inline]
-    pub(super) fn eta_from(&self, side: usize) -> f32 {
-        if side == 0 || self.thin { self.eta } else { 1.0 / self.eta }
-    }
-
-    /// Reflectance of the dielectric at a facet, what it lets through, and the cosine of the refracted ray.
-    #[inline]
-    fn dielectric(&self, cos: f32, eta: f32) -> (Rgb, f32, f32) {
-        match grazing_weight(cos, eta) {
-            None => (Rgb::ONE, 0.0, 0.0),
-            Some((grazing, cos_t)) => {
-                let f = self.f0 + (Rgb::splat(self.f90) - self.f0) * grazing;
-                (f, (1.0 - f.max_element()).max(0.0), cos_t)
-            }
-        }
+    pub(super) fn rough_glass(&self) -> Option<&'a RoughGlass> {
+        if self.glass > 0.0 { self.interface.glass.as_ref() } else { None }
     }
 
     /// Reflectance of metal and of the matte's interface at a facet.
@@ -320,7 +207,7 @@ impl<'a> Layered<'a> {
     fn opaque(&self, cos: f32) -> Rgb {
         let mut reflected = if self.metal > 0.0 { schlick(self.base, cos) * self.metal } else { Rgb::ZERO };
         if self.matte > 0.0 {
-            reflected += self.dielectric(cos, self.eta).0 * self.matte;
+            reflected += self.interface.dielectric(cos, 0).0 * self.matte;
         }
         reflected
     }
@@ -332,83 +219,138 @@ impl<'a> Layered<'a> {
         if self.glass == 0.0 {
             return (opaque, Rgb::ZERO, 0.0);
         }
-        let (f, t, cos_t) = self.dielectric(cos, self.eta_from(side));
+        let (f, t, cos_t) = self.interface.dielectric(cos, side);
         (opaque + f * self.glass, self.base * (self.glass * t), cos_t)
     }
 
-    /// A cosine at which the smooth interface reflects about as much as the rough one does at `mu`.
+    /// The surface seen along `wo`.
     #[inline]
-    fn effective_cosine(&self, mu: f32) -> f32 {
-        if self.class == LobeSet::DELTA {
-            mu
-        } else {
-            let alpha = (self.ggx.alpha_x * self.ggx.alpha_y).sqrt();
-            mu + (1.0 - mu) * 0.6 * alpha.min(1.0)
+    pub(super) fn seen(&self, wo: Vec3) -> Seen {
+        let n = self.interface;
+        let side = usize::from(wo.z < 0.0);
+        let o = Vec3::new(wo.x, wo.y, wo.z.abs());
+        let at = Position::new(o.z);
+        let through = n.through.at(at);
+        let mut seen = Seen {
+            o,
+            side,
+            at,
+            root: n.ggx.root(o),
+            loss: n.loss.at(at),
+            through,
+            means: Shares::default(),
+            albedos: [Rgb::ZERO, self.diffuse_albedo * through, self.straight, Rgb::ZERO, Rgb::ZERO],
+        };
+        seen.means.diffuse = mean(seen.albedos[1]);
+        seen.means.straight = mean(self.straight);
+        if self.has_facets {
+            let [single, returned, passed] = self.facet_albedos(&seen);
+            seen.albedos[0] = single + returned + passed;
+            seen.means.facets = mean(single);
+            seen.means.returned = mean(returned);
+            seen.means.passed = mean(passed);
+        }
+        self.cover_albedos(&mut seen);
+        // The estimate may vanish where the lobe does not: black metal at normal incidence.
+        if self.has_facets && n.class != LobeSet::DELTA {
+            seen.means.facets += 0.01;
+        }
+        seen
+    }
+
+    /// Estimates of the albedos of facets, their compensation on the same side, and on the other.
+    #[inline]
+    fn facet_albedos(&self, seen: &Seen) -> [Rgb; 3] {
+        let n = self.interface;
+        let cos = n.effective_cosine(seen.o.z);
+        let own = PI * n.loss.average * seen.loss;
+        let (returned, passed) = (self.returned * own, self.passed * own);
+        match self.rough_glass() {
+            Some(glass) => {
+                let (side, at) = (seen.side, seen.at);
+                let loss = glass.loss[side].at(at);
+                let reflected = glass.reflected[side].at(at);
+                let transmitted = (1.0 - loss - reflected).max(0.0);
+                let smooth = n.dielectric(cos, side).0;
+                let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);
+                let single =
+                    self.opaque(cos) * (1.0 - seen.loss) + (tint * reflected + self.base * transmitted) * self.glass;
+                let same = self.glass * glass.returned[side] * loss * glass.loss[side].average * PI;
+                let other = glass.loss[1 - side].average * n.index2(1 - side);
+                let across = self.base * (self.glass * glass.passed * loss * other * PI);
+                [single, returned + Rgb::splat(same), passed + across]
+            }
+            None => {
+                let (r, t, _) = self.fresnel(cos, seen.side);
+                [(r + t) * (1.0 - seen.loss), returned, passed]
+            }
         }
     }
 
-    /// Estimates of the lobes' albedos at cosine `mu` from `side`, in the order of [`Shares`].
+    /// What a covering scatters, and what it leaves of the rest.
     #[inline]
-    fn albedos(&self, mu: f32, at: Position, side: usize, set: LobeSet) -> [Rgb; 8] {
-        let mut a = [Rgb::ZERO; 8];
-        let rough = self.class != LobeSet::DELTA;
-        let facets = self.has_facets && set.has(self.class);
-        if facets {
-            let cos = self.effective_cosine(mu);
-            let loss = self.loss.at(at);
-            let own = PI * self.loss.average * loss;
-            a[1] = self.returned * own;
-            a[2] = self.passed * own;
-            if self.is_rough_solid() {
-                let glass_loss = self.glass_loss[side].at(at);
-                let reflected = self.glass_reflected[side].at(at);
-                let transmitted = (1.0 - glass_loss - reflected).max(0.0);
-                let smooth = self.dielectric(cos, self.eta_from(side)).0;
-                let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);
-                a[0] = self.opaque(cos) * (1.0 - loss) + (tint * reflected + self.base * transmitted) * self.glass;
-                a[1] += Rgb::splat(self.glass_returned[side] * glass_loss * self.glass_loss[side].average * PI);
-                let other = self.glass_loss[1 - side].average * self.index2(1 - side);
-                a[2] += self.glass_passed * (glass_loss * other * PI);
-            } else {
-                let (r, t, _) = self.fresnel(cos, side);
-                a[0] = (r + t) * (1.0 - loss);
+    fn cover_albedos(&self, seen: &mut Seen) {
+        let Some(c) = &self.interface.cover else { return };
+        let passes = c.cover.passes(seen.at);
+        for albedo in &mut seen.albedos {
+            *albedo *= passes;
+        }
+        for share in [
+            &mut seen.means.facets,
+            &mut seen.means.returned,
+            &mut seen.means.passed,
+            &mut seen.means.diffuse,
+            &mut seen.means.straight,
+        ] {
+            *share *= passes;
+        }
+        if self.has_facets {
+            let mut lost = Rgb::ZERO;
+            for (below, profile) in c.below.iter().zip(&c.profiles) {
+                lost += self.below * (PI * below * profile.average * profile.at(seen.at));
             }
+            seen.albedos[0] += lost;
+            seen.means.below = mean(lost);
         }
-        if set.has(LobeSet::BROAD) && self.diffuse.max_element() > 0.0 {
-            a[3] = self.diffuse_albedo * self.through.at(at);
-        }
-        if set.has(LobeSet::DELTA) {
-            a[4] = self.straight;
-        }
-        if let Some(c) = &self.cover {
-            let passes = c.cover.passes(at);
-            for albedo in &mut a {
-                *albedo *= passes;
-            }
-            if facets && rough {
-                for (below, profile) in c.below.iter().zip(&c.profiles) {
-                    a[5] += *below * (PI * profile.average * profile.at(at));
-                }
-            }
-            [a[6], a[7]] = c.cover.albedos(mu, at, set);
-        }
-        a
+        let [coat, sheen] = c.cover.albedos(seen.o.z, seen.at);
+        (seen.albedos[3], seen.albedos[4]) = (coat, sheen);
+        (seen.means.coat, seen.means.sheen) = (mean(coat), mean(sheen));
+    }
+
+    /// Which of [`Seen`]'s five groups of lobes are in the set.
+    #[inline]
+    fn groups(&self, set: LobeSet) -> [bool; 5] {
+        let coat = self.interface.cover.as_ref().is_some_and(|c| set.has(c.cover.coat_class));
+        let broad = set.has(LobeSet::BROAD);
+        [set.has(self.interface.class), broad, set.has(LobeSet::DELTA), coat, broad]
     }
 
     /// Albedo of the lobes of `set`.
     #[inline]
-    pub(super) fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {
-        let mu = wo.z.abs();
-        self.albedos(mu, Position::new(mu), usize::from(wo.z < 0.0), set).into_iter().sum::<Rgb>().min(Rgb::ONE)
+    pub(super) fn albedo(&self, seen: &Seen, set: LobeSet) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        for (albedo, counts) in seen.albedos.iter().zip(self.groups(set)) {
+            if counts {
+                sum += *albedo;
+            }
+        }
+        sum.min(Rgb::ONE)
     }
 
     #[inline]
-    pub(super) fn shares(&self, mu: f32, at: Position, side: usize, set: LobeSet) -> Option<Shares> {
-        let mut shares = Shares::new(self.albedos(mu, at, side, set));
-        // The estimate may vanish where the lobe does not: black metal at normal incidence.
-        if self.has_facets && set.has(self.class) && self.class != LobeSet::DELTA {
-            shares.facets += 0.01;
-        }
+    pub(super) fn shares(&self, seen: &Seen, set: LobeSet) -> Option<Shares> {
+        let [facets, diffuse, straight, coat, sheen] = self.groups(set).map(|counts| f32::from(u8::from(counts)));
+        let means = &seen.means;
+        let shares = Shares {
+            facets: means.facets * facets,
+            returned: means.returned * facets,
+            passed: means.passed * facets,
+            below: means.below * facets,
+            diffuse: means.diffuse * diffuse,
+            straight: means.straight * straight,
+            coat: means.coat * coat,
+            sheen: means.sheen * sheen,
+        };
         shares.normalised()
     }
 }

@@ -3,6 +3,7 @@
 mod cover;
 mod energy;
 mod fresnel;
+mod interface;
 mod layered;
 mod microfacet;
 mod parameters;
@@ -12,11 +13,13 @@ mod shading;
 mod sheen;
 
 pub use energy::{Coverings, EnergyTables};
+pub use interface::Interface;
 pub use layered::Layered;
 pub use parameters::Parameters;
 pub use shading::{Gathering, Shading};
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
+use layered::Seen;
 use profile::Profile;
 use std::f32::consts::FRAC_1_PI;
 use std::ops::{BitAnd, BitOr};
@@ -99,9 +102,7 @@ pub struct BsdfSample {
 }
 
 /// How a surface scatters at one point, in its shading frame: z is the shading normal, directions point away from the
-/// surface, z > 0 is its front. Built per vertex; looks values up in the scene's tables.
-// Boxing the large variant would allocate once per vertex.
-#[allow(clippy::large_enum_variant)]
+/// surface, z > 0 is its front.
 #[derive(Clone, Copy, Debug)]
 pub enum Bsdf<'a> {
     /// Lambert's reflection of some colour on both sides.
@@ -111,13 +112,18 @@ pub enum Bsdf<'a> {
 }
 
 impl<'a> Bsdf<'a> {
-    /// The BSDF of `parameters`. `tables` were made for their refractive index (the nearest one is used).
+    /// The BSDF of `parameters`, whose interface is `interface`.
+    pub fn new(parameters: &Parameters, interface: &'a Interface) -> Bsdf<'a> {
+        Bsdf::of(parameters.base_color, parameters.metallic, parameters.transmission, interface)
+    }
+
+    /// The BSDF of a surface of colour `base`, `metallic` and transmitting in these shares, at `interface`.
     #[inline]
-    pub fn new(parameters: &Parameters, tables: &'a EnergyTables) -> Bsdf<'a> {
-        if parameters.is_matte() {
-            Bsdf::Matte(parameters.base_color)
+    pub fn of(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface) -> Bsdf<'a> {
+        if metallic == 0.0 && transmission == 0.0 && interface.bare {
+            Bsdf::Matte(base)
         } else {
-            Bsdf::Layered(Layered::new(parameters, tables))
+            Bsdf::Layered(Layered::new(base, metallic, transmission, interface))
         }
     }
 
@@ -127,7 +133,16 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::Matte(color) if color.max_element() > 0.0 => LobeSet::BROAD,
             Bsdf::Matte(_) => LobeSet::NONE,
-            Bsdf::Layered(layered) => layered.lobes(),
+            Bsdf::Layered(layered) => layered.lobes,
+        }
+    }
+
+    /// The surface seen along `wo`.
+    #[inline]
+    fn seen(&self, wo: Vec3) -> Seen {
+        match self {
+            Bsdf::Matte(_) => Seen::plain(wo),
+            Bsdf::Layered(layered) => layered.seen(wo),
         }
     }
 
@@ -139,34 +154,47 @@ impl<'a> Bsdf<'a> {
     /// `f_radiance(o, i) = f_importance(i, o) = f_importance(o, i) n_o^2 / n_i^2`.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        self.evaluate_seen(&self.seen(wo), wi, transport, set)
+    }
+
+    #[inline]
+    fn evaluate_seen(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         match self {
             Bsdf::Matte(color) => {
-                if wo.z * wi.z > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
-                    (*color * FRAC_1_PI, wi.z.abs() * FRAC_1_PI)
+                let above = if seen.side == 1 { -wi.z } else { wi.z };
+                if seen.o.z > 0.0 && above > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
+                    (*color * FRAC_1_PI, above * FRAC_1_PI)
                 } else {
                     (Rgb::ZERO, 0.0)
                 }
             }
-            Bsdf::Layered(layered) => layered.evaluate(wo, wi, transport, set),
+            Bsdf::Layered(layered) => layered.evaluate(seen, wi, transport, set),
         }
     }
 
     /// The first part of [`Bsdf::evaluate`].
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
+        self.eval_seen(&self.seen(wo), wi, transport, set)
+    }
+
+    #[inline]
+    fn eval_seen(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
         match self {
-            Bsdf::Matte(_) => self.evaluate(wo, wi, transport, set).0,
-            Bsdf::Layered(layered) => layered.eval(wo, wi, transport, set),
+            Bsdf::Matte(_) => self.evaluate_seen(seen, wi, transport, set).0,
+            Bsdf::Layered(layered) => layered.eval(seen, wi, transport, set),
         }
     }
 
-    /// Where only diffuse reflection is in `set`: the BSDF for `wo` over its dependence on `wi`, and that dependence (`None`: there is none).
+    /// Where only diffuse reflection is in `set`: the BSDF over its dependence on `wi`, and that dependence (`None`: there is none).
     #[inline]
-    pub(super) fn diffuse_from(&self, wo: Vec3, set: LobeSet) -> Option<(Rgb, Option<&Profile<'_>>)> {
+    fn diffuse_only(&self, seen: &Seen, set: LobeSet) -> Option<(Rgb, Option<&'a Profile>)> {
         match self {
             Bsdf::Matte(color) if set.has(LobeSet::BROAD) => Some((*color * FRAC_1_PI, None)),
             Bsdf::Matte(_) => None,
-            Bsdf::Layered(layered) => layered.diffuse_from(wo, set).map(|(factor, through)| (factor, Some(through))),
+            Bsdf::Layered(layered) => {
+                layered.diffuse_only(seen, set).map(|factor| (factor, Some(&layered.interface.through)))
+            }
         }
     }
 
@@ -180,32 +208,46 @@ impl<'a> Bsdf<'a> {
     /// nothing, or the direction drawn is not one they scatter to.
     #[inline]
     pub fn sample(&self, wo: Vec3, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        self.sample_seen(&self.seen(wo), transport, set, u_lobe, u)
+    }
+
+    #[inline]
+    fn sample_seen(
+        &self,
+        seen: &Seen,
+        transport: Transport,
+        set: LobeSet,
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<BsdfSample> {
         match self {
             Bsdf::Matte(color) => {
                 let mut wi = warp::hemisphere_cosine(u);
-                if !self.lobes().has(set) || wi.z <= 0.0 || wo.z == 0.0 {
+                if !self.lobes().has(set) || wi.z <= 0.0 || seen.o.z == 0.0 {
                     return None;
                 }
                 let pdf_w = wi.z * FRAC_1_PI;
-                wi.z = wi.z.copysign(wo.z);
+                if seen.side == 1 {
+                    wi.z = -wi.z;
+                }
                 Some(BsdfSample { wi, weight: *color, pdf_w, lobe: LobeSet::BROAD, transmitted: false })
             }
-            Bsdf::Layered(layered) => layered.sample(wo, transport, set, u_lobe, u),
+            Bsdf::Layered(layered) => layered.sample(seen, transport, set, u_lobe, u),
         }
     }
 
     /// Albedo of the lobes of `set`: the share of flux from `wo` that they scatter. Exact for delta and diffuse lobes, a good estimate for others.
     #[inline]
     pub fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {
+        self.albedo_seen(&self.seen(wo), set)
+    }
+
+    #[inline]
+    fn albedo_seen(&self, seen: &Seen, set: LobeSet) -> Rgb {
         match self {
-            Bsdf::Matte(color) => {
-                if set.has(LobeSet::BROAD) {
-                    *color
-                } else {
-                    Rgb::ZERO
-                }
-            }
-            Bsdf::Layered(layered) => layered.albedo(wo, set),
+            Bsdf::Matte(color) if set.has(LobeSet::BROAD) => *color,
+            Bsdf::Matte(_) => Rgb::ZERO,
+            Bsdf::Layered(layered) => layered.albedo(seen, set),
         }
     }
 }

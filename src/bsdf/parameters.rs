@@ -1,6 +1,5 @@
 //! What a material says at one point, textures looked up.
 
-use super::fresnel::is_matched;
 use crate::math::Rgb;
 
 /// Parameters of the scattering model at one point: glTF's metallic-roughness model with its extensions.
@@ -61,15 +60,6 @@ impl Parameters {
     #[inline]
     pub(super) fn is_covered(&self) -> bool {
         self.clearcoat > 0.0 || self.sheen_color.max_element() > 0.0
-    }
-
-    /// Nothing but Lambert's reflection.
-    #[inline]
-    pub(super) fn is_matte(&self) -> bool {
-        self.metallic == 0.0
-            && self.transmission == 0.0
-            && (self.specular == 0.0 || is_matched(self.eta))
-            && !self.is_covered()
     }
 
     /// Where the indices match, light goes straight through it, tinted by the base colour, and does nothing else.

@@ -34,6 +34,19 @@ const AVERAGE: [f32; NODES] = {
     result
 };
 
+/// Weights of the nodes in the integral of `f 2 mu dmu` times two, `f` made constant between nodes: the mean of its two ends, doubled.
+const MASS: [f32; NODES] = {
+    let mut weights = [0.0f32; NODES];
+    let mut i = 0;
+    while i + 1 < NODES {
+        let step = SQUARES[i + 1] - SQUARES[i];
+        weights[i] += step;
+        weights[i + 1] += step;
+        i += 1;
+    }
+    weights
+};
+
 /// Squared cosines of the nodes: `t^8`. Uniform numbers between two of them are squares of cosines with density `2 mu`.
 const SQUARES: [f32; NODES] = {
     let mut squares = [0.0f32; NODES];
@@ -57,7 +70,7 @@ pub fn node(i: usize) -> f32 {
 }
 
 /// A cosine or an alpha on its axis: index of the node below, and the fraction to the next.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Position {
     i: usize,
     t: f32,
@@ -74,14 +87,7 @@ impl Position {
 }
 
 /// Four functions of the cosine at one alpha.
-#[derive(Clone, Debug)]
-struct Row {
-    values: [Vec4; NODES],
-    /// Cosine-weighted averages.
-    average: Vec4,
-    /// Integrals of the functions made constant between nodes.
-    mass: Vec4,
-}
+type Row = [[f32; NODES]; 4];
 
 /// Four functions of the cosine and of alpha.
 #[derive(Clone, Debug)]
@@ -90,70 +96,68 @@ pub struct Grid(Vec<Row>);
 impl Grid {
     /// From values at the nodes: of alpha, then of the cosine.
     pub fn new(rows: impl Iterator<Item = [Vec4; NODES]>) -> Grid {
-        let row = |values: [Vec4; NODES]| {
-            let average = values.iter().zip(AVERAGE).map(|(&v, w)| v * w).sum();
-            let mass = (0..NODES - 1).map(|i| (values[i] + values[i + 1]) * (SQUARES[i + 1] - SQUARES[i])).sum();
-            Row { values, average, mass }
-        };
-        Grid(rows.map(row).collect())
+        Grid(rows.map(|row| std::array::from_fn(|k| row.map(|v| v[k]))).collect())
     }
 }
 
-/// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe.
+/// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe. Its nodes are kept, so that a
+/// photon costs one interpolation and no look at the grid.
 #[derive(Clone, Copy, Debug)]
-pub struct Profile<'a> {
-    rows: Option<(&'a Row, &'a Row)>,
-    alpha: f32,
-    constant: f32,
-    factors: Vec4,
+pub struct Profile {
+    nodes: [f32; NODES],
     /// Cosine-weighted average over the hemisphere.
     pub average: f32,
     mass: f32,
 }
 
-impl<'a> Profile<'a> {
+/// Sum of products, in an order that vector instructions like.
+#[inline]
+fn dot(a: &[f32; NODES], b: &[f32; NODES]) -> f32 {
+    let mut sums = [0.0f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum()
+}
+
+impl Profile {
     /// The same everywhere.
-    #[inline]
-    pub fn constant(constant: f32) -> Profile<'a> {
-        Profile { rows: None, alpha: 0.0, constant, factors: Vec4::ZERO, average: constant, mass: 2.0 * constant }
+    pub const fn constant(constant: f32) -> Profile {
+        Profile { nodes: [constant; NODES], average: constant, mass: 2.0 * constant }
     }
 
-    /// `constant + factors . grid`.
+    /// `constant + factors . grid`, at least zero.
     #[inline]
-    pub fn new(grid: &'a Grid, alpha: Position, constant: f32, factors: Vec4) -> Profile<'a> {
+    pub fn new(grid: &Grid, alpha: Position, constant: f32, factors: Vec4) -> Profile {
         let Position { i, t } = alpha;
         let (low, high) = (&grid.0[i], &grid.0[i + 1]);
-        Profile {
-            rows: Some((low, high)),
-            alpha: t,
-            constant,
-            factors,
-            average: (constant + factors.dot(low.average.lerp(high.average, t))).max(0.0),
-            mass: (2.0 * constant + factors.dot(low.mass.lerp(high.mass, t))).max(0.0),
-        }
-    }
-
-    #[inline]
-    fn node(&self, i: usize) -> f32 {
-        match self.rows {
-            None => self.constant,
-            Some((low, high)) => {
-                (self.constant + self.factors.dot(low.values[i].lerp(high.values[i], self.alpha))).max(0.0)
+        let mut nodes = [constant; NODES];
+        for (k, factor) in factors.to_array().into_iter().enumerate() {
+            if factor != 0.0 {
+                for j in 0..NODES {
+                    nodes[j] += factor * (low[k][j] + (high[k][j] - low[k][j]) * t);
+                }
             }
         }
+        for node in &mut nodes {
+            *node = node.max(0.0);
+        }
+        Profile { nodes, average: dot(&nodes, &AVERAGE), mass: dot(&nodes, &MASS) }
     }
 
     /// The value at a cosine.
     #[inline]
     pub fn at(&self, mu: Position) -> f32 {
-        let (a, b) = (self.node(mu.i), self.node(mu.i + 1));
+        let (a, b) = (self.nodes[mu.i], self.nodes[mu.i + 1]);
         a + (b - a) * mu.t
     }
 
     /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which [`Profile::sample`] draws it.
     #[inline]
     pub fn at_with_pdf_w(&self, at: Position, mu: f32) -> (f32, f32) {
-        let (a, b) = (self.node(at.i), self.node(at.i + 1));
+        let (a, b) = (self.nodes[at.i], self.nodes[at.i + 1]);
         (a + (b - a) * at.t, (a + b) / self.mass.max(f32::MIN_POSITIVE) * mu * FRAC_1_PI)
     }
 
@@ -162,7 +166,7 @@ impl<'a> Profile<'a> {
     pub fn sample(&self, u: Vec2) -> Option<Vec3> {
         let mut left = u.x * self.mass;
         for i in 0..NODES - 1 {
-            let value = self.node(i) + self.node(i + 1);
+            let value = self.nodes[i] + self.nodes[i + 1];
             let mass = value * (SQUARES[i + 1] - SQUARES[i]);
             if left < mass {
                 let square = SQUARES[i] + left / value;
@@ -180,7 +184,7 @@ impl<'a> Profile<'a> {
         (0..NODES)
             .map(|i| {
                 AVERAGE[i]
-                    * self.node(i)
+                    * self.nodes[i]
                     * other(Position { i: i.min(NODES - 2), t: if i == NODES - 1 { 1.0 } else { 0.0 } })
             })
             .sum()

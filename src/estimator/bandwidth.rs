@@ -9,6 +9,7 @@ use crate::camera::Camera;
 use crate::photon::{PhotonMap, nearest_radius2};
 use crate::random::{Domain, Stream};
 use crate::transport::{Eye, GatherPoint, same_surface};
+use bumpalo::Bump;
 use rayon::prelude::*;
 
 /// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the picture says
@@ -60,10 +61,11 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
     let found: Vec<Option<f32>> = (0..pixels)
         .into_par_iter()
         .with_min_len(256)
-        .map(|i| {
+        .map_init(Bump::new, |arena, i| {
+            arena.reset();
             let pixel = (i as u32 % width, i as u32 / width);
             let stream = Stream::new(seed, 0, Domain::PilotEye, i as u64);
-            eye.gather_point(pixel, stream).map(|point| of_point(&point))
+            eye.gather_point(arena, pixel, stream).map(|point| of_point(&point))
         })
         .collect();
     let mut known: Vec<f32> = found.iter().flatten().copied().collect();

@@ -1,5 +1,6 @@
 //! The point of a surface that a ray has hit, with everything shading needs.
 
+use super::mesh::Corner;
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -33,48 +34,42 @@ const POSITION_ERROR: f32 = 32.0 * f32::EPSILON;
 impl Surface {
     /// The surface at barycentric coordinates (`b1`, `b2`) of triangle `primitive`. `None` for a triangle without area.
     #[inline]
-    pub fn at(
+    pub(super) fn at(
         instance_index: u32,
         instance: &Instance,
         mesh: &Mesh,
+        corners: &[Corner],
         primitive: u32,
-        b1: f32,
-        b2: f32,
+        [b1, b2]: [f32; 2],
     ) -> Option<Surface> {
-        let triangle = mesh.triangles[primitive as usize].map(|i| i as usize);
-        let [p0, p1, p2] = triangle.map(|i| mesh.positions[i]);
+        let [i0, i1, i2] = mesh.triangles[primitive as usize];
+        let (i0, i1, i2) = (i0 as usize, i1 as usize, i2 as usize);
+        let (c0, c1, c2) = (&corners[i0], &corners[i1], &corners[i2]);
         let b0 = 1.0 - b1 - b2;
-        let e1 = p1 - p0;
-        let e2 = p2 - p0;
-        let p = instance.point(p0 + e1 * b1 + e2 * b2);
+        let e1 = c1.p - c0.p;
+        let e2 = c2.p - c0.p;
+        let p = instance.point(c0.p + e1 * b1 + e2 * b2);
         let ng = instance.normal(e1.cross(e2)).try_normalize()?;
-        let blend3 = |values: &[Vec3]| values[triangle[0]] * b0 + values[triangle[1]] * b1 + values[triangle[2]] * b2;
-        let mut ns = ng;
-        if !mesh.normals.is_empty()
-            && let Some(n) = instance.normal(blend3(&mesh.normals)).try_normalize()
-        {
-            // A file may carry normals that disagree with the winding: the winding decides which side is the front.
-            ns = if n.dot(ng) < 0.0 { -n } else { n };
+        // A file may carry normals that disagree with the winding: the winding decides which side is the front.
+        let ns = match instance.normal(c0.n * b0 + c1.n * b1 + c2.n * b2).try_normalize() {
+            Some(n) if n.dot(ng) < 0.0 => -n,
+            Some(n) => n,
+            None => ng,
+        };
+        let mut uv = [c0.uv * b0 + c1.uv * b1 + c2.uv * b2, Vec2::ZERO];
+        let second = &mesh.uvs[1];
+        if !second.is_empty() {
+            uv[1] = second[i0] * b0 + second[i1] * b1 + second[i2] * b2;
         }
-        let uv = [0, 1].map(|set: usize| {
-            let values = &mesh.uvs[set];
-            if values.is_empty() {
-                Vec2::ZERO
-            } else {
-                values[triangle[0]] * b0 + values[triangle[1]] * b1 + values[triangle[2]] * b2
-            }
-        });
-        let color = if mesh.colors.is_empty() {
-            Vec4::ONE
-        } else {
-            mesh.colors[triangle[0]] * b0 + mesh.colors[triangle[1]] * b1 + mesh.colors[triangle[2]] * b2
-        };
-        let tangent = if mesh.tangents.is_empty() {
-            Vec4::ZERO
-        } else {
-            let t = mesh.tangents[triangle[0]] * b0 + mesh.tangents[triangle[1]] * b1 + mesh.tangents[triangle[2]] * b2;
-            instance.direction(t.truncate()).extend(if t.w < 0.0 { -1.0 } else { 1.0 })
-        };
+        let mut color = Vec4::ONE;
+        if !mesh.colors.is_empty() {
+            color = mesh.colors[i0] * b0 + mesh.colors[i1] * b1 + mesh.colors[i2] * b2;
+        }
+        let mut tangent = Vec4::ZERO;
+        if !mesh.tangents.is_empty() {
+            let t = mesh.tangents[i0] * b0 + mesh.tangents[i1] * b1 + mesh.tangents[i2] * b2;
+            tangent = instance.direction(t.truncate()).extend(if t.w < 0.0 { -1.0 } else { 1.0 });
+        }
         Some(Surface {
             p,
             ng,

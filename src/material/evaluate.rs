@@ -1,7 +1,7 @@
 //! Materials at a surface: textures looked up, in the order the glTF specification multiplies them.
 
 use super::Material;
-use crate::bsdf::{Coverings, EnergyTables, Parameters};
+use crate::bsdf::Parameters;
 use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, sqr};
 use crate::texture::{Texture, TextureRef};
@@ -34,18 +34,48 @@ impl Material {
         Vec4::from_array(self.base_color) * surface.color * look_up(&self.base_color_texture, surface, textures)
     }
 
+    /// What of the scattering model may change without a change of the interface: base colour, share of metal, share of the
+    /// dielectric that transmits. All in `[0, 1]`.
+    #[inline]
+    pub fn base_and_shares(&self, surface: &Surface, textures: &[Texture]) -> (Rgb, f32, f32) {
+        let base = unit_color(self.base(surface, textures).truncate());
+        let (mut metallic, mut transmission) = (unit(self.metallic), unit(self.transmission));
+        if metallic > 0.0 && self.metallic_roughness_texture.is_some() {
+            metallic *= unit(look_up(&self.metallic_roughness_texture, surface, textures).z);
+        }
+        if transmission > 0.0 && self.transmission_texture.is_some() {
+            transmission *= unit(look_up(&self.transmission_texture, surface, textures).x);
+        }
+        (base, metallic, transmission)
+    }
+
+    /// Whether no texture says anything about the interface, so that one serves all surfaces of the material.
+    pub fn has_plain_interface(&self) -> bool {
+        let textures = [
+            &self.metallic_roughness_texture,
+            &self.anisotropy_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.sheen_color_texture,
+            &self.sheen_roughness_texture,
+        ];
+        textures.iter().all(|texture| texture.is_none())
+    }
+
     /// The parameters of the scattering model; `eta` is the index of refraction behind the surface (its back) over the one before it.
     #[inline]
     pub fn parameters(&self, surface: &Surface, textures: &[Texture], eta: f32) -> Parameters {
         if self.unlit {
             return Parameters { base_color: Rgb::ZERO, ..Parameters::default() };
         }
-        let base = self.base(surface, textures);
+        let (base_color, metallic, transmission) = self.base_and_shares(surface, textures);
         let mut p = Parameters {
-            base_color: unit_color(base.truncate()),
-            metallic: unit(self.metallic),
+            base_color,
+            metallic,
             eta,
-            transmission: unit(self.transmission),
+            transmission,
             thin: self.thin,
             specular: unit(self.specular),
             specular_color: self.specular_color.max(Rgb::ZERO),
@@ -53,9 +83,7 @@ impl Material {
         };
         let mut roughness = unit(self.roughness);
         if self.metallic_roughness_texture.is_some() {
-            let texel = look_up(&self.metallic_roughness_texture, surface, textures);
-            roughness *= unit(texel.y);
-            p.metallic *= unit(texel.z);
+            roughness *= unit(look_up(&self.metallic_roughness_texture, surface, textures).y);
         }
         let alpha = sqr(roughness);
         (p.alpha_x, p.alpha_y) = (alpha, alpha);
@@ -63,9 +91,6 @@ impl Material {
             // KHR_materials_anisotropy: along the direction, alpha is drawn towards 1.
             let texel = look_up(&self.anisotropy_texture, surface, textures);
             p.alpha_x = alpha + (1.0 - alpha) * sqr(unit(self.anisotropy * texel.z));
-        }
-        if self.transmission_texture.is_some() {
-            p.transmission *= unit(look_up(&self.transmission_texture, surface, textures).x);
         }
         if self.specular_texture.is_some() {
             p.specular *= unit(look_up(&self.specular_texture, surface, textures).w);
@@ -92,6 +117,9 @@ impl Material {
     /// direction of anisotropy. Where the mesh has no tangents, a normal map has no frame to be read in and is ignored.
     #[inline]
     pub fn shading_frame(&self, surface: &Surface, textures: &[Texture]) -> Frame {
+        if self.normal_texture.is_none() && self.anisotropy == 0.0 {
+            return Frame::from_normal(surface.ns);
+        }
         let tangent = surface.tangent.truncate();
         let mut frame = Frame::from_normal_tangent(surface.ns, tangent);
         let has_tangents = tangent != Vec3::ZERO;
@@ -142,23 +170,4 @@ fn on_side_of(n: Vec3, ng: Vec3) -> Vec3 {
     const LEAST: f32 = 0.05;
     let cos = n.dot(ng);
     if cos >= LEAST { n } else { (n + ng * (LEAST - cos)).normalize() }
-}
-
-impl EnergyTables {
-    /// Tables for all interfaces that surfaces of these materials make with the open space and with each other's solids.
-    pub fn for_materials(materials: &[Material]) -> EnergyTables {
-        let index = |m: &Material| if m.ior.is_finite() { m.ior } else { 1.0 };
-        let mut around: Vec<f32> = materials.iter().filter(|m| m.is_solid_glass()).map(index).chain([1.0]).collect();
-        around.sort_by(f32::total_cmp);
-        around.dedup();
-        let mut etas = vec![];
-        for material in materials {
-            etas.extend(around.iter().map(|n| material.ior / n));
-        }
-        let coverings = Coverings {
-            coat: materials.iter().any(|m| m.clearcoat > 0.0),
-            sheen: materials.iter().any(|m| m.sheen_color.max_element() > 0.0),
-        };
-        EnergyTables::new(etas, coverings)
-    }
 }

@@ -2,8 +2,10 @@
 
 mod evaluate;
 mod library;
+mod scattering;
 
 pub use library::Materials;
+pub use scattering::Scattering;
 
 use crate::math::Rgb;
 use crate::texture::TextureRef;

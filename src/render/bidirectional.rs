@@ -17,9 +17,10 @@ use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Eye, EyeMeasure, Left, LightPass, Meets, MergeLevels, MergePhoton, Splat, Strategies, Surroundings,
+    Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat, Strategies, Surroundings,
     path_measure,
 };
+use bumpalo::Bump;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -172,9 +173,11 @@ impl<'a> Passes<'a> {
         for pair in &self.pairs {
             let pass = self.light_pass(i, pair);
             let walk = |tile| {
-                let mut left = Left::default();
+                let (mut left, mut arena) = (Left::default(), Bump::new());
                 for (_, (x, y)) in tiles.pixels(tile) {
-                    shared.light_path(&pass, y * width + x, true, &mut left, &mut ());
+                    arena.reset();
+                    let mut vertices = LightVertices::new_in(&arena);
+                    shared.light_path(&arena, &pass, y * width + x, true, &mut vertices, &mut left, &mut ());
                 }
                 left.photons
             };
@@ -221,14 +224,16 @@ impl<'a> Passes<'a> {
                 .par_chunks_mut(TILE_PIXELS)
                 .enumerate()
                 .map(|(tile, measures)| {
-                    let mut left = Left::default();
+                    let (mut left, mut arena) = (Left::default(), Bump::new());
                     for (slot, (x, y)) in tiles.pixels(tile) {
                         let index = y * width + x;
-                        shared.light_path(pass, index, false, &mut left, &mut ());
+                        arena.reset();
+                        let mut vertices = LightVertices::new_in(&arena);
+                        shared.light_path(&arena, pass, index, false, &mut vertices, &mut left, &mut ());
                         let levels = levels(bandwidths[index as usize].bandwidth, pair);
-                        let meets = Meets { vertices: &left.vertices, photons: map, levels: &levels };
+                        let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                         let stream = Stream::new(seed, i, pair.eye, u64::from(index));
-                        measures[slot] = shared.eye_path((x, y), stream, &meets, &mut ());
+                        measures[slot] = shared.eye_path(&arena, (x, y), stream, &meets, &mut ());
                     }
                     (left.splats, left.photons)
                 })
@@ -254,9 +259,11 @@ impl<'a> Passes<'a> {
         let (eye, tiles, seed) = (self.eye(), self.tiles, self.settings.seed);
         let domain = self.pairs[0].eye;
         self.measures[0].par_chunks_mut(TILE_PIXELS).enumerate().for_each(|(tile, measures)| {
+            let mut arena = Bump::new();
             for (slot, (x, y)) in tiles.pixels(tile) {
+                arena.reset();
                 let stream = Stream::new(seed, i, domain, u64::from(y * tiles.width + x));
-                measures[slot] = path_measure(&eye, (x, y), stream);
+                measures[slot] = path_measure(&eye, &arena, (x, y), stream);
             }
         });
     }

@@ -14,6 +14,7 @@ use crate::photon::{Photon, PhotonMap};
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Surroundings, light_path};
+use bumpalo::Bump;
 use rayon::prelude::*;
 
 /// Light paths per unit of work. Constant, so that the photons' order does not depend on threads.
@@ -26,10 +27,11 @@ pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPas
     let chunks = pass.paths().div_ceil(CHUNK);
     let parts: Vec<Vec<Photon>> = (0..chunks)
         .into_par_iter()
-        .map(|chunk| {
+        .map_init(Bump::new, |arena, chunk| {
             let mut photons = Vec::with_capacity(CHUNK as usize * 2);
             for index in chunk * CHUNK..((chunk + 1) * CHUNK).min(pass.paths()) {
-                light_path(scene, surroundings, pass, index, &mut photons);
+                light_path(scene, arena, surroundings, pass, index, &mut photons);
+                arena.reset();
             }
             photons
         })
@@ -43,7 +45,7 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
     let rows = width as usize * TILE;
-    pixels.par_chunks_mut(rows).enumerate().for_each(|(band, pixels)| {
+    pixels.par_chunks_mut(rows).enumerate().for_each_init(Bump::new, |arena, (band, pixels)| {
         let band_height = pixels.len() / width as usize;
         for x0 in (0..width as usize).step_by(TILE) {
             for dy in 0..band_height {
@@ -54,9 +56,11 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
                     let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
                     // Radius squared of level k (from 0) of m: each halves that of the next larger.
                     let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
+                    arena.reset();
+                    let arena = &*arena;
                     let trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
                         let stream = Stream::new(settings.seed, i, domain, index);
-                        eye.measure((x as u32, y as u32), stream, photons, radii)
+                        eye.measure(arena, (x as u32, y as u32), stream, photons, radii)
                     };
                     if levels.two_paths {
                         let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));

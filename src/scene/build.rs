@@ -2,11 +2,10 @@
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
 use super::{Scene, Survey};
-use crate::bsdf::EnergyTables;
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
-use crate::material::{Alpha, Material, Materials};
+use crate::material::{Alpha, Material, Materials, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::trace::{AlphaTest, Tracer};
 use std::sync::Arc;
@@ -80,7 +79,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
     }
-    let tables = EnergyTables::for_materials(&materials.list);
+    let scattering = Scattering::new(&materials.list);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     Ok(Scene {
         source: description.source,
@@ -92,7 +91,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         lights,
         cameras: description.cameras,
         medium: description.medium,
-        tables,
+        scattering,
         survey,
         warnings,
     })
@@ -117,15 +116,15 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
     for placed in &description.instances {
         uses[placed.mesh as usize] += 1;
     }
-    let mut shapes = Shapes { meshes: std::mem::take(&mut description.meshes), instances: Vec::new() };
+    let (mut meshes, mut instances) = (std::mem::take(&mut description.meshes), Vec::new());
     for placed in &description.instances {
         let mut to_world = placed.to_world;
         to_world.translation -= origin;
         let shared = uses[placed.mesh as usize] > 1;
         if !shared {
-            bake(&mut shapes.meshes[placed.mesh as usize], &to_world);
+            bake(&mut meshes[placed.mesh as usize], &to_world);
         }
-        shapes.instances.push(Instance {
+        instances.push(Instance {
             name: placed.name.clone(),
             mesh: placed.mesh,
             material: placed.material,
@@ -133,7 +132,7 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
             to_world: shared.then(|| Placement::new(glam::Affine3A::from_mat4(glam::DMat4::from(to_world).as_mat4()))),
         });
     }
-    shapes
+    Shapes::new(meshes, instances)
 }
 
 /// Moves a mesh to world space. A mirroring transform turns the winding, so that the front stays the front.

@@ -11,11 +11,10 @@ pub use description::Description;
 pub use survey::Survey;
 pub use view::{MAX_SIZE, View};
 
-use crate::bsdf::EnergyTables;
 use crate::error::Result;
 use crate::geometry::Shapes;
 use crate::light::Lights;
-use crate::material::{Materials, MediumParameters};
+use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::DVec3;
 use crate::trace::Tracer;
 use description::CameraDescription;
@@ -42,8 +41,8 @@ pub struct Scene {
     pub cameras: Vec<CameraDescription>,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
-    /// Energy compensation tables of the materials.
-    pub tables: EnergyTables,
+    /// How the materials scatter.
+    pub scattering: Scattering,
     /// What is present.
     pub survey: Survey,
     /// Whatever was ignored or approximated, from the reader and from building.

@@ -13,6 +13,7 @@ use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::PhotonMap;
 use crate::random::{Purpose, Stream, mix};
 use crate::scene::Scene;
+use bumpalo::Bump;
 
 /// What an eye path meets.
 pub struct Meets<'a> {
@@ -37,7 +38,7 @@ struct EyeWalk<'a, R> {
 
 /// The first hit and the features of a path that arrives at `vertex`.
 #[inline]
-pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_>, scattered: Option<Scattered>, measure: &mut EyeMeasure) {
+pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_, '_>, scattered: Option<Scattered>, measure: &mut EyeMeasure) {
     match scattered {
         None => measure.first = Some(FirstHit { p: vertex.surface.p, instance: vertex.surface.instance }),
         Some(scattered) => trail.scattered(scattered.lobe),
@@ -47,7 +48,7 @@ pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_>, scattered: Option<Sca
     if trail.is_clear() && shading.bsdf.lobes().has(LobeSet::SMOOTH) {
         let n = shading.frame.n;
         measure.features = Features {
-            albedo: shading.albedo(vertex.wo, LobeSet::ALL),
+            albedo: shading.albedo(LobeSet::ALL),
             normal: if n.dot(vertex.wo) < 0.0 { -n } else { n },
             depth: trail.length,
         };
@@ -56,7 +57,7 @@ pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_>, scattered: Option<Sca
 
 /// Light left on the way from `vertex` along `wi` to `target` (`None`: out of the scene).
 #[inline]
-pub(super) fn visible(scene: &Scene, vertex: &Vertex<'_>, wi: Vec3, target: Option<Vec3>, token: u32) -> Rgb {
+pub(super) fn visible(scene: &Scene, vertex: &Vertex<'_, '_>, wi: Vec3, target: Option<Vec3>, token: u32) -> Rgb {
     let origin = vertex.surface.spawn(wi);
     let (direction, tmax) = match target {
         None => (wi, f32::INFINITY),
@@ -92,19 +93,19 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn next_event(&mut self, vertex: &Vertex<'_>) {
+    fn next_event(&mut self, vertex: &Vertex<'_, '_>) {
         let scene = self.shared.eye.scene;
-        let Vertex { surface, shading, wo, draws, .. } = vertex;
+        let Vertex { surface, shading, draws, .. } = vertex;
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
             return;
         };
-        let (f, pdf) = shading.evaluate_cos(*wo, light.wi, Transport::Radiance, LobeSet::ALL);
+        let (f, pdf) = shading.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         let value = vertex.throughput * f * light.radiance / light.pdf_w;
         if !is_lit(value) {
             return;
         }
-        let reverse = shading.pdf(light.wi, *wo, Transport::Importance, LobeSet::ALL);
+        let reverse = shading.reverse_pdf(light.wi, Transport::Importance, LobeSet::ALL);
         let arrival_pdf_a = light.arrival_pdf_a * light.wi.dot(surface.ng).abs();
         let ratios = mis::next_event(&self.mis, (pdf, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
         let at = light.target.unwrap_or(light.wi);
@@ -115,16 +116,16 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn connect(&mut self, vertex: &Vertex<'_>, light: &LightVertex<'_>) {
+    fn connect(&mut self, vertex: &Vertex<'_, '_>, light: &LightVertex<'_>) {
         let Bidirectional { eye, strategies, .. } = self.shared;
         let to = light.surface.p - vertex.surface.p;
         let distance2 = to.length_squared();
         let d = to / distance2.sqrt();
-        let (f_eye, pdf_eye) = vertex.shading.evaluate_cos(vertex.wo, d, Transport::Radiance, LobeSet::ALL);
+        let (f_eye, pdf_eye) = vertex.shading.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
         if !is_lit(f_eye) {
             return;
         }
-        let (f_light, pdf_light) = light.shading.evaluate_cos(light.wo, -d, Transport::Importance, LobeSet::ALL);
+        let (f_light, pdf_light) = light.shading.evaluate_cos(-d, Transport::Importance, LobeSet::ALL);
         let value = vertex.throughput * f_eye * f_light * light.throughput / distance2;
         if !is_lit(value) {
             return;
@@ -133,13 +134,13 @@ impl<R: Record> EyeWalk<'_, R> {
         let ratios = mis::connect(
             &End {
                 mis: &light.mis,
-                reverse_pdf_w: light.shading.pdf(-d, light.wo, Transport::Radiance, LobeSet::ALL),
+                reverse_pdf_w: light.shading.reverse_pdf(-d, Transport::Radiance, LobeSet::ALL),
                 arrival_pdf_a: pdf_eye * cos_light / distance2,
                 merges: strategies.light_merges(light.depth),
             },
             &End {
                 mis: &self.mis,
-                reverse_pdf_w: vertex.shading.pdf(d, vertex.wo, Transport::Importance, LobeSet::ALL),
+                reverse_pdf_w: vertex.shading.reverse_pdf(d, Transport::Importance, LobeSet::ALL),
                 arrival_pdf_a: pdf_light * cos_eye / distance2,
                 merges: strategies.eye_merges(vertex.depth),
             },
@@ -153,9 +154,9 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 }
 
-impl<R: Record> Visitor for EyeWalk<'_, R> {
+impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
     #[inline]
-    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, .. } = self.shared;
         look(&mut self.trail, vertex, scattered, &mut self.measure);
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
@@ -195,7 +196,7 @@ impl<R: Record> Visitor for EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn scatter(&mut self, vertex: &Vertex<'_>, sample: &BsdfSample) {
+    fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let merges = self.shared.strategies.eye_merges(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Importance, merges);
     }
@@ -219,6 +220,7 @@ impl Bidirectional<'_> {
     #[inline]
     pub fn eye_path<R: Record>(
         &self,
+        arena: &Bump,
         pixel: (u32, u32),
         stream: Stream,
         meets: &Meets<'_>,
@@ -236,7 +238,7 @@ impl Bidirectional<'_> {
             measure: EyeMeasure::default(),
             record,
         };
-        walk(eye.scene, start, stream, Transport::Radiance, eye.max_depth, &mut visitor);
+        walk(eye.scene, arena, start, stream, Transport::Radiance, eye.max_depth, &mut visitor);
         visitor.measure
     }
 }

@@ -7,9 +7,10 @@ use super::light::LightPass;
 use super::mis::{self, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
-use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Shading, Transport};
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
+use bumpalo::Bump;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
 #[derive(Clone, Copy, Debug)]
@@ -47,11 +48,12 @@ pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, part: Part, va
     }
 }
 
-/// What light paths leave behind. `vertices` are those of the last path alone.
+/// Vertices of one light path, for the eye path it belongs to.
+pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
+
+/// What light paths leave for others than their own eye path.
 #[derive(Default)]
-pub struct Left<'s> {
-    /// For the eye path it belongs to.
-    pub vertices: Vec<LightVertex<'s>>,
+pub struct Left {
     /// For the film, of all paths so far.
     pub splats: Vec<Splat>,
     /// For the next pass, of all paths so far.
@@ -59,21 +61,22 @@ pub struct Left<'s> {
 }
 
 struct LightWalk<'a, 's, R> {
-    shared: &'a Bidirectional<'s>,
+    shared: &'a Bidirectional<'a>,
     mis: MisState,
     infinite: bool,
     caustic: bool,
     photons_only: bool,
-    left: &'a mut Left<'s>,
+    vertices: &'a mut LightVertices<'s>,
+    left: &'a mut Left,
     record: &'a mut R,
 }
 
 impl<R: Record> LightWalk<'_, '_, R> {
-    fn connect_camera(&mut self, vertex: &Vertex<'_>) {
+    fn connect_camera(&mut self, vertex: &Vertex<'_, '_>) {
         let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
-        let Vertex { surface, shading, wo, draws, .. } = vertex;
+        let Vertex { surface, shading, draws, .. } = vertex;
         let Some(sample) = eye.camera.sample(surface.p, draws.two(Purpose::Lens)) else { return };
-        let f = shading.eval_cos(*wo, sample.wi, Transport::Importance, LobeSet::ALL);
+        let f = shading.eval_cos(sample.wi, Transport::Importance, LobeSet::ALL);
         // Density of the rays of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();
         let value = vertex.throughput * f * (pdf_a / light_paths);
@@ -82,7 +85,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
             return;
         }
         let ratios = if strategies.connect {
-            let reverse = shading.pdf(sample.wi, *wo, Transport::Radiance, LobeSet::ALL);
+            let reverse = shading.reverse_pdf(sample.wi, Transport::Radiance, LobeSet::ALL);
             mis::camera(&self.mis, pdf_a * sample.wi.dot(surface.ng).abs(), *light_paths, reverse)
         } else {
             Ratios::ALONE
@@ -103,9 +106,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
     }
 }
 
-impl<R: Record> Visitor for LightWalk<'_, '_, R> {
+impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
-    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+    fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, merged_paths, .. } = self.shared;
         if let Some(scattered) = scattered {
             self.caustic &= scattered.lobe != LobeSet::BROAD;
@@ -121,9 +124,9 @@ impl<R: Record> Visitor for LightWalk<'_, '_, R> {
         }
         if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
-                self.left.vertices.push(LightVertex {
+                self.vertices.push(LightVertex {
                     surface: *vertex.surface,
-                    shading: Shading { bsdf: Bsdf::new(vertex.parameters, &eye.scene.tables), ..*vertex.shading },
+                    shading: *vertex.shading,
                     wo: vertex.wo,
                     throughput: vertex.throughput,
                     depth: vertex.depth,
@@ -140,7 +143,7 @@ impl<R: Record> Visitor for LightWalk<'_, '_, R> {
     }
 
     #[inline]
-    fn scatter(&mut self, vertex: &Vertex<'_>, sample: &BsdfSample) {
+    fn scatter(&mut self, vertex: &Vertex<'_, 's>, sample: &BsdfSample) {
         let merges = self.shared.strategies.light_merges(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, merges);
     }
@@ -150,7 +153,7 @@ impl<R: Record> Visitor for LightWalk<'_, '_, R> {
 #[inline]
 pub(super) fn scatter(
     mis: MisState,
-    vertex: &Vertex<'_>,
+    vertex: &Vertex<'_, '_>,
     sample: &BsdfSample,
     back: Transport,
     merges: bool,
@@ -159,21 +162,22 @@ pub(super) fn scatter(
     if sample.lobe == LobeSet::DELTA {
         return mis.scatter_delta(cos);
     }
-    mis.scatter(cos, sample.pdf_w, vertex.shading.pdf(sample.wi, vertex.wo, back, LobeSet::ALL), merges)
+    mis.scatter(cos, sample.pdf_w, vertex.shading.reverse_pdf(sample.wi, back, LobeSet::ALL), merges)
 }
 
 impl<'s> Bidirectional<'s> {
-    /// Walks light path `index` of `pass`; with `photons_only` it leaves nothing else.
+    /// Walks light path `index` of `pass`, which adds its vertices; with `photons_only` it leaves only those.
     #[inline]
     pub fn light_path<R: Record>(
         &self,
+        arena: &'s Bump,
         pass: &LightPass,
         index: u32,
         photons_only: bool,
-        left: &mut Left<'s>,
+        vertices: &mut LightVertices<'s>,
+        left: &mut Left,
         record: &mut R,
     ) {
-        left.vertices.clear();
         let eye = &self.eye;
         let Some(emitted) = pass.emit(eye.scene, self.surroundings, index) else { return };
         let mut start = emitted.start;
@@ -184,9 +188,10 @@ impl<'s> Bidirectional<'s> {
             infinite: emitted.density.infinite,
             caustic: true,
             photons_only,
+            vertices,
             left,
             record,
         };
-        walk(eye.scene, start, emitted.stream, Transport::Importance, eye.max_depth, &mut visitor);
+        walk(eye.scene, arena, start, emitted.stream, Transport::Importance, eye.max_depth, &mut visitor);
     }
 }

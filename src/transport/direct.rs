@@ -32,7 +32,7 @@ pub fn balance(pdf: f32, other: f32) -> f32 {
 /// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival` is the
 /// probability of going on with `onward`.
 #[inline]
-pub fn direct_light(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+pub fn direct_light(scene: &Scene, vertex: &Vertex<'_, '_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
     if scene.lights.is_empty() {
         return Rgb::ZERO;
     }
@@ -44,7 +44,7 @@ pub fn direct_light(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward:
 }
 
 #[inline]
-fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+fn next_event(scene: &Scene, vertex: &Vertex<'_, '_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
     let Vertex { surface, shading, wo, draws, .. } = vertex;
     let choice = draws.one(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
@@ -57,7 +57,7 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeS
         if !set.has(LobeSet::SMOOTH) {
             continue;
         }
-        let (f, pdf) = shading.evaluate_cos(*wo, sample.wi, Transport::Radiance, set);
+        let (f, pdf) = shading.evaluate_cos(sample.wi, Transport::Radiance, set);
         scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
     let arriving = scattered * sample.radiance / sample.pdf_w;
@@ -81,10 +81,10 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_>, gather: LobeSet, onward: LobeS
 }
 
 #[inline]
-fn second_strategy(scene: &Scene, vertex: &Vertex<'_>, set: LobeSet) -> Rgb {
-    let Vertex { surface, shading, wo, draws, .. } = vertex;
+fn second_strategy(scene: &Scene, vertex: &Vertex<'_, '_>, set: LobeSet) -> Rgb {
+    let Vertex { surface, shading, draws, .. } = vertex;
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
-    let Some(sample) = shading.sample(*wo, Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
+    let Some(sample) = shading.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
     let interior = if sample.transmitted { vertex.interior_behind } else { vertex.interior };
     let origin = surface.spawn(sample.wi);
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;

@@ -14,6 +14,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::photon::{Photon, PhotonFlags, PhotonMap};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
+use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
 /// Most bandwidth levels of one eye path.
@@ -148,15 +149,15 @@ impl Gather<'_> {
     /// Photons around the vertex: kernel density estimation with the box kernel, all levels from one query [post-reconstruction
     /// 2021, (2) and (3)].
     #[inline]
-    fn gather(&mut self, vertex: &Vertex<'_>, broad: LobeSet, sharp: LobeSet) {
+    fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
         let radii = &self.radii.radius2[..self.radii.count];
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
         let ng = vertex.surface.ng;
         // Bin by the smallest level that holds the photon; a level is the sum of the bins up to its own.
         let mut bins = [[Rgb::ZERO; MAX_LEVELS]; 2];
-        let by_broad = vertex.shading.gathering(vertex.wo, broad);
-        let by_both = vertex.shading.gathering(vertex.wo, broad | sharp);
+        let by_broad = vertex.shading.gathering(broad);
+        let by_both = vertex.shading.gathering(broad | sharp);
         self.photons.within(vertex.surface.p, largest, |photon, distance2| {
             let unreachable = photon.flags.has(PhotonFlags::UNREACHABLE);
             if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
@@ -181,9 +182,9 @@ impl Gather<'_> {
     }
 }
 
-impl Visitor for Gather<'_> {
+impl<'a> Visitor<'a> for Gather<'_> {
     #[inline]
-    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let (surface, shading) = (vertex.surface, vertex.shading);
         if scattered.is_none() {
             self.measure.first = Some(FirstHit { p: surface.p, instance: surface.instance });
@@ -199,7 +200,7 @@ impl Visitor for Gather<'_> {
         // Lamps and other surfaces that scatter nothing have features, too.
         if self.stage == Stage::Clear && lobes != LobeSet::DELTA {
             self.measure.features = Features {
-                albedo: shading.albedo(vertex.wo, LobeSet::ALL),
+                albedo: shading.albedo(LobeSet::ALL),
                 normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },
                 depth: self.length,
             };
@@ -255,7 +256,14 @@ impl Eye<'_> {
 
     /// Traces one eye path and measures all levels of `radii`.
     #[inline]
-    pub fn measure(&self, pixel: (u32, u32), stream: Stream, photons: &PhotonMap, radii: &LevelRadii) -> EyeMeasure {
+    pub fn measure(
+        &self,
+        arena: &Bump,
+        pixel: (u32, u32),
+        stream: Stream,
+        photons: &PhotonMap,
+        radii: &LevelRadii,
+    ) -> EyeMeasure {
         let mut gather = Gather {
             scene: self.scene,
             photons,
@@ -266,14 +274,16 @@ impl Eye<'_> {
             stage: Stage::Clear,
             last: Vec3::ZERO,
         };
-        walk(self.scene, self.start(pixel, stream), stream, Transport::Radiance, self.max_depth, &mut gather);
+        let start = self.start(pixel, stream);
+        walk(self.scene, arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
         gather.measure
     }
 
     /// The first vertex of an eye path whose lobes gather photons.
-    pub fn gather_point(&self, pixel: (u32, u32), stream: Stream) -> Option<GatherPoint> {
+    pub fn gather_point(&self, arena: &Bump, pixel: (u32, u32), stream: Stream) -> Option<GatherPoint> {
         let mut find = FindGatherPoint { found: None, length: 0.0 };
-        walk(self.scene, self.start(pixel, stream), stream, Transport::Radiance, self.max_depth, &mut find);
+        let start = self.start(pixel, stream);
+        walk(self.scene, arena, start, stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
 }
@@ -294,8 +304,8 @@ struct FindGatherPoint {
     length: f32,
 }
 
-impl Visitor for FindGatherPoint {
-    fn surface(&mut self, vertex: &Vertex<'_>, _: Option<Scattered>) -> Next {
+impl<'a> Visitor<'a> for FindGatherPoint {
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         self.length += vertex.distance;
         let lobes = vertex.shading.bsdf.lobes();
         if lobes.has(LobeSet::BROAD) {

@@ -8,6 +8,7 @@ use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags};
 use crate::random::{Domain, SobolPair, Stream, mix};
 use crate::scene::Scene;
+use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
 #[derive(Clone, Copy, Debug)]
@@ -88,9 +89,9 @@ struct Deposit<'a> {
     unreachable: bool,
 }
 
-impl Visitor for Deposit<'_> {
+impl<'a> Visitor<'a> for Deposit<'_> {
     #[inline]
-    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         if let Some(scattered) = scattered {
             self.caustic &= !scattered.lobe.has(LobeSet::BROAD);
             self.unreachable &= scattered.lobe == LobeSet::DELTA;
@@ -116,8 +117,15 @@ impl Visitor for Deposit<'_> {
 
 /// Traces light path `index` of the pass and appends its photons.
 #[inline]
-pub fn light_path(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, index: u32, photons: &mut Vec<Photon>) {
+pub fn light_path(
+    scene: &Scene,
+    arena: &Bump,
+    surroundings: &Surroundings,
+    pass: &LightPass,
+    index: u32,
+    photons: &mut Vec<Photon>,
+) {
     let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
     let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
-    walk(scene, emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
+    walk(scene, arena, emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
 }

@@ -15,7 +15,7 @@ mod walk;
 
 pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Strategies, Technique};
 pub use bidirectional_eye::Meets;
-pub use bidirectional_light::{Left, Splat};
+pub use bidirectional_light::{Left, LightVertices, Splat};
 pub use direct::{balance, direct_light};
 pub use eye::{Eye, EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS, same_surface};
 pub use interior::{Crossing, Interior, Surroundings};

@@ -12,6 +12,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
+use bumpalo::Bump;
 
 struct PathTracer<'a> {
     scene: &'a Scene,
@@ -30,15 +31,14 @@ impl PathTracer<'_> {
         }
     }
 
-    fn next_event(&self, vertex: &Vertex<'_>) -> Rgb {
+    fn next_event(&self, vertex: &Vertex<'_, '_>) -> Rgb {
         let (scene, surface, draws) = (self.scene, vertex.surface, vertex.draws);
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
             return Rgb::ZERO;
         };
-        let f = vertex.shading.eval_cos(vertex.wo, light.wi, Transport::Radiance, LobeSet::SMOOTH);
-        let pdf =
-            vertex.shading.pdf(vertex.wo, light.wi, Transport::Radiance, LobeSet::ALL) * vertex.survival(LobeSet::ALL);
+        let (f, pdf) = vertex.shading.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
+        let pdf = pdf * vertex.survival(LobeSet::ALL);
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let arriving = f * light.radiance * (weight / light.pdf_w);
         if arriving.max_element() <= 0.0 {
@@ -67,8 +67,8 @@ impl PathTracer<'_> {
     }
 }
 
-impl Visitor for PathTracer<'_> {
-    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next {
+impl<'a> Visitor<'a> for PathTracer<'_> {
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         look(&mut self.trail, vertex, scattered, &mut self.measure);
         let from = if scattered.is_none() { vertex.from } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, from, vertex.surface) {
@@ -94,15 +94,15 @@ impl Visitor for PathTracer<'_> {
 }
 
 /// What one path through a uniform point of pixel `(x, y)` measures, on one level.
-pub fn path_measure(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> EyeMeasure {
+pub fn path_measure(eye: &Eye<'_>, arena: &Bump, pixel: (u32, u32), stream: Stream) -> EyeMeasure {
     let start = eye.start(pixel, stream);
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
     let mut tracer = PathTracer { scene: eye.scene, max_depth: eye.max_depth, measure, trail, last: start.origin };
-    walk(eye.scene, start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
+    walk(eye.scene, arena, start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    path_measure(eye, pixel, stream).radiance(0)
+    path_measure(eye, &Bump::new(), pixel, stream).radiance(0)
 }

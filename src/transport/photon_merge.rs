@@ -47,7 +47,7 @@ impl Located for MergePhoton {
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
-    pub fn new(vertex: &Vertex<'_>, flux: Rgb, caustic: bool, mis: &MisState) -> MergePhoton {
+    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, caustic: bool, mis: &MisState) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
@@ -73,7 +73,7 @@ impl MergePhoton {
 pub(super) fn merge_photons<R: Record>(
     photons: &PhotonMap<MergePhoton>,
     levels: &MergeLevels,
-    vertex: &Vertex<'_>,
+    vertex: &Vertex<'_, '_>,
     mis: &MisState,
     longest: u32,
     record: &mut R,
@@ -81,18 +81,18 @@ pub(super) fn merge_photons<R: Record>(
 ) {
     let radii = levels.radius2();
     let Some(&largest) = radii.last() else { return };
-    let (ng, wo, shading) = (vertex.surface.ng, vertex.wo, vertex.shading);
+    let (ng, shading) = (vertex.surface.ng, vertex.shading);
     photons.within(vertex.surface.p, largest, |photon, distance2| {
         if photon.ng.dot(ng) <= NORMAL_COSINE || u32::from(photon.depth) > longest {
             return;
         }
-        let (f, pdf) = shading.evaluate_cos(wo, photon.wi, Transport::Radiance, LobeSet::ALL);
+        let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);
         // Photons measure irradiance on the geometric surface: the cosine in f belongs to a direction, not to them.
         let value = vertex.throughput * f * photon.flux / photon.wi.dot(ng).abs();
         if !is_lit(value) {
             return;
         }
-        let reverse = shading.pdf(photon.wi, wo, Transport::Importance, LobeSet::ALL);
+        let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
         let ratios = mis::merge(&photon.mis(), mis, pdf, reverse);
         let technique = Technique::Merge { light: u32::from(photon.depth), eye: vertex.depth };
         record.contribution(technique, value, photon.p, ratios);

@@ -1,7 +1,6 @@
 //! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
 
 use super::interior::{Crossing, Interior, ior};
-use crate::bsdf::Parameters;
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::scene::Scene;
@@ -14,8 +13,8 @@ const MAX_NULL_CROSSINGS: u32 = 256;
 pub struct Arrival {
     /// The surface.
     pub surface: Surface,
-    /// Its material's parameters there.
-    pub parameters: Parameters,
+    /// Index of refraction behind it (its back) over the one before it.
+    pub eta: f32,
     /// For the surface of a solid: what is on its sides.
     pub crossing: Option<Crossing>,
     /// The solids the ray was in when it arrived.
@@ -52,22 +51,20 @@ fn absorb(scene: &Scene, interior: &Interior, distance: f32) -> Rgb {
 }
 
 /// What a surface hit by a ray is.
-#[allow(clippy::large_enum_variant)]
 enum Boundary {
     /// Nothing: go on behind it with this tint and interior.
     None(Rgb, Interior),
-    /// A scattering surface.
-    Scattering(Parameters, Option<Crossing>),
+    /// A scattering surface: index of refraction behind it over before it, and what is on its sides if it bounds a solid.
+    Scattering(f32, Option<Crossing>),
 }
 
 #[inline]
 fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3) -> Boundary {
     let material = &scene.materials.list[surface.material as usize];
-    let textures = &scene.materials.textures;
     if !material.is_solid_glass() {
         // What covers an opaque body meets the medium around it, air or water.
         let around = if scene.survey.solids { interior.ior(scene) } else { 1.0 };
-        return Boundary::Scattering(material.parameters(surface, textures, material.ior / around), None);
+        return Boundary::Scattering(material.ior / around, None);
     }
     let entering = direction.dot(surface.ng) < 0.0;
     let object = scene.shapes.instances[surface.instance as usize].object;
@@ -78,11 +75,13 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     }
     let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
     let eta = if entering { after / before } else { before / after };
-    let parameters = material.parameters(surface, textures, eta);
-    if eta == 1.0 && parameters.is_pure_transmission() && !material.emits() {
-        return Boundary::None(parameters.base_color, crossing.interior);
+    if eta == 1.0 && !material.emits() {
+        let parameters = material.parameters(surface, &scene.materials.textures, eta);
+        if parameters.is_pure_transmission() {
+            return Boundary::None(parameters.base_color, crossing.interior);
+        }
     }
-    Boundary::Scattering(parameters, Some(crossing))
+    Boundary::Scattering(eta, Some(crossing))
 }
 
 /// Follows a ray from inside `interior` to the next surface that scatters.
@@ -107,9 +106,8 @@ pub fn next_surface(scene: &Scene, origin: Vec3, direction: Vec3, interior: Inte
             transmittance *= absorb(scene, &interior, hit.t);
         }
         match boundary(scene, &surface, &interior, direction) {
-            Boundary::Scattering(parameters, crossing) => {
-                let arrival = Arrival { surface, parameters, crossing, interior, transmittance, distance };
-                return End::Surface(arrival);
+            Boundary::Scattering(eta, crossing) => {
+                return End::Surface(Arrival { surface, eta, crossing, interior, transmittance, distance });
             }
             Boundary::None(tint, behind) => {
                 transmittance *= tint;

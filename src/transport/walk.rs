@@ -3,11 +3,12 @@
 
 use super::interior::Interior;
 use super::segment::{Arrival, End, next_surface};
-use crate::bsdf::{Bsdf, BsdfSample, LobeSet, Parameters, Shading, Transport};
+use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
+use bumpalo::Bump;
 
 /// After this many bounces even a path that loses nothing may end: it goes on with probability [`LATE_SURVIVAL`] at most, so that light
 /// trapped between perfect mirrors ends without a limit on depth.
@@ -30,14 +31,12 @@ pub struct PathStart {
     pub interior: Interior,
 }
 
-/// A vertex of a path on a surface.
-pub struct Vertex<'a> {
+/// A vertex of a path on a surface. What it refers to by `'a` outlives the walk.
+pub struct Vertex<'v, 'a> {
     /// The surface.
-    pub surface: &'a Surface,
-    /// How it scatters.
-    pub shading: &'a Shading<'a>,
-    /// What it scatters by, from which its BSDF can be made again to outlive the walk.
-    pub parameters: &'a Parameters,
+    pub surface: &'v Surface,
+    /// How it scatters, seen along `wo`.
+    pub shading: &'v Shading<'a>,
     /// Unit direction back along the path.
     pub wo: Vec3,
     /// Weight of the path up to here, before this vertex scatters.
@@ -76,12 +75,12 @@ pub enum Next {
 }
 
 /// Receives the vertices of a walk.
-pub trait Visitor {
+pub trait Visitor<'a> {
     /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
-    fn surface(&mut self, vertex: &Vertex<'_>, scattered: Option<Scattered>) -> Next;
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
     /// `sample` is drawn at `vertex`, and the path goes on.
     #[inline]
-    fn scatter(&mut self, vertex: &Vertex<'_>, sample: &BsdfSample) {
+    fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let _ = (vertex, sample);
     }
     /// The path leaves the scene along `direction` with weight `throughput`; `from` is its last vertex.
@@ -90,12 +89,12 @@ pub trait Visitor {
     }
 }
 
-impl Vertex<'_> {
+impl Vertex<'_, '_> {
     /// Probability that the walk goes on from here if the visitor asks for the lobes of `set`. Known before a direction
     /// is drawn, so that MIS weights can use it.
     #[inline]
     pub fn survival(&self, set: LobeSet) -> f32 {
-        let albedo = self.shading.albedo(self.wo, set);
+        let albedo = self.shading.albedo(set);
         let expected = (self.throughput * albedo).max_element() * self.survival_scale;
         // Written so that NaN ends the path.
         let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
@@ -103,10 +102,12 @@ impl Vertex<'_> {
     }
 }
 
-/// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments.
+/// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond the scene is
+/// made in `arena`, which may be reset when none of them is left.
 #[inline]
-pub fn walk<V: Visitor>(
-    scene: &Scene,
+pub fn walk<'a, V: Visitor<'a>>(
+    scene: &'a Scene,
+    arena: &'a Bump,
     start: PathStart,
     stream: Stream,
     transport: Transport,
@@ -129,17 +130,17 @@ pub fn walk<V: Visitor>(
             }
             End::Lost => return,
         };
-        let Arrival { surface, parameters, crossing, interior: here, transmittance, distance } = arrival;
+        let Arrival { ref surface, eta, ref crossing, interior: here, transmittance, distance } = arrival;
         throughput *= transmittance;
         let material = &scene.materials.list[surface.material as usize];
-        let frame = material.shading_frame(&surface, &scene.materials.textures);
-        let shading = Shading { frame, ng: surface.ng, bsdf: Bsdf::new(&parameters, &scene.tables) };
-        let behind = crossing.map_or(here, |c| c.interior);
+        let frame = material.shading_frame(surface, &scene.materials.textures);
+        let bsdf = scene.scattering.bsdf(&scene.materials, surface, eta, arena);
+        let shading = Shading::new(frame, surface.ng, bsdf, -direction);
+        let behind = crossing.as_ref().map_or(here, |c| c.interior);
         let draws = stream.vertex(depth);
         let vertex = Vertex {
-            surface: &surface,
+            surface,
             shading: &shading,
-            parameters: &parameters,
             wo: -direction,
             throughput,
             depth,
@@ -162,7 +163,7 @@ pub fn walk<V: Visitor>(
             return;
         }
         let sample =
-            shading.sample(-direction, transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
+            shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
         let Some(sample) = sample else { return };
         visitor.scatter(&vertex, &sample);
         throughput *= sample.weight / survival;

@@ -1,6 +1,13 @@
 //! What integration tests share.
 #![allow(dead_code)]
 
+use caustique::bsdf::{Bsdf, EnergyTables, Interface, Parameters};
+
+/// The BSDF of `p`; its interface lives as long as the program.
+pub fn bsdf(p: &Parameters, tables: &EnergyTables) -> Bsdf<'static> {
+    Bsdf::new(p, Box::leak(Box::new(Interface::new(p, tables))))
+}
+
 pub mod glb;
 pub mod scenes;
 pub mod stats;
