@@ -1,6 +1,7 @@
 //! Reflectance of smooth interfaces, and the directions light takes there.
 
 use crate::math::{Rgb, Vec3, sqr};
+use wide::f32x8;
 
 /// Ratios of refractive indices this near to 1 are taken for 1: the interface does nothing. Below it the half vector of
 /// refraction, a difference of nearly equal vectors, drowns in rounding.
@@ -96,6 +97,28 @@ impl Smooth {
         let (a, b) = ((near - cos_t) * (cos_o + far), (near + cos_t) * (cos_o - far));
         let f = 0.5 * (sqr(a) + sqr(b)) / sqr((near + cos_t) * (cos_o + far));
         Some((((f - self.normal) * self.inverse_rest).clamp(0.0, 1.0), cos_t))
+    }
+}
+
+impl Smooth {
+    /// [`Smooth::grazing_weight`] for eight angles at an interface to a denser medium, or to one that does not differ.
+    #[inline]
+    pub fn grazing_weight_from_thin(&self, cos_o: f32x8) -> f32x8 {
+        if is_matched(self.eta) {
+            return f32x8::ZERO;
+        }
+        let square = |x: f32x8| x * x;
+        let sin2_t = (f32x8::ONE - square(cos_o)).fast_max(f32x8::ZERO) * self.inverse_eta2;
+        let cos_t = (f32x8::ONE - sin2_t).sqrt();
+        let (near, far) = (cos_o * self.eta, cos_t * self.eta);
+        let (a, b) = ((near - cos_t) * (cos_o + far), (near + cos_t) * (cos_o - far));
+        let f = (square(a) + square(b)) * 0.5 / square((near + cos_t) * (cos_o + far));
+        ((f - self.normal) * self.inverse_rest).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
+    }
+
+    /// Whether [`Smooth::grazing_weight_from_thin`] will do.
+    pub fn is_from_thin(&self) -> bool {
+        self.eta >= 1.0 - MATCHED && self.eta <= MIRROR_ETA
     }
 }
 

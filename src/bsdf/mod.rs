@@ -3,6 +3,7 @@
 mod cover;
 mod energy;
 mod fresnel;
+mod gathering;
 mod interface;
 mod layered;
 mod microfacet;
@@ -16,7 +17,8 @@ pub use energy::{Coverings, EnergyTables};
 pub use interface::Interface;
 pub use layered::Layered;
 pub use parameters::Parameters;
-pub use shading::{Gathering, Shading};
+pub use gathering::Gathering;
+pub use shading::Shading;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use layered::Seen;
@@ -195,6 +197,15 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(layered) => {
                 layered.diffuse_only(seen, set).map(|factor| (factor, Some(&layered.interface.through)))
             }
+        }
+    }
+
+    /// The layered model, where facets that only reflect are in `set`, and nothing lies on them.
+    #[inline]
+    fn reflecting_facets_only(&self, seen: &Seen, set: LobeSet) -> Option<&Layered<'a>> {
+        match self {
+            Bsdf::Layered(layered) if layered.has_plain_facets(seen, set) => Some(layered),
+            _ => None,
         }
     }
 

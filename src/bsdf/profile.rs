@@ -77,6 +77,9 @@ pub struct Position {
 }
 
 impl Position {
+    /// Position of cosine 1.
+    pub const SCALE: f32 = (NODES - 1) as f32;
+
     /// Of a cosine or an alpha.
     #[inline]
     pub fn new(x: f32) -> Position {
@@ -145,6 +148,12 @@ impl Profile {
             *node = node.max(0.0);
         }
         Profile { nodes, average: dot(&nodes, &AVERAGE), mass: dot(&nodes, &MASS) }
+    }
+
+    /// Values at the nodes.
+    #[inline]
+    pub(super) fn nodes(&self) -> &[f32; NODES] {
+        &self.nodes
     }
 
     /// The value at a cosine.

@@ -48,6 +48,14 @@ impl Layered<'_> {
         Some(self.diffuse * seen.through)
     }
 
+    /// Facets that only reflect are in `set`, and nothing lies on them.
+    #[inline]
+    pub(super) fn has_plain_facets(&self, seen: &Seen, set: LobeSet) -> bool {
+        let n = self.interface;
+        let facets = self.has_facets && n.class != LobeSet::DELTA && set.has(n.class);
+        facets && self.glass == 0.0 && n.cover.is_none() && n.smooth[0].is_from_thin() && seen.o.z >= LEAST_COSINE
+    }
+
     /// The first part of [`Layered::evaluate`]: no densities, so no shares.
     #[inline]
     pub(super) fn eval(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {

@@ -4,8 +4,7 @@
 //! reflected or transmitted is then never in doubt, nothing leaks, and every algorithm sees the same function. Light carried the other
 //! way takes the adjoint of Veach \[1997, 5.3\].
 
-use super::layered::{LEAST_COSINE, Seen};
-use super::profile::{Position, Profile};
+use super::layered::Seen;
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 
@@ -18,9 +17,9 @@ pub struct Shading<'a> {
     pub ng: Vec3,
     /// Scattering in the frame.
     pub bsdf: Bsdf<'a>,
-    seen: Seen,
+    pub(super) seen: Seen,
     /// Cosine of the direction with the geometric normal; 0 where the two normals disagree about its side.
-    cos_og: f32,
+    pub(super) cos_og: f32,
 }
 
 impl<'a> Shading<'a> {
@@ -86,22 +85,6 @@ impl<'a> Shading<'a> {
         self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cos_ig)
     }
 
-    /// [`Shading::gather`] for many photons.
-    #[inline]
-    pub fn gathering(&self, set: LobeSet) -> Gathering<'_> {
-        let kind = if self.cos_og == 0.0 {
-            Kind::Nothing
-        } else {
-            match self.bsdf.diffuse_only(&self.seen, set) {
-                Some((factor, through)) => {
-                    Kind::Diffuse { factor, through, side: if self.seen.side == 1 { -1.0 } else { 1.0 } }
-                }
-                None => Kind::Any,
-            }
-        };
-        Gathering { shading: self, set, kind }
-    }
-
     /// Albedo of the lobes of `set`, see [`Bsdf::albedo`].
     #[inline]
     pub fn albedo(&self, set: LobeSet) -> Rgb {
@@ -125,75 +108,5 @@ impl<'a> Shading<'a> {
         }
         sample.wi = wi;
         Some(sample)
-    }
-}
-
-/// What photons add to the radiance along one direction.
-pub struct Gathering<'a> {
-    shading: &'a Shading<'a>,
-    set: LobeSet,
-    kind: Kind<'a>,
-}
-
-/// Diffuse reflection, which most photons meet, needs little per photon.
-enum Kind<'a> {
-    Nothing,
-    Diffuse {
-        factor: Rgb,
-        through: Option<&'a Profile>,
-        /// 1 in front, -1 behind: photons on the side of the viewer count.
-        side: f32,
-    },
-    Any,
-}
-
-impl Gathering<'_> {
-    /// [`Shading::gather`] of a photon from `wi`.
-    #[inline]
-    pub fn photon(&self, wi: Vec3) -> Rgb {
-        match &self.kind {
-            Kind::Nothing => Rgb::ZERO,
-            Kind::Any => self.shading.gather(wi, self.set),
-            Kind::Diffuse { factor, through, side } => {
-                let (cos_s, cos_g) = (wi.dot(self.shading.frame.n) * side, wi.dot(self.shading.ng) * side);
-                if cos_s < LEAST_COSINE || cos_g <= 0.0 {
-                    return Rgb::ZERO;
-                }
-                let through = through.map_or(1.0, |through| through.at(Position::new(cos_s)));
-                *factor * (through * cos_s / cos_g)
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bsdf::{Coverings, EnergyTables, Interface, Parameters};
-    use crate::random::{Domain, Purpose, Stream};
-
-    /// The short way for diffuse reflection gives what the long way gives, on both sides and with a bent shading normal.
-    #[test]
-    fn gathering_is_gather() {
-        let tables = EnergyTables::new([1.5], Coverings::default());
-        let plastic =
-            Parameters { base_color: Rgb::new(0.6, 0.3, 0.1), eta: 1.5, specular: 1.0, ..Parameters::default() };
-        let matte = Parameters { specular: 0.0, ..plastic };
-        let rough = Parameters { alpha_x: 0.5, alpha_y: 0.5, ..plastic };
-        let sharp = Parameters { alpha_x: 0.05, alpha_y: 0.05, ..plastic };
-        for parameters in [plastic, matte, rough, sharp] {
-            let frame = Frame::from_normal(Vec3::new(0.3, 0.1, 1.0).normalize());
-            let interface = Interface::new(&parameters, &tables);
-            let bsdf = Bsdf::new(&parameters, &interface);
-            for i in 0..2000 {
-                let draws = Stream::new(1, 0, Domain::Test, i).vertex(0);
-                let wo = crate::math::warp::sphere_uniform(draws.two(Purpose::Pixel));
-                let wi = crate::math::warp::sphere_uniform(draws.two(Purpose::Lens));
-                let shading = Shading::new(frame, Vec3::Z, bsdf, wo);
-                let expected = shading.gather(wi, LobeSet::BROAD);
-                let found = shading.gathering(LobeSet::BROAD).photon(wi);
-                assert!((found - expected).length() <= 1e-4 * expected.length() + 1e-7, "{found} {expected}");
-            }
-        }
     }
 }

@@ -6,9 +6,9 @@
 //! gets the median of the others (or, with no others, the cap at the scene's size).
 
 use crate::camera::Camera;
-use crate::photon::{PhotonMap, nearest_radius2};
+use crate::photon::{PhotonMap, nearest_radius2, same_surface};
 use crate::random::{Domain, Stream};
-use crate::transport::{Eye, GatherPoint, same_surface};
+use crate::transport::{Eye, GatherPoint};
 use bumpalo::Bump;
 use rayon::prelude::*;
 

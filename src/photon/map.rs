@@ -68,6 +68,8 @@ struct Node {
 pub trait Located: Copy + Send + Sync {
     /// World position.
     fn position(&self) -> Vec3;
+    /// Unit geometric normal of the surface.
+    fn normal(&self) -> Vec3;
     /// Whether it is fit for the map.
     fn is_finite(&self) -> bool;
 }
@@ -76,6 +78,11 @@ impl Located for Photon {
     #[inline]
     fn position(&self) -> Vec3 {
         self.p
+    }
+
+    #[inline]
+    fn normal(&self) -> Vec3 {
+        self.ng
     }
 
     #[inline]
@@ -263,7 +270,7 @@ impl<P: Located> PhotonMap<P> {
     fn hit_children(&self, level: usize, node: usize, px: f32x8, py: f32x8, pz: f32x8, radius2: f32) -> u32 {
         let node = &self.levels[level][node];
         let zero = f32x8::ZERO;
-        let gap = |min: f32x8, max: f32x8, p: f32x8| (min - p).max(p - max).max(zero);
+        let gap = |min: f32x8, max: f32x8, p: f32x8| (min - p).fast_max(p - max).fast_max(zero);
         let dx = gap(node.min[0], node.max[0], px);
         let dy = gap(node.min[1], node.max[1], py);
         let dz = gap(node.min[2], node.max[2], pz);

@@ -1,7 +1,9 @@
 //! The photon map: photons in Morton order under an implicit 8-wide tree of boxes.
 
 mod map;
+mod near;
 mod nearest;
 
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
+pub use near::{Near, same_surface};
 pub use nearest::{MAX_NEIGHBOURS, nearest_radius2};

@@ -13,7 +13,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::{Photon, PhotonMap};
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
-use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Surroundings, light_path};
+use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -39,28 +39,36 @@ pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPas
     parts.concat()
 }
 
+/// The pixels of a tile along a Z-order curve: neighbours in time are neighbours in the picture, in both directions.
+fn z_order() -> impl Iterator<Item = (usize, usize)> {
+    let even_bits = |i: usize| (i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i >> 3 & 8);
+    (0..TILE * TILE).map(move |i| (even_bits(i), even_bits(i >> 1)))
+}
+
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
 fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
     let (width, _) = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
     let rows = width as usize * TILE;
-    pixels.par_chunks_mut(rows).enumerate().for_each_init(Bump::new, |arena, (band, pixels)| {
+    pixels.par_chunks_mut(rows).enumerate().for_each_init(Scratch::default, |scratch, (band, pixels)| {
         let band_height = pixels.len() / width as usize;
         for x0 in (0..width as usize).step_by(TILE) {
-            for dy in 0..band_height {
-                for x in x0..(x0 + TILE).min(width as usize) {
+            {
+                for (dx, dy) in z_order() {
+                    let x = x0 + dx;
+                    if x >= width as usize || dy >= band_height {
+                        continue;
+                    }
                     let pixel = &mut pixels[dy * width as usize + x];
                     let y = band * TILE + dy;
                     let index = (y * width as usize + x) as u64;
                     let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
                     // Radius squared of level k (from 0) of m: each halves that of the next larger.
                     let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
-                    arena.reset();
-                    let arena = &*arena;
-                    let trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
+                    let mut trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
                         let stream = Stream::new(settings.seed, i, domain, index);
-                        eye.measure(arena, (x as u32, y as u32), stream, photons, radii)
+                        eye.measure(scratch, (x as u32, y as u32), stream, photons, radii)
                     };
                     if levels.two_paths {
                         let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));

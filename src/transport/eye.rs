@@ -6,12 +6,13 @@
 //! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light.
 
 use super::direct::{balance, direct_light};
+use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::Camera;
 use crate::math::{Rgb, Vec2, Vec3};
-use crate::photon::{Photon, PhotonFlags, PhotonMap};
+use crate::photon::{Near, Photon, PhotonMap};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -19,15 +20,6 @@ use std::f32::consts::FRAC_1_PI;
 
 /// Most bandwidth levels of one eye path.
 pub const MAX_LEVELS: usize = 5;
-
-/// Photons of a surface whose normal turns further than this (cosine) from the gathering point's are not its own.
-const NORMAL_COSINE: f32 = 0.7;
-
-/// Whether a photon lies on the surface around a point with geometric normal `ng`.
-#[inline]
-pub fn same_surface(photon: &Photon, ng: Vec3) -> bool {
-    photon.ng.dot(ng) > NORMAL_COSINE
-}
 
 /// Bandwidths of the levels of one eye path: radii squared in ascending order.
 #[derive(Clone, Copy, Debug)]
@@ -115,6 +107,7 @@ enum Stage {
 struct Gather<'a> {
     scene: &'a Scene,
     photons: &'a PhotonMap,
+    near: &'a mut Near<Photon>,
     radii: &'a LevelRadii,
     max_depth: u32,
     measure: EyeMeasure,
@@ -153,24 +146,13 @@ impl Gather<'_> {
         let radii = &self.radii.radius2[..self.radii.count];
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
-        let ng = vertex.surface.ng;
-        // Bin by the smallest level that holds the photon; a level is the sum of the bins up to its own.
-        let mut bins = [[Rgb::ZERO; MAX_LEVELS]; 2];
-        let by_broad = vertex.shading.gathering(broad);
-        let by_both = vertex.shading.gathering(broad | sharp);
-        self.photons.within(vertex.surface.p, largest, |photon, distance2| {
-            let unreachable = photon.flags.has(PhotonFlags::UNREACHABLE);
-            if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
-                return;
+        let mut batch = Batch::new(radii, vertex.shading, broad, broad | sharp);
+        self.photons.gather(self.near, vertex.surface.p, vertex.surface.ng, largest, |photon, distance2| {
+            if u32::from(photon.depth) <= longest {
+                batch.push(photon, distance2);
             }
-            let f = if unreachable { by_both.photon(photon.wi) } else { by_broad.photon(photon.wi) };
-            let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
-            let mut level = radii.len() - 1;
-            while level > 0 && distance2 < radii[level - 1] {
-                level -= 1;
-            }
-            bins[caustic][level] += f * photon.flux;
         });
+        let bins = batch.finish();
         let mut sums = [Rgb::ZERO; 2];
         for (level, radius2) in radii.iter().enumerate() {
             let kernel = vertex.throughput * (FRAC_1_PI / radius2);
@@ -254,11 +236,11 @@ impl Eye<'_> {
         PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: self.interior }
     }
 
-    /// Traces one eye path and measures all levels of `radii`.
+    /// Traces one eye path and measures all levels of `radii`. `scratch` has served no other photons.
     #[inline]
     pub fn measure(
         &self,
-        arena: &Bump,
+        scratch: &mut Scratch,
         pixel: (u32, u32),
         stream: Stream,
         photons: &PhotonMap,
@@ -267,6 +249,7 @@ impl Eye<'_> {
         let mut gather = Gather {
             scene: self.scene,
             photons,
+            near: &mut scratch.near,
             radii,
             max_depth: self.max_depth,
             measure: EyeMeasure::default(),
@@ -275,8 +258,10 @@ impl Eye<'_> {
             last: Vec3::ZERO,
         };
         let start = self.start(pixel, stream);
-        walk(self.scene, arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
-        gather.measure
+        walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
+        let measure = gather.measure;
+        scratch.arena.reset();
+        measure
     }
 
     /// The first vertex of an eye path whose lobes gather photons.

@@ -5,11 +5,8 @@ use super::mis::{self, MisState};
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
-use crate::photon::{Located, PhotonMap};
+use crate::photon::{Located, PhotonMap, same_surface};
 use std::f32::consts::FRAC_1_PI;
-
-/// Photons of a surface whose normal turns further than this (cosine) from the merging point's are not its own.
-const NORMAL_COSINE: f32 = 0.7;
 
 /// A light-path vertex, as small as merging in the next pass allows.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +33,11 @@ impl Located for MergePhoton {
     #[inline]
     fn position(&self) -> Vec3 {
         self.p
+    }
+
+    #[inline]
+    fn normal(&self) -> Vec3 {
+        self.ng
     }
 
     #[inline]
@@ -83,7 +85,7 @@ pub(super) fn merge_photons<R: Record>(
     let Some(&largest) = radii.last() else { return };
     let (ng, shading) = (vertex.surface.ng, vertex.shading);
     photons.within(vertex.surface.p, largest, |photon, distance2| {
-        if photon.ng.dot(ng) <= NORMAL_COSINE || u32::from(photon.depth) > longest {
+        if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
             return;
         }
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);

@@ -1,0 +1,171 @@
+//! Queries that follow one another closely: photons around a place are kept and scanned, instead of looked for again.
+//!
+//! The eye paths of neighbouring pixels gather within a fraction of the bandwidth of each other. What a scan visits, and in which order, is
+//! what the tree would have visited, so nothing depends on what happens to be kept.
+
+use super::map::{Located, PhotonMap};
+use crate::math::Vec3;
+use wide::{CmpGt, CmpLt, f32x8};
+
+/// Photons of a surface whose normal turns further than this (cosine) from the gathering point's are not its own.
+const NORMAL_COSINE: f32 = 0.7;
+
+/// Whether a photon lies on the surface around a point with geometric normal `ng`.
+#[inline]
+pub fn same_surface(photon: &impl Located, ng: Vec3) -> bool {
+    photon.normal().dot(ng) > NORMAL_COSINE
+}
+
+/// Kept radius over the radius of the query that filled it. Larger ones serve more queries and are scanned for longer.
+const REACH: f32 = 1.75;
+/// Most photons kept; where there are more, the tree is faster.
+const MOST: usize = 512;
+/// A query this much of its radius away from the one before it is likely to be followed by others like it.
+const COHERENT: f32 = 0.75;
+/// What rounding may do to distances, relative.
+const ROUNDING: f32 = 1e-4;
+
+/// Positions and normals of eight photons; absent ones are infinitely far away.
+#[derive(Clone, Copy)]
+struct Eight {
+    p: [f32x8; 3],
+    n: [f32x8; 3],
+}
+
+/// The photons around a place. One per worker and map.
+pub struct Near<P> {
+    center: Vec3,
+    /// All photons nearer than this to the centre are kept; 0: none are.
+    radius: f32,
+    /// Where the last query was.
+    last: Vec3,
+    photons: Vec<P>,
+    eights: Vec<Eight>,
+}
+
+impl<P> Default for Near<P> {
+    fn default() -> Self {
+        let nowhere = Vec3::splat(f32::INFINITY);
+        Near { center: nowhere, radius: 0.0, last: nowhere, photons: Vec::new(), eights: Vec::new() }
+    }
+}
+
+impl<P: Located> PhotonMap<P> {
+    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p` whose surface is that of
+    /// normal `ng`, in Morton order.
+    #[inline]
+    pub fn gather(&self, near: &mut Near<P>, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
+        let radius = radius2.sqrt();
+        let moved = near.last.distance_squared(p);
+        near.last = p;
+        let covered = (near.center.distance(p) + radius) * (1.0 + ROUNDING) <= near.radius;
+        if covered || (moved < COHERENT * COHERENT * radius2 && self.fill(near, p, radius * REACH)) {
+            near.scan(p, ng, radius2, visit);
+        } else {
+            self.within(p, radius2, |photon, distance2| {
+                if same_surface(photon, ng) {
+                    visit(photon, distance2);
+                }
+            });
+        }
+    }
+
+    /// Keeps the photons around `center`; `false`, and none are kept, if there are too many.
+    #[cold]
+    fn fill(&self, near: &mut Near<P>, center: Vec3, radius: f32) -> bool {
+        near.photons.clear();
+        near.eights.clear();
+        self.traverse(center, radius * radius, |photon, _, radius2| {
+            near.photons.push(*photon);
+            // Shrunk to nothing, the search ends early.
+            if near.photons.len() > MOST { 0.0 } else { radius2 }
+        });
+        if near.photons.len() > MOST {
+            near.radius = 0.0;
+            return false;
+        }
+        for photons in near.photons.chunks(8) {
+            let of = |f: &dyn Fn(&P) -> f32| f32x8::from(std::array::from_fn::<f32, 8, _>(|k| photons.get(k).map_or(f32::INFINITY, f)));
+            near.eights.push(Eight {
+                p: std::array::from_fn(|a| of(&|photon| photon.position()[a])),
+                n: std::array::from_fn(|a| of(&|photon| photon.normal()[a])),
+            });
+        }
+        (near.center, near.radius) = (center, radius);
+        true
+    }
+}
+
+impl<P: Located> Near<P> {
+    #[inline]
+    fn scan(&self, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
+        let (p, ng) = (p.to_array().map(f32x8::splat), ng.to_array().map(f32x8::splat));
+        let (radius2, cosine) = (f32x8::splat(radius2), f32x8::splat(NORMAL_COSINE));
+        for (eight, photons) in self.eights.iter().zip(self.photons.chunks(8)) {
+            let d: [f32x8; 3] = std::array::from_fn(|a| eight.p[a] - p[a]);
+            let distance2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            // As `Vec3::dot` adds.
+            let cos = eight.n[0] * ng[0] + eight.n[1] * ng[1] + eight.n[2] * ng[2];
+            let mut inside = (distance2.cmp_lt(radius2) & cos.cmp_gt(cosine)).move_mask() as u32;
+            if inside == 0 {
+                continue;
+            }
+            let distance2 = distance2.to_array();
+            while inside != 0 {
+                let i = inside.trailing_zeros() as usize;
+                inside &= inside - 1;
+                visit(&photons[i], distance2[i]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photon::{Photon, PhotonFlags};
+    use crate::random::{Domain, Purpose, Stream};
+
+    /// Clusters, duplicates and a sheet with two kinds of normals; queries that walk, jump, and change their radius.
+    #[test]
+    fn what_is_kept_changes_nothing() {
+        let photons: Vec<Photon> = (0..20_000)
+            .map(|i| {
+                let draws = Stream::new(5, 0, Domain::Test, i).vertex(0);
+                let (u, v) = (draws.two(Purpose::Pixel), draws.one(Purpose::Lobe));
+                let p = match i % 5 {
+                    0 => Vec3::new(0.5 + 1e-3 * u.x, 1e-3 * v, 0.5 + 1e-3 * u.y),
+                    1 => Vec3::new(0.25, 0.0, 0.25),
+                    _ => Vec3::new(u.x, 1e-3 * v, u.y),
+                };
+                let ng = if i % 3 == 0 { Vec3::Z } else { Vec3::Y };
+                Photon { p, wi: Vec3::Y, ng, flux: Vec3::splat(i as f32), flags: PhotonFlags(0), depth: 2 }
+            })
+            .collect();
+        let map = PhotonMap::build(photons);
+        let mut near = Near::default();
+        let (mut p, mut radius, mut kept) = (Vec3::new(0.3, 0.0, 0.3), 0.02, 0);
+        for q in 0..20_000 {
+            let draws = Stream::new(6, 0, Domain::Test, q).vertex(0);
+            let (u, v) = (draws.two(Purpose::Pixel), draws.one(Purpose::Lobe));
+            if v < 0.01 {
+                p = Vec3::new(u.x, 0.0, u.y);
+                radius = 10f32.powf(-4.0 + 3.0 * draws.one(Purpose::Roulette));
+            } else {
+                p += Vec3::new(u.x - 0.5, 0.0, u.y - 0.5) * radius;
+            }
+            let ng = Vec3::new(0.1, 0.9, 0.1).normalize();
+            let radius2 = radius * radius * if q % 2 == 0 { 1.0 } else { 0.125 };
+            let (mut found, mut expected) = (Vec::new(), Vec::new());
+            map.gather(&mut near, p, ng, radius2, |photon, d2| found.push((photon.flux.x as u32, d2.to_bits())));
+            map.within(p, radius2, |photon, d2| {
+                if same_surface(photon, ng) {
+                    expected.push((photon.flux.x as u32, d2.to_bits()));
+                }
+            });
+            assert_eq!(found, expected, "query {q} at {p}, radius {radius}");
+            kept += usize::from(near.radius > 0.0 && near.center.distance(p) < near.radius);
+        }
+        assert!(kept > 5000, "only {kept} queries were served by what was kept");
+    }
+}
