@@ -1,5 +1,9 @@
 //! Cameras: perspective and orthographic, with a thin lens; rays from the film and importance towards a point.
 
+mod tiles;
+
+pub use tiles::par_pixels;
+
 use crate::math::{DVec3, Mat3, Vec2, Vec3, warp};
 
 /// How the film maps to directions.

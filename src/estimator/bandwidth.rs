@@ -5,12 +5,11 @@
 //! picture's width there. With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
 //! gets the median of the others (or, with no others, the cap at the scene's size).
 
-use crate::camera::Camera;
-use crate::photon::{PhotonMap, nearest_radius2, same_surface};
+use crate::camera::{Camera, par_pixels};
+use crate::photon::{Nearest, PhotonMap};
 use crate::random::{Domain, Stream};
 use crate::transport::{Eye, GatherPoint};
 use bumpalo::Bump;
-use rayon::prelude::*;
 
 /// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the picture says
 /// nothing about a place.
@@ -46,28 +45,21 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
         return vec![r; pixels];
     }
     let least = LEAST * scene.lights.sky().radius;
-    let of_point = |point: &GatherPoint| {
+    let of_point = |nearest: &mut Nearest, point: &GatherPoint| {
         let span = span(camera, point.length);
         let cap = SCREEN_CAP * span;
         let r = match rule {
-            InitialBandwidth::Nearest(k) => {
-                nearest_radius2(pilot, point.p, k, cap * cap, |photon| same_surface(photon, point.ng))
-                    .map_or(cap, f32::sqrt)
-            }
+            InitialBandwidth::Nearest(k) => nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt),
             _ => (FOOTPRINT_PIXELS * span / width as f32).min(cap),
         };
         r.max(least)
     };
-    let found: Vec<Option<f32>> = (0..pixels)
-        .into_par_iter()
-        .with_min_len(256)
-        .map_init(Bump::new, |arena, i| {
-            arena.reset();
-            let pixel = (i as u32 % width, i as u32 / width);
-            let stream = Stream::new(seed, 0, Domain::PilotEye, i as u64);
-            eye.gather_point(arena, pixel, stream).map(|point| of_point(&point))
-        })
-        .collect();
+    let mut found: Vec<Option<f32>> = vec![None; pixels];
+    par_pixels(&mut found, width, <(Bump, Nearest)>::default, |(arena, nearest), (x, y), found| {
+        let stream = Stream::new(seed, 0, Domain::PilotEye, u64::from(y) * u64::from(width) + u64::from(x));
+        *found = eye.gather_point(arena, (x, y), stream).map(|point| of_point(nearest, &point));
+        arena.reset();
+    });
     let mut known: Vec<f32> = found.iter().flatten().copied().collect();
     let fallback = if known.is_empty() {
         (SCREEN_CAP * span(camera, scene.lights.sky().radius)).max(least)

@@ -6,4 +6,4 @@ mod nearest;
 
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
 pub use near::{Near, same_surface};
-pub use nearest::{MAX_NEIGHBOURS, nearest_radius2};
+pub use nearest::{MAX_NEIGHBOURS, Nearest};

@@ -1,10 +1,73 @@
 //! k-th nearest neighbour, for initial bandwidths.
 
+use super::near::{Near, same_surface};
 use super::{Photon, PhotonMap};
 use crate::math::Vec3;
 
 /// Most neighbours that can be asked for.
 pub const MAX_NEIGHBOURS: usize = 1024;
+
+/// The last distance over which the next search begins: a little more, so that it mostly suffices.
+const GUESS: f32 = 1.3;
+
+/// Searches for the k-th nearest photon; one per worker and map. A search that follows another nearby begins with its
+/// result, which changes the effort, never the outcome.
+#[derive(Default)]
+pub struct Nearest {
+    near: Near<Photon>,
+    distances2: Vec<f32>,
+    /// Squared distance that the last search found.
+    last2: f32,
+}
+
+impl Nearest {
+    /// Squared distance from `p` to its `k`-th nearest photon among those whose surface is that of normal `ng` and that lie nearer than
+    /// `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
+    pub fn radius2(&mut self, map: &PhotonMap, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
+        let guess2 = (self.last2 * (GUESS * GUESS)).min(limit2);
+        let mut found = None;
+        if guess2 > 0.0 {
+            self.distances2.clear();
+            map.gather(&mut self.near, p, ng, guess2, |_, distance2| self.distances2.push(distance2));
+            // As many as that within a smaller radius: the k-th of them is the k-th of all.
+            if self.distances2.len() >= k {
+                found = Some(*self.distances2.select_nth_unstable_by(k - 1, f32::total_cmp).1);
+            } else if guess2 == limit2 {
+                return None;
+            }
+        }
+        found = found.or_else(|| self.search(map, p, ng, k, limit2));
+        self.last2 = found.unwrap_or(limit2);
+        found
+    }
+
+    /// Without a guess.
+    fn search(&mut self, map: &PhotonMap, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
+        // A sorted run of the best distances: k is small, and an insertion moves half of it.
+        let best = &mut self.distances2;
+        best.clear();
+        // The neighbourhood along the curve bounds the distance, so that the search proper starts small.
+        let mut bound = limit2;
+        for photon in map.around(p, 2 * k) {
+            let distance2 = photon.p.distance_squared(p);
+            if distance2 < bound && same_surface(photon, ng) {
+                bound = insert(best, k, distance2, bound);
+            }
+        }
+        best.clear();
+        // The bound itself was reached by some photon: it must stay within.
+        let start = if bound < limit2 { bound.next_up() } else { limit2 };
+        map.traverse(p, start, |photon, distance2, radius2| {
+            // The other photons of a leaf were found before the radius shrank.
+            if distance2 >= radius2 || !same_surface(photon, ng) {
+                radius2
+            } else {
+                insert(best, k, distance2, radius2)
+            }
+        });
+        (best.len() == k).then(|| best[k - 1])
+    }
+}
 
 /// Puts a distance into the sorted run of the `k` best; returns the radius squared that matters from now on.
 fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
@@ -12,35 +75,6 @@ fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
     best.truncate(k);
     // Strictly nearer photons only may still displace the k-th.
     if best.len() == k { best[k - 1].min(radius2) } else { radius2 }
-}
-
-/// Squared distance from `p` to its `k`-th nearest photon among those that `accept` takes and that lie nearer than
-/// `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
-pub fn nearest_radius2(
-    map: &PhotonMap,
-    p: Vec3,
-    k: usize,
-    limit2: f32,
-    accept: impl Fn(&Photon) -> bool,
-) -> Option<f32> {
-    // A sorted run of the best distances: k is small, and an insertion moves half of it.
-    let mut best: Vec<f32> = Vec::with_capacity(k + 1);
-    // The neighbourhood along the curve bounds the distance, so that the search proper starts small.
-    let mut bound = limit2;
-    for photon in map.around(p, 2 * k) {
-        let distance2 = photon.p.distance_squared(p);
-        if distance2 < bound && accept(photon) {
-            bound = insert(&mut best, k, distance2, bound);
-        }
-    }
-    best.clear();
-    // The bound itself was reached by some photon: it must stay within.
-    let start = if bound < limit2 { bound.next_up() } else { limit2 };
-    map.traverse(p, start, |photon, distance2, radius2| {
-        // The other photons of a leaf were found before the radius shrank.
-        if distance2 >= radius2 || !accept(photon) { radius2 } else { insert(&mut best, k, distance2, radius2) }
-    });
-    (best.len() == k).then(|| best[k - 1])
 }
 
 #[cfg(test)]
@@ -67,14 +101,18 @@ mod tests {
             })
             .collect();
         let map = PhotonMap::build(photons.clone());
-        for (q, k) in [(0, 1), (1, 10), (2, 20), (3, 500)] {
-            let u = Stream::new(4, 0, Domain::Test, q).vertex(0).two(Purpose::Pixel);
-            let p = Vec3::new(u.x, u.y, 0.0);
+        let mut nearest = Nearest::default();
+        for q in 0..200 {
+            let k = [1, 10, 20, 500][q as usize % 4];
+            // Some near the one before, some far.
+            let u = Stream::new(4, 0, Domain::Test, q / 8).vertex((q % 8) as u32).two(Purpose::Pixel);
+            let base = Stream::new(4, 1, Domain::Test, q / 8).vertex(0).two(Purpose::Pixel);
+            let p = Vec3::new(base.x, base.y, 0.0) + 0.01 * Vec3::new(u.x, u.y, 0.0);
             let mut distances: Vec<f32> =
                 photons.iter().filter(|photon| photon.ng.z > 0.0).map(|photon| photon.p.distance_squared(p)).collect();
             distances.sort_by(f32::total_cmp);
-            assert_eq!(nearest_radius2(&map, p, k, f32::INFINITY, |photon| photon.ng.z > 0.0), Some(distances[k - 1]));
-            assert_eq!(nearest_radius2(&map, p, k, distances[k - 1], |photon| photon.ng.z > 0.0), None);
+            assert_eq!(nearest.radius2(&map, p, Vec3::Z, k, f32::INFINITY), Some(distances[k - 1]));
+            assert_eq!(nearest.radius2(&map, p, Vec3::Z, k, distances[k - 1]), None);
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
 use super::result::{Phases, Rendered, relative_error};
 use super::settings::Settings;
-use crate::camera::Camera;
+use crate::camera::{Camera, par_pixels};
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -19,8 +19,6 @@ use rayon::prelude::*;
 
 /// Light paths per unit of work. Constant, so that the photons' order does not depend on threads.
 const CHUNK: u32 = 1024;
-/// Rows of pixels per unit of work, and width of the tiles in which they are visited, for coherent rays and gathers.
-const TILE: usize = 16;
 
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
 pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Vec<Photon> {
@@ -39,51 +37,30 @@ pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPas
     parts.concat()
 }
 
-/// The pixels of a tile along a Z-order curve: neighbours in time are neighbours in the picture, in both directions.
-fn z_order() -> impl Iterator<Item = (usize, usize)> {
-    let even_bits = |i: usize| (i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i >> 3 & 8);
-    (0..TILE * TILE).map(move |i| (even_bits(i), even_bits(i >> 1)))
-}
-
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
 fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
     let (width, _) = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
-    let rows = width as usize * TILE;
-    pixels.par_chunks_mut(rows).enumerate().for_each_init(Scratch::default, |scratch, (band, pixels)| {
-        let band_height = pixels.len() / width as usize;
-        for x0 in (0..width as usize).step_by(TILE) {
-            {
-                for (dx, dy) in z_order() {
-                    let x = x0 + dx;
-                    if x >= width as usize || dy >= band_height {
-                        continue;
-                    }
-                    let pixel = &mut pixels[dy * width as usize + x];
-                    let y = band * TILE + dy;
-                    let index = (y * width as usize + x) as u64;
-                    let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
-                    // Radius squared of level k (from 0) of m: each halves that of the next larger.
-                    let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
-                    let mut trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
-                        let stream = Stream::new(settings.seed, i, domain, index);
-                        eye.measure(scratch, (x as u32, y as u32), stream, photons, radii)
-                    };
-                    if levels.two_paths {
-                        let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));
-                        let others =
-                            LevelRadii::new((1..levels.count.max(2)).map(|k| radius2(k.min(levels.count - 1))));
-                        let correlated = trace(Domain::EyeCorrelated, &others);
-                        keep_first_hit(eye, pixel, &independent);
-                        pixel.add(&independent, Some(&correlated), levels.count, levels.own());
-                    } else {
-                        let all = trace(Domain::EyeIndependent, &LevelRadii::new((0..levels.count).map(radius2)));
-                        keep_first_hit(eye, pixel, &all);
-                        pixel.add(&all, None, levels.count, levels.own());
-                    }
-                }
-            }
+    par_pixels(pixels, width, Scratch::default, |scratch, (x, y), pixel| {
+        let index = u64::from(y) * u64::from(width) + u64::from(x);
+        let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
+        // Radius squared of level k (from 0) of m: each halves that of the next larger.
+        let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
+        let mut trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
+            let stream = Stream::new(settings.seed, i, domain, index);
+            eye.measure(scratch, (x, y), stream, photons, radii)
+        };
+        if levels.two_paths {
+            let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));
+            let others = LevelRadii::new((1..levels.count.max(2)).map(|k| radius2(k.min(levels.count - 1))));
+            let correlated = trace(Domain::EyeCorrelated, &others);
+            keep_first_hit(eye, pixel, &independent);
+            pixel.add(&independent, Some(&correlated), levels.count, levels.own());
+        } else {
+            let all = trace(Domain::EyeIndependent, &LevelRadii::new((0..levels.count).map(radius2)));
+            keep_first_hit(eye, pixel, &all);
+            pixel.add(&all, None, levels.count, levels.own());
         }
     });
 }

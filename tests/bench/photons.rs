@@ -4,7 +4,7 @@
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
 use caustique::math::{Rgb, Vec3};
-use caustique::photon::{Photon, PhotonFlags, PhotonMap, nearest_radius2};
+use caustique::photon::{Nearest, Photon, PhotonFlags, PhotonMap};
 use caustique::random::{Domain, Purpose, Stream};
 use std::time::Instant;
 
@@ -170,10 +170,11 @@ fn main() {
         let map = PhotonMap::build(points.iter().map(photon).collect());
         let build_tree = t.elapsed();
         // Neighbouring pixels see neighbouring places: queries follow the map's own order in runs.
+        let mut nearest = Nearest::default();
         let queries: Vec<(Vec3, f32)> = (0..QUERIES)
             .map(|i| {
                 let p = map.photons()[i * map.photons().len() / QUERIES].p;
-                let r2 = nearest_radius2(&map, p, 20, f32::INFINITY, |_| true).unwrap_or(1.0).max(1e-12);
+                let r2 = nearest.radius2(&map, p, Vec3::Y, 20, f32::INFINITY).unwrap_or(1.0).max(1e-12);
                 (p, r2 * 1.0001)
             })
             .collect();
