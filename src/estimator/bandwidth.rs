@@ -55,10 +55,12 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
         r.max(least)
     };
     let mut found: Vec<Option<f32>> = vec![None; pixels];
-    par_pixels(&mut found, width, <(Bump, Nearest)>::default, |(arena, nearest), (x, y), found| {
-        let stream = Stream::new(seed, 0, Domain::PilotEye, u64::from(y) * u64::from(width) + u64::from(x));
-        *found = eye.gather_point(arena, (x, y), stream).map(|point| of_point(nearest, &point));
-        arena.reset();
+    par_pixels(&mut found, width, <(Bump, Nearest)>::default, |(arena, nearest), found, places| {
+        let starts = eye.starts(places, |place| Stream::new(seed, 0, Domain::PilotEye, place.index));
+        for (place, start) in places.iter().flatten().zip(starts.into_iter().flatten()) {
+            found[place.at] = eye.gather_point(arena, start).map(|point| of_point(nearest, &point));
+            arena.reset();
+        }
     });
     let mut known: Vec<f32> = found.iter().flatten().copied().collect();
     let fallback = if known.is_empty() {

@@ -65,8 +65,8 @@ mod tests {
                     let small = 1.0 + bias + 0.8 * (noise.x - 0.5);
                     let large = 1.0 + 2.0 * bias + 0.8 * (noise.y - 0.5);
                     pixel.iterations = i;
-                    pixel.levels[0].add(Rgb::splat(small), f64::from(i));
-                    pixel.differences[0].add(Rgb::splat(large - small), f64::from(i));
+                    pixel.levels[0].add(Rgb::splat(small), 1.0 / f64::from(i));
+                    pixel.differences[0].add(Rgb::splat(large - small), 1.0 / f64::from(i));
                 }
                 let error = SquaredError::of(&pixel, 0, 2).expect("two iterations are done");
                 squared_bias += error.squared_bias.x / 4000.0;

@@ -73,11 +73,11 @@ impl Pixel {
             return;
         }
         self.iterations += 1;
-        let n = f64::from(self.iterations);
+        let inverse_count = 1.0 / f64::from(self.iterations);
         for level in 0..count {
-            self.levels[level].add(values[level], n);
+            self.levels[level].add(values[level], inverse_count);
             if level + 1 < count {
-                self.differences[level].add(values[level + 1] - values[level], n);
+                self.differences[level].add(values[level + 1] - values[level], inverse_count);
             }
         }
         let (measure, level) = match correlated {

@@ -6,7 +6,7 @@
 use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
 use super::result::{Phases, Rendered, relative_error};
 use super::settings::Settings;
-use crate::camera::{Camera, par_pixels};
+use crate::camera::{Camera, Place, par_pixels};
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -42,25 +42,31 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
     let (width, _) = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
-    par_pixels(pixels, width, Scratch::default, |scratch, (x, y), pixel| {
-        let index = u64::from(y) * u64::from(width) + u64::from(x);
-        let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
-        // Radius squared of level k (from 0) of m: each halves that of the next larger.
-        let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
-        let mut trace = |domain: Domain, radii: &LevelRadii| -> EyeMeasure {
-            let stream = Stream::new(settings.seed, i, domain, index);
-            eye.measure(scratch, (x, y), stream, photons, radii)
-        };
-        if levels.two_paths {
-            let independent = trace(Domain::EyeIndependent, &LevelRadii::new(std::iter::once(radius2(0))));
-            let others = LevelRadii::new((1..levels.count.max(2)).map(|k| radius2(k.min(levels.count - 1))));
-            let correlated = trace(Domain::EyeCorrelated, &others);
-            keep_first_hit(eye, pixel, &independent);
-            pixel.add(&independent, Some(&correlated), levels.count, levels.own());
-        } else {
-            let all = trace(Domain::EyeIndependent, &LevelRadii::new((0..levels.count).map(radius2)));
-            keep_first_hit(eye, pixel, &all);
-            pixel.add(&all, None, levels.count, levels.own());
+    let stream = |domain: Domain| move |place: &Place| Stream::new(settings.seed, i, domain, place.index);
+    par_pixels(pixels, width, Scratch::default, |scratch, pixels, places| {
+        let independent = eye.starts(places, stream(Domain::EyeIndependent));
+        let correlated = levels.two_paths.then(|| eye.starts(places, stream(Domain::EyeCorrelated)));
+        for (k, place) in places.iter().enumerate() {
+            let (Some(place), Some(start)) = (place, independent[k]) else { continue };
+            let pixel = &mut pixels[place.at];
+            let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
+            // Radius squared of level k (from 0) of m: each halves that of the next larger.
+            let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
+            let all = LevelRadii::new((0..levels.count).map(radius2));
+            match correlated.and_then(|starts| starts[k]) {
+                Some(correlated) => {
+                    let independent = eye.measure(scratch, start, photons, &all.part(0..1));
+                    let others = if levels.count > 1 { all.part(1..levels.count) } else { all };
+                    let correlated = eye.measure(scratch, correlated, photons, &others);
+                    keep_first_hit(eye, pixel, &independent);
+                    pixel.add(&independent, Some(&correlated), levels.count, levels.own());
+                }
+                None => {
+                    let all = eye.measure(scratch, start, photons, &all);
+                    keep_first_hit(eye, pixel, &all);
+                    pixel.add(&all, None, levels.count, levels.own());
+                }
+            }
         }
     });
 }

@@ -12,12 +12,12 @@ pub struct Welford {
 }
 
 impl Welford {
-    /// Adds the `count`-th value (the first has count 1).
+    /// Adds the n-th value (the first is number 1), given 1 / n.
     #[inline]
-    pub fn add(&mut self, value: Rgb, count: f64) {
+    pub fn add(&mut self, value: Rgb, inverse_count: f64) {
         let value = value.as_dvec3();
         let delta = value - self.mean;
-        self.mean += delta / count;
+        self.mean += delta * inverse_count;
         self.m2 += delta * (value - self.mean);
     }
 
@@ -49,8 +49,8 @@ mod tests {
         let (mut a, mut b) = (Welford::default(), Welford::default());
         for (i, &v) in values.iter().enumerate() {
             let rgb = Rgb::splat(v as f32);
-            whole.add(rgb, (i + 1) as f64);
-            if i < 300 { a.add(rgb, (i + 1) as f64) } else { b.add(rgb, (i - 299) as f64) }
+            whole.add(rgb, 1.0 / (i + 1) as f64);
+            if i < 300 { a.add(rgb, 1.0 / (i + 1) as f64) } else { b.add(rgb, 1.0 / (i - 299) as f64) }
         }
         let mean = values.iter().sum::<f64>() / 1000.0;
         let m2 = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();

@@ -33,6 +33,18 @@ pub struct Hit {
     pub primitive: u32,
 }
 
+impl From<embree::Hit> for Hit {
+    #[inline]
+    fn from(hit: embree::Hit) -> Hit {
+        Hit {
+            t: hit.t,
+            barycentric: [hit.u, hit.v],
+            instance: hit.instance.unwrap_or(hit.geometry).0,
+            primitive: hit.primitive,
+        }
+    }
+}
+
 /// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs. A pure function.
 pub type AlphaTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
@@ -120,13 +132,13 @@ impl Tracer {
     /// The nearest hit, or none.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let hit = self.scene.intersect(&Self::ray(ray))?;
-        Some(Hit {
-            t: hit.t,
-            barycentric: [hit.u, hit.v],
-            instance: hit.instance.unwrap_or(hit.geometry).0,
-            primitive: hit.primitive,
-        })
+        self.scene.intersect(&Self::ray(ray)).map(Hit::from)
+    }
+
+    /// The nearest hits of rays that go much the same way. Which rays are given together may decide between triangles that share an edge.
+    #[inline]
+    pub fn intersect8(&self, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
+        self.scene.intersect8(&rays.each_ref().map(|ray| ray.as_ref().map(Self::ray))).map(|hit| hit.map(Hit::from))
     }
 
     /// Whether anything lies on the segment.

@@ -5,7 +5,7 @@
 //! a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the path itself, which
 //! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
 
-use super::segment::{End, next_surface, transmittance};
+use super::segment::{End, Known, next_surface, transmittance};
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
@@ -89,7 +89,7 @@ fn second_strategy(scene: &Scene, vertex: &Vertex<'_, '_>, set: LobeSet) -> Rgb 
     let origin = surface.spawn(sample.wi);
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
     let mut light = Rgb::ZERO;
-    match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha)) {
+    match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha), Known::Unknown) {
         End::Surface(arrival) => {
             if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, surface.p, &arrival.surface) {
                 light = radiance * arrival.transmittance * weight(pdf);

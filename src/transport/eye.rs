@@ -8,13 +8,15 @@
 use super::direct::{balance, direct_light};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
+use super::segment::{Known, look};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
-use crate::camera::Camera;
+use crate::camera::{Camera, GROUP, Place};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::photon::{Near, Photon, PhotonMap};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
+use crate::trace::Ray;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
@@ -38,6 +40,12 @@ impl LevelRadii {
             radii.count += 1;
         }
         radii
+    }
+
+    /// Some of the levels.
+    #[inline]
+    pub fn part(&self, levels: std::ops::Range<usize>) -> LevelRadii {
+        LevelRadii::new(self.radius2[..self.count][levels].iter().copied())
     }
 
     /// Number of levels.
@@ -233,7 +241,43 @@ impl Eye<'_> {
         let draws = stream.vertex(0);
         let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
         let ray = self.camera.ray(film, draws.two(Purpose::Lens));
-        PathStart { origin: ray.origin, direction: ray.direction, throughput: Rgb::ONE, interior: self.interior }
+        PathStart {
+            origin: ray.origin,
+            direction: ray.direction,
+            throughput: Rgb::ONE,
+            interior: self.interior,
+            first: Known::Unknown,
+        }
+    }
+
+    /// The starts of the eye paths of neighbouring pixels (their streams come from `stream`), first rays traced together.
+    pub fn starts(
+        &self,
+        places: &[Option<Place>; GROUP],
+        stream: impl Fn(&Place) -> Stream,
+    ) -> [Option<(PathStart, Stream)>; GROUP] {
+        let mut starts = places.each_ref().map(|place| {
+            place.as_ref().map(|place| {
+                let stream = stream(place);
+                (self.start(place.pixel, stream), stream)
+            })
+        });
+        let rays = starts.each_ref().map(|start| {
+            start.as_ref().map(|(start, stream)| Ray {
+                origin: start.origin,
+                direction: start.direction,
+                tmax: f32::INFINITY,
+                token: stream.vertex(0).token(Purpose::Alpha),
+            })
+        });
+        let hits = self.scene.tracer.intersect8(&rays);
+        // One after the other, so that the processor waits for their memory at once.
+        for (start, hit) in starts.iter_mut().zip(hits) {
+            if let Some((start, _)) = start {
+                start.first = look(self.scene, hit);
+            }
+        }
+        starts
     }
 
     /// Traces one eye path and measures all levels of `radii`. `scratch` has served no other photons.
@@ -241,8 +285,7 @@ impl Eye<'_> {
     pub fn measure(
         &self,
         scratch: &mut Scratch,
-        pixel: (u32, u32),
-        stream: Stream,
+        (start, stream): (PathStart, Stream),
         photons: &PhotonMap,
         radii: &LevelRadii,
     ) -> EyeMeasure {
@@ -257,7 +300,6 @@ impl Eye<'_> {
             stage: Stage::Clear,
             last: Vec3::ZERO,
         };
-        let start = self.start(pixel, stream);
         walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
         let measure = gather.measure;
         scratch.arena.reset();
@@ -265,9 +307,8 @@ impl Eye<'_> {
     }
 
     /// The first vertex of an eye path whose lobes gather photons.
-    pub fn gather_point(&self, arena: &Bump, pixel: (u32, u32), stream: Stream) -> Option<GatherPoint> {
+    pub fn gather_point(&self, arena: &Bump, (start, stream): (PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindGatherPoint { found: None, length: 0.0 };
-        let start = self.start(pixel, stream);
         walk(self.scene, arena, start, stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }

@@ -1,6 +1,7 @@
 //! Light paths that leave photons.
 
 use super::interior::Surroundings;
+use super::segment::Known;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::EmissionDensity;
@@ -73,6 +74,7 @@ impl LightPass {
                 direction: emission.direction,
                 throughput: flux,
                 interior: surroundings.light(emission.light),
+                first: Known::Unknown,
             },
             stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
             delta: emission.delta,

@@ -4,7 +4,7 @@ use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::scene::Scene;
-use crate::trace::Ray;
+use crate::trace::{Hit, Ray};
 
 /// Boundaries without scattering that a segment may cross; more are taken for a numerical trap and end the path.
 const MAX_NULL_CROSSINGS: u32 = 256;
@@ -23,6 +23,18 @@ pub struct Arrival {
     pub transmittance: Rgb,
     /// Length of the way.
     pub distance: f32,
+}
+
+/// What a ray meets, if that is known before it is followed.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Known {
+    /// It is not.
+    #[default]
+    Unknown,
+    /// Nothing.
+    Nothing,
+    /// This triangle at this distance; no surface if it has no area.
+    Hit(f32, Option<Surface>),
 }
 
 /// How a ray ended.
@@ -84,26 +96,44 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     Boundary::Scattering(eta, Some(crossing))
 }
 
+/// The surface hit.
+#[inline]
+pub fn look(scene: &Scene, hit: Option<Hit>) -> Known {
+    match hit {
+        None => Known::Nothing,
+        Some(hit) => Known::Hit(hit.t, scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)),
+    }
+}
+
 /// Follows a ray from inside `interior` to the next surface that scatters.
 #[inline]
-pub fn next_surface(scene: &Scene, origin: Vec3, direction: Vec3, interior: Interior, token: u32) -> End {
+pub fn next_surface(
+    scene: &Scene,
+    origin: Vec3,
+    direction: Vec3,
+    interior: Interior,
+    token: u32,
+    mut known: Known,
+) -> End {
     let mut ray = Ray { origin, direction, tmax: f32::INFINITY, token };
     let mut interior = interior;
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
     for _ in 0..MAX_NULL_CROSSINGS {
-        let Some(hit) = scene.tracer.intersect(&ray) else {
+        let met = match std::mem::take(&mut known) {
+            Known::Unknown => look(scene, scene.tracer.intersect(&ray)),
+            known => known,
+        };
+        let Known::Hit(t, surface) = met else {
             if scene.survey.media {
                 transmittance *= absorb(scene, &interior, f32::INFINITY);
             }
             return End::Escaped(transmittance);
         };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
-            return End::Lost;
-        };
-        distance += hit.t;
+        let Some(surface) = surface else { return End::Lost };
+        distance += t;
         if scene.survey.media {
-            transmittance *= absorb(scene, &interior, hit.t);
+            transmittance *= absorb(scene, &interior, t);
         }
         match boundary(scene, &surface, &interior, direction) {
             Boundary::Scattering(eta, crossing) => {

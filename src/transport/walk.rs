@@ -2,7 +2,7 @@
 //! [`Visitor`].
 
 use super::interior::Interior;
-use super::segment::{Arrival, End, next_surface};
+use super::segment::{Arrival, End, Known, next_surface};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
@@ -29,6 +29,8 @@ pub struct PathStart {
     pub throughput: Rgb,
     /// The solids the origin is in.
     pub interior: Interior,
+    /// What the first ray meets, if it has been traced already.
+    pub first: Known,
 }
 
 /// A vertex of a path on a surface. What it refers to by `'a` outlives the walk.
@@ -114,7 +116,7 @@ pub fn walk<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { mut origin, mut direction, mut throughput, mut interior } = start;
+    let PathStart { mut origin, mut direction, mut throughput, mut interior, first: mut known } = start;
     let survival_scale = 1.0 / throughput.max_element();
     if !survival_scale.is_finite() {
         return;
@@ -122,7 +124,7 @@ pub fn walk<'a, V: Visitor<'a>>(
     let mut scattered = None;
     for depth in 1..=max_depth {
         let token = stream.vertex(depth - 1).token(Purpose::Alpha);
-        let arrival = match next_surface(scene, origin, direction, interior, token) {
+        let arrival = match next_surface(scene, origin, direction, interior, token, std::mem::take(&mut known)) {
             End::Surface(arrival) => arrival,
             End::Escaped(left) => {
                 visitor.escape(direction, throughput * left, scattered);

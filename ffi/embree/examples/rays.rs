@@ -32,8 +32,26 @@ fn main() {
     let coherent: Vec<Ray> = (0..RAYS).map(camera).collect();
     for (name, rays) in [("random", &incoherent), ("camera", &coherent)] {
         best(&format!("{name} intersect"), threads, rays, |ray| scene.intersect(ray).is_some());
+        eights(&format!("{name} intersect8"), threads, rays, &scene);
         best(&format!("{name} occluded"), threads, rays, |ray| scene.occluded(ray));
     }
+}
+
+/// As [`best`], eight rays at once.
+fn eights(name: &str, threads: usize, rays: &[Ray], scene: &caustique_embree::Scene) {
+    let packets: Vec<[Option<Ray>; 8]> =
+        rays.chunks_exact(8).map(|rays| std::array::from_fn(|k| Some(rays[k]))).collect();
+    let mut seconds = f64::INFINITY;
+    for _ in 0..5 {
+        let start = Instant::now();
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| std::hint::black_box(packets.iter().map(|p| scene.intersect8(p)[0].is_some()).count()));
+            }
+        });
+        seconds = seconds.min(start.elapsed().as_secs_f64());
+    }
+    println!("{name:17} {:6.2} Mrays/s", (threads * rays.len()) as f64 / seconds * 1e-6);
 }
 
 /// Prints the best of five runs; each thread traces all the rays.

@@ -11,6 +11,8 @@ pub const INVALID_GEOMETRY_ID: u32 = u32::MAX;
 
 pub const DEVICE_PROPERTY_VERSION_MAJOR: u32 = 1;
 pub const DEVICE_PROPERTY_VERSION_MINOR: u32 = 2;
+/// Packets of eight are traced as such.
+pub const DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED: u32 = 33;
 pub const DEVICE_PROPERTY_VERSION_PATCH: u32 = 3;
 
 pub const GEOMETRY_TYPE_TRIANGLE: u32 = 0;
@@ -89,6 +91,33 @@ impl RawHit {
     };
 }
 
+/// `RTCRayHit8`: structures of arrays. As with [`RawHit`], `instance_primitive` is there from Embree 4.3 on.
+#[repr(C, align(32))]
+#[derive(Clone, Copy)]
+pub struct RawRayHit8 {
+    pub origin: [[f32; 8]; 3],
+    pub tnear: [f32; 8],
+    pub direction: [[f32; 8]; 3],
+    pub time: [f32; 8],
+    pub tfar: [f32; 8],
+    pub mask: [u32; 8],
+    pub id: [u32; 8],
+    pub flags: [u32; 8],
+    pub ng: [[f32; 8]; 3],
+    pub u: [f32; 8],
+    pub v: [f32; 8],
+    pub primitive: [u32; 8],
+    pub geometry: [u32; 8],
+    pub instance: [u32; 8],
+    pub instance_primitive: [u32; 8],
+}
+
+/// Which of eight rays are to be traced: all bits set, or none.
+#[repr(C, align(32))]
+pub struct Valid8(pub [i32; 8]);
+
+const _: () = assert!(size_of::<RawRayHit8>() == 21 * 32);
+
 /// `RTCIntersectContext` of Embree 3. The last field is there only in builds with `RTC_MIN_WIDTH`, and
 /// padding otherwise.
 #[repr(C)]
@@ -100,10 +129,33 @@ pub struct IntersectContext3 {
 }
 
 impl IntersectContext3 {
+    const COHERENT: IntersectContext3 = IntersectContext3 { flags: 1, ..IntersectContext3::INCOHERENT };
     const INCOHERENT: IntersectContext3 = IntersectContext3 {
         flags: 0,
         filter: std::ptr::null(),
         instance: INVALID_GEOMETRY_ID,
+        min_width_distance_factor: 0.0,
+    };
+}
+
+/// `RTCIntersectArguments` of Embree 4. The last field is there only in builds with `RTC_MIN_WIDTH`, and padding otherwise.
+#[repr(C)]
+struct IntersectArguments4 {
+    flags: u32,
+    features: u32,
+    context: *const c_void,
+    filter: *const c_void,
+    intersect: *const c_void,
+    min_width_distance_factor: f32,
+}
+
+impl IntersectArguments4 {
+    const COHERENT: IntersectArguments4 = IntersectArguments4 {
+        flags: 1 << 16,
+        features: u32::MAX,
+        context: std::ptr::null(),
+        filter: std::ptr::null(),
+        intersect: std::ptr::null(),
         min_width_distance_factor: 0.0,
     };
 }
@@ -180,6 +232,7 @@ functions! {
     Trace3 {
         intersect = b"rtcIntersect1\0" (Handle, *mut IntersectContext3, *mut RawRayHit);
         occluded = b"rtcOccluded1\0" (Handle, *mut IntersectContext3, *mut RawRay);
+        intersect8 = b"rtcIntersect8\0" (*const Valid8, Handle, *mut IntersectContext3, *mut RawRayHit8);
     }
 }
 
@@ -189,6 +242,7 @@ functions! {
     Trace4 {
         intersect = b"rtcIntersect1\0" (Handle, *mut RawRayHit, *mut c_void);
         occluded = b"rtcOccluded1\0" (Handle, *mut RawRay, *mut c_void);
+        intersect8 = b"rtcIntersect8\0" (*const Valid8, Handle, *mut RawRayHit8, *mut c_void);
     }
 }
 
@@ -228,6 +282,26 @@ impl Trace {
             }
             // SAFETY: as above.
             Trace::V4(functions) => unsafe { (functions.occluded)(scene, ray, std::ptr::null_mut()) },
+        }
+    }
+
+    /// Coherent rays, eight at once.
+    ///
+    /// # Safety
+    /// As for [`Trace::intersect`]; the library's devices must support packets of eight.
+    #[inline(always)]
+    pub unsafe fn intersect8(&self, valid: &Valid8, scene: Handle, rays: *mut RawRayHit8) {
+        match self {
+            Trace::V3(functions) => {
+                let mut context = IntersectContext3::COHERENT;
+                // SAFETY: the caller vouches for scene and rays; the context lives through the call.
+                unsafe { (functions.intersect8)(valid, scene, &mut context, rays) }
+            }
+            Trace::V4(functions) => {
+                let mut arguments = IntersectArguments4::COHERENT;
+                // SAFETY: as above; the arguments live through the call.
+                unsafe { (functions.intersect8)(valid, scene, rays, (&raw mut arguments).cast()) }
+            }
         }
     }
 }

@@ -263,7 +263,10 @@ impl SceneBuilder {
         device.check("build a scene")?;
         let shared = Shared { owned: self.owned, has_instances: self.has_instances };
         let trace = device.library().trace();
-        Ok(Scene { raw: scene, trace, filtered: self.has_filters, reach: self.reach, shared: Arc::new(shared) })
+        // SAFETY: the device is alive.
+        let eight = unsafe { (common.device_property)(device.raw(), api::DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) } != 0;
+        let packets = eight && !self.has_filters;
+        Ok(Scene { raw: scene, trace, packets, filtered: self.has_filters, reach: self.reach, shared: Arc::new(shared) })
     }
 
     fn device(&self) -> &Device {
@@ -289,6 +292,8 @@ pub struct Scene {
     pub(crate) raw: Handle,
     pub(crate) trace: Trace,
     pub(crate) filtered: bool,
+    /// Rays may be traced eight at once. Filters are called with one ray at a time.
+    pub(crate) packets: bool,
     pub(crate) reach: f32,
     shared: Arc<Shared>,
 }

@@ -146,6 +146,65 @@ fn a_million_triangles_agree_with_brute_force() {
     assert!((10..50).contains(&hits), "{hits} of 60 rays hit: a poor test");
 }
 
+/// Eight at once find what one finds: the same triangle, but for rays within rounding of an edge.
+#[test]
+fn packets_agree_with_single_rays() {
+    let scene = million();
+    let mut random = Random(9);
+    let (mut hits, mut others) = (0, 0);
+    for packet in 0..20_000 {
+        let origin = random.point();
+        let towards = random.direction();
+        let rays: [Option<Ray>; 8] = std::array::from_fn(|k| {
+            let spread = 0.05 * random.unit();
+            let direction = [towards[0] + spread, towards[1] - spread, towards[2]];
+            // Some absent, some that Embree must not see.
+            match (packet + k) % 11 {
+                0 => None,
+                1 => Some(ray([f32::NAN, 0.0, 0.0], direction)),
+                _ => Some(ray(origin, direction)),
+            }
+        });
+        for (ray, together) in rays.iter().zip(scene.intersect8(&rays)) {
+            let alone = ray.as_ref().and_then(|ray| scene.intersect(ray));
+            match (alone, together) {
+                (None, None) => {}
+                (Some(a), Some(b)) if (a.geometry, a.primitive) == (b.geometry, b.primitive) => {
+                    hits += 1;
+                    assert!((a.t - b.t).abs() <= 1e-4 * a.t + 1e-6, "{a:?} {b:?}");
+                    assert!((a.u - b.u).abs() < 0.01 && (a.v - b.v).abs() < 0.01, "{a:?} {b:?}");
+                }
+                (Some(a), Some(b)) => {
+                    others += 1;
+                    assert!((a.t - b.t).abs() <= 1e-3 * a.t + 1e-4, "{a:?} {b:?}");
+                }
+                _ => others += 1,
+            }
+        }
+    }
+    assert!(hits > 20_000 && others * 1000 < hits, "{hits} alike, {others} not");
+}
+
+/// With filters, and through instances.
+#[test]
+fn packets_call_filters_and_reach_into_instances() {
+    let scene = sheets(|candidate| candidate.token == 0);
+    let rays: [Option<Ray>; 8] =
+        std::array::from_fn(|k| Some(Ray { token: k as u32 % 2, ..down(0.1 + 0.02 * k as f32, 0.2) }));
+    let hits = scene.intersect8(&rays);
+    for (ray, hit) in rays.iter().zip(hits) {
+        assert_eq!(hit, ray.as_ref().and_then(|ray| scene.intersect(ray)));
+    }
+    let mut root = builder();
+    let shift = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0];
+    root.instance(GeometryId(4), &one_triangle(), &shift).unwrap();
+    let root = root.commit().unwrap();
+    let rays: [Option<Ray>; 8] = std::array::from_fn(|k| Some(down(2.1 + 0.02 * k as f32, 0.2)));
+    for hit in root.intersect8(&rays) {
+        assert_eq!(hit.and_then(|hit| hit.instance), Some(GeometryId(4)));
+    }
+}
+
 #[test]
 fn intersect_and_occluded_agree() {
     let scene = million();
