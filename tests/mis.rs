@@ -76,7 +76,7 @@ impl<'a> Visitor<'a> for Notes<'a> {
 
 fn notes<'a>(scene: &'a Scene, arena: &'a Bump, start: PathStart, stream: Stream, transport: Transport) -> Notes<'a> {
     let mut notes = Notes { scene, met: Vec::new(), escaped: None };
-    walk(scene, arena, start, stream, transport, 12, &mut notes);
+    walk(scene, arena, &start, stream, transport, 12, &mut notes);
     notes
 }
 

@@ -57,7 +57,7 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
     let mut found: Vec<Option<f32>> = vec![None; pixels];
     par_pixels(&mut found, width, <(Bump, Nearest)>::default, |(arena, nearest), found, places| {
         let starts = eye.starts(places, |place| Stream::new(seed, 0, Domain::PilotEye, place.index));
-        for (place, start) in places.iter().flatten().zip(starts.into_iter().flatten()) {
+        for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
             found[place.at] = eye.gather_point(arena, start).map(|point| of_point(nearest, &point));
             arena.reset();
         }

@@ -58,6 +58,14 @@ impl Pixel {
         Pixel { bandwidth, z: 1e10, ..Pixel::default() }
     }
 
+    /// Looks at the memory that [`Pixel::add`] is about to change, so that the processor waits for that of several pixels at once. Returns
+    /// something that depends on it.
+    #[inline]
+    pub fn touch(&self) -> f64 {
+        let levels: f64 = self.levels.iter().chain(&self.differences).map(|level| level.mean.x).sum();
+        levels + self.parts.emission.x + self.parts.indirect.z + self.depth + f64::from(self.bandwidth)
+    }
+
     /// Adds one iteration: level 1 from `independent`, the others from `correlated` (of `count - 1` levels), or all from `independent`
     /// when there is one level. `own` is the level (from 0) whose parts are kept.
     pub fn add(&mut self, independent: &EyeMeasure, correlated: Option<&EyeMeasure>, count: usize, own: usize) {

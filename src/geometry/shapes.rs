@@ -21,6 +21,22 @@ impl Shapes {
         Shapes { meshes, instances, corners }
     }
 
+    /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of it at once, so that the
+    /// processor waits once. Returns something that depends on it.
+    #[inline]
+    pub fn touch(&self, triangles: impl Iterator<Item = (u32, u32)> + Clone) -> f32 {
+        let corners = |(instance, primitive): (u32, u32)| {
+            let mesh = self.instances[instance as usize].mesh as usize;
+            (mesh, self.meshes[mesh].triangles[primitive as usize])
+        };
+        let indices: u32 = triangles.clone().map(|t| corners(t).1[0] & 1).sum();
+        let places = triangles.map(|t| {
+            let (mesh, corners) = corners(t);
+            corners.iter().map(|&c| self.corners[mesh][c as usize].p.x).sum::<f32>()
+        });
+        places.sum::<f32>() + indices as f32
+    }
+
     /// The surface at barycentric coordinates of a triangle; `None` if it has no area.
     #[inline]
     pub fn surface(&self, instance: u32, primitive: u32, barycentric: [f32; 2]) -> Option<Surface> {

@@ -44,16 +44,18 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
     let factor = radius2_factor(i, settings.alpha) as f32;
     let stream = |domain: Domain| move |place: &Place| Stream::new(settings.seed, i, domain, place.index);
     par_pixels(pixels, width, Scratch::default, |scratch, pixels, places| {
+        let waiting = places.iter().flatten().map(|place| pixels[place.at].touch()).sum::<f64>();
+        std::hint::black_box(waiting);
         let independent = eye.starts(places, stream(Domain::EyeIndependent));
         let correlated = levels.two_paths.then(|| eye.starts(places, stream(Domain::EyeCorrelated)));
         for (k, place) in places.iter().enumerate() {
-            let (Some(place), Some(start)) = (place, independent[k]) else { continue };
+            let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
             let pixel = &mut pixels[place.at];
             let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
             // Radius squared of level k (from 0) of m: each halves that of the next larger.
             let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
             let all = LevelRadii::new((0..levels.count).map(radius2));
-            match correlated.and_then(|starts| starts[k]) {
+            match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                 Some(correlated) => {
                     let independent = eye.measure(scratch, start, photons, &all.part(0..1));
                     let others = if levels.count > 1 { all.part(1..levels.count) } else { all };

@@ -238,7 +238,7 @@ impl Bidirectional<'_> {
             measure: EyeMeasure::default(),
             record,
         };
-        walk(eye.scene, arena, start, stream, Transport::Radiance, eye.max_depth, &mut visitor);
+        walk(eye.scene, arena, &start, stream, Transport::Radiance, eye.max_depth, &mut visitor);
         visitor.measure
     }
 }

@@ -192,6 +192,6 @@ impl<'s> Bidirectional<'s> {
             left,
             record,
         };
-        walk(eye.scene, arena, start, emitted.stream, Transport::Importance, eye.max_depth, &mut visitor);
+        walk(eye.scene, arena, &start, emitted.stream, Transport::Importance, eye.max_depth, &mut visitor);
     }
 }

@@ -89,7 +89,7 @@ fn second_strategy(scene: &Scene, vertex: &Vertex<'_, '_>, set: LobeSet) -> Rgb 
     let origin = surface.spawn(sample.wi);
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
     let mut light = Rgb::ZERO;
-    match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha), Known::Unknown) {
+    match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha), &Known::Unknown) {
         End::Surface(arrival) => {
             if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, surface.p, &arrival.surface) {
                 light = radiance * arrival.transmittance * weight(pdf);

@@ -271,7 +271,8 @@ impl Eye<'_> {
             })
         });
         let hits = self.scene.tracer.intersect8(&rays);
-        // One after the other, so that the processor waits for their memory at once.
+        let triangles = hits.iter().flatten().map(|hit| (hit.instance, hit.primitive));
+        std::hint::black_box(self.scene.shapes.touch(triangles));
         for (start, hit) in starts.iter_mut().zip(hits) {
             if let Some((start, _)) = start {
                 start.first = look(self.scene, hit);
@@ -285,7 +286,7 @@ impl Eye<'_> {
     pub fn measure(
         &self,
         scratch: &mut Scratch,
-        (start, stream): (PathStart, Stream),
+        (start, stream): &(PathStart, Stream),
         photons: &PhotonMap,
         radii: &LevelRadii,
     ) -> EyeMeasure {
@@ -300,16 +301,16 @@ impl Eye<'_> {
             stage: Stage::Clear,
             last: Vec3::ZERO,
         };
-        walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
+        walk(self.scene, &scratch.arena, start, *stream, Transport::Radiance, self.max_depth, &mut gather);
         let measure = gather.measure;
         scratch.arena.reset();
         measure
     }
 
     /// The first vertex of an eye path whose lobes gather photons.
-    pub fn gather_point(&self, arena: &Bump, (start, stream): (PathStart, Stream)) -> Option<GatherPoint> {
+    pub fn gather_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindGatherPoint { found: None, length: 0.0 };
-        walk(self.scene, arena, start, stream, Transport::Radiance, self.max_depth, &mut find);
+        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
 }

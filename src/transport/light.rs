@@ -129,5 +129,5 @@ pub fn light_path(
 ) {
     let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
     let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
-    walk(scene, arena, emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
+    walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
 }

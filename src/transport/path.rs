@@ -98,7 +98,7 @@ pub fn path_measure(eye: &Eye<'_>, arena: &Bump, pixel: (u32, u32), stream: Stre
     let start = eye.start(pixel, stream);
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
     let mut tracer = PathTracer { scene: eye.scene, max_depth: eye.max_depth, measure, trail, last: start.origin };
-    walk(eye.scene, arena, start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
+    walk(eye.scene, arena, &start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure
 }
 

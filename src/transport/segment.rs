@@ -113,16 +113,16 @@ pub fn next_surface(
     direction: Vec3,
     interior: Interior,
     token: u32,
-    mut known: Known,
+    known: &Known,
 ) -> End {
     let mut ray = Ray { origin, direction, tmax: f32::INFINITY, token };
     let mut interior = interior;
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
-    for _ in 0..MAX_NULL_CROSSINGS {
-        let met = match std::mem::take(&mut known) {
-            Known::Unknown => look(scene, scene.tracer.intersect(&ray)),
-            known => known,
+    for crossed in 0..MAX_NULL_CROSSINGS {
+        let met = match known {
+            Known::Nothing | Known::Hit(..) if crossed == 0 => *known,
+            _ => look(scene, scene.tracer.intersect(&ray)),
         };
         let Known::Hit(t, surface) = met else {
             if scene.survey.media {

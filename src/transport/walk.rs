@@ -110,13 +110,14 @@ impl Vertex<'_, '_> {
 pub fn walk<'a, V: Visitor<'a>>(
     scene: &'a Scene,
     arena: &'a Bump,
-    start: PathStart,
+    start: &PathStart,
     stream: Stream,
     transport: Transport,
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { mut origin, mut direction, mut throughput, mut interior, first: mut known } = start;
+    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first } = *start;
+    let mut known = first;
     let survival_scale = 1.0 / throughput.max_element();
     if !survival_scale.is_finite() {
         return;
@@ -124,7 +125,7 @@ pub fn walk<'a, V: Visitor<'a>>(
     let mut scattered = None;
     for depth in 1..=max_depth {
         let token = stream.vertex(depth - 1).token(Purpose::Alpha);
-        let arrival = match next_surface(scene, origin, direction, interior, token, std::mem::take(&mut known)) {
+        let arrival = match next_surface(scene, origin, direction, interior, token, std::mem::replace(&mut known, &Known::Unknown)) {
             End::Surface(arrival) => arrival,
             End::Escaped(left) => {
                 visitor.escape(direction, throughput * left, scattered);
