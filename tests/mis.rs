@@ -19,8 +19,8 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
-    Bidirectional, Eye, Left, LightPass, LightVertices, Meets, MergeLevels, Next, PathStart, Record, Scattered, Strategies,
-    Surroundings, Technique, Vertex, Visitor, walk,
+    Bidirectional, Eye, Left, LightPass, LightVertices, Meets, MergeLevels, Next, PathStart, Record, Scattered,
+    Strategies, Surroundings, Technique, Vertex, Visitor, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 

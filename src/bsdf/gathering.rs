@@ -161,8 +161,8 @@ impl Positions {
 mod tests {
     use super::*;
     use crate::bsdf::Bsdf;
-    use crate::math::Frame;
     use crate::bsdf::{Coverings, EnergyTables, Interface, Parameters};
+    use crate::math::Frame;
     use crate::random::{Domain, Purpose, Stream};
 
     /// The short ways give what the long way gives, on both sides and with a bent shading normal.

@@ -10,10 +10,10 @@
 //! What single scattering between facets loses is given back by a separable lobe, for glass on both sides in the ratio
 //! that keeps it reciprocal \[Kulla and Conty 2017\]. The lobe belongs to the class of the lobe it completes.
 
+use super::LobeSet;
 use super::fresnel::schlick;
 use super::interface::{Interface, RoughGlass, again};
 use super::profile::Position;
-use super::LobeSet;
 use crate::math::{Rgb, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -139,7 +139,7 @@ impl Seen {
 
 impl<'a> Layered<'a> {
     /// The surface of `base` colour, `metallic` and transmitting in these shares, at `interface`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface) -> Layered<'a> {
         let Interface { matched, class, thin, average, .. } = *interface;
         let metal = metallic;
@@ -224,7 +224,7 @@ impl<'a> Layered<'a> {
     }
 
     /// The surface seen along `wo`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn seen(&self, wo: Vec3) -> Seen {
         let n = self.interface;
         let side = usize::from(wo.z < 0.0);
@@ -259,7 +259,7 @@ impl<'a> Layered<'a> {
     }
 
     /// Estimates of the albedos of facets, their compensation on the same side, and on the other.
-    #[inline]
+    #[inline(always)]
     fn facet_albedos(&self, seen: &Seen) -> [Rgb; 3] {
         let n = self.interface;
         let cos = n.effective_cosine(seen.o.z);

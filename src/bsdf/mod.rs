@@ -14,10 +14,10 @@ mod shading;
 mod sheen;
 
 pub use energy::{Coverings, EnergyTables};
+pub use gathering::Gathering;
 pub use interface::Interface;
 pub use layered::Layered;
 pub use parameters::Parameters;
-pub use gathering::Gathering;
 pub use shading::Shading;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
@@ -120,7 +120,7 @@ impl<'a> Bsdf<'a> {
     }
 
     /// The BSDF of a surface of colour `base`, `metallic` and transmitting in these shares, at `interface`.
-    #[inline]
+    #[inline(always)]
     pub fn of(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface) -> Bsdf<'a> {
         if metallic == 0.0 && transmission == 0.0 && interface.bare {
             Bsdf::Matte(base)
@@ -140,7 +140,7 @@ impl<'a> Bsdf<'a> {
     }
 
     /// The surface seen along `wo`.
-    #[inline]
+    #[inline(always)]
     fn seen(&self, wo: Vec3) -> Seen {
         match self {
             Bsdf::Matte(_) => Seen::plain(wo),
@@ -223,14 +223,7 @@ impl<'a> Bsdf<'a> {
     }
 
     #[inline]
-    fn sample_seen(
-        &self,
-        seen: &Seen,
-        transport: Transport,
-        set: LobeSet,
-        u_lobe: f32,
-        u: Vec2,
-    ) -> Option<BsdfSample> {
+    fn sample_seen(&self, seen: &Seen, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         match self {
             Bsdf::Matte(color) => {
                 let mut wi = warp::hemisphere_cosine(u);

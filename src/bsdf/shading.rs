@@ -24,7 +24,7 @@ pub struct Shading<'a> {
 
 impl<'a> Shading<'a> {
     /// `bsdf` in `frame` on a surface with geometric normal `ng`, seen along the unit direction `wo`.
-    #[inline]
+    #[inline(always)]
     pub fn new(frame: Frame, ng: Vec3, bsdf: Bsdf<'a>, wo: Vec3) -> Shading<'a> {
         let local = frame.to_local(wo);
         let cos = wo.dot(ng);

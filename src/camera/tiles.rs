@@ -37,11 +37,8 @@ pub fn par_pixels<T: Send, S>(
                 let places = std::array::from_fn(|k| {
                     let (x, dy) = (x0 + even_bits(first + k), even_bits((first + k) >> 1));
                     let y = band * TILE + dy;
-                    let place = Place {
-                        pixel: (x as u32, y as u32),
-                        index: (y * width + x) as u64,
-                        at: dy * width + x,
-                    };
+                    let place =
+                        Place { pixel: (x as u32, y as u32), index: (y * width + x) as u64, at: dy * width + x };
                     (x < width && dy < height).then_some(place)
                 });
                 if places.iter().any(Option::is_some) {
@@ -60,12 +57,17 @@ mod tests {
     fn every_pixel_is_visited_once() {
         for (width, height) in [(1, 1), (16, 16), (37, 5), (100, 33), (3, 70)] {
             let mut pixels = vec![0u32; (width * height) as usize];
-            par_pixels(&mut pixels, width, || (), |(), pixels, places| {
-                for place in places.iter().flatten() {
-                    assert_eq!(place.index, u64::from(place.pixel.1 * width + place.pixel.0));
-                    pixels[place.at] += 1 + place.index as u32;
-                }
-            });
+            par_pixels(
+                &mut pixels,
+                width,
+                || (),
+                |(), pixels, places| {
+                    for place in places.iter().flatten() {
+                        assert_eq!(place.index, u64::from(place.pixel.1 * width + place.pixel.0));
+                        pixels[place.at] += 1 + place.index as u32;
+                    }
+                },
+            );
             assert!(pixels.iter().enumerate().all(|(i, &pixel)| pixel == 1 + i as u32), "{width} x {height}");
         }
     }

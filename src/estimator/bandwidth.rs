@@ -7,7 +7,7 @@
 
 use crate::camera::{Camera, par_pixels};
 use crate::photon::{Nearest, PhotonMap};
-use crate::random::{Domain, Stream};
+use crate::random::{Domain, Streams};
 use crate::transport::{Eye, GatherPoint};
 use bumpalo::Bump;
 
@@ -49,14 +49,17 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
         let span = span(camera, point.length);
         let cap = SCREEN_CAP * span;
         let r = match rule {
-            InitialBandwidth::Nearest(k) => nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt),
+            InitialBandwidth::Nearest(k) => {
+                nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
+            }
             _ => (FOOTPRINT_PIXELS * span / width as f32).min(cap),
         };
         r.max(least)
     };
     let mut found: Vec<Option<f32>> = vec![None; pixels];
+    let streams = Streams::new(seed, 0, Domain::PilotEye);
     par_pixels(&mut found, width, <(Bump, Nearest)>::default, |(arena, nearest), found, places| {
-        let starts = eye.starts(places, |place| Stream::new(seed, 0, Domain::PilotEye, place.index));
+        let starts = eye.starts(places, streams);
         for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
             found[place.at] = eye.gather_point(arena, start).map(|point| of_point(nearest, &point));
             arena.reset();

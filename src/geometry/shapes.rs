@@ -2,6 +2,7 @@
 
 use super::mesh::Corner;
 use super::{Instance, Mesh, Surface};
+use crate::math::Vec3;
 
 /// The scene's geometry.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,15 @@ impl Shapes {
         Shapes { meshes, instances, corners }
     }
 
+    /// Whether `p` is before the front of a triangle's plane. Near the plane rounding decides.
+    #[inline]
+    pub fn is_in_front(&self, instance: u32, primitive: u32, p: Vec3) -> bool {
+        let placed = &self.instances[instance as usize];
+        let mesh = placed.mesh as usize;
+        let [p0, p1, p2] = self.meshes[mesh].triangles[primitive as usize].map(|i| self.corners[mesh][i as usize].p);
+        placed.normal((p1 - p0).cross(p2 - p0)).dot(p - placed.point(p0)) > 0.0
+    }
+
     /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of it at once, so that the
     /// processor waits once. Returns something that depends on it.
     #[inline]
@@ -38,7 +48,7 @@ impl Shapes {
     }
 
     /// The surface at barycentric coordinates of a triangle; `None` if it has no area.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, instance: u32, primitive: u32, barycentric: [f32; 2]) -> Option<Surface> {
         let placed = &self.instances[instance as usize];
         let (mesh, corners) = (&self.meshes[placed.mesh as usize], &self.corners[placed.mesh as usize]);

@@ -33,7 +33,7 @@ const POSITION_ERROR: f32 = 32.0 * f32::EPSILON;
 
 impl Surface {
     /// The surface at barycentric coordinates (`b1`, `b2`) of triangle `primitive`. `None` for a triangle without area.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(
         instance_index: u32,
         instance: &Instance,

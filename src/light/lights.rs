@@ -161,6 +161,10 @@ impl Lights {
         let (index, probability, _) = self.choice.as_ref()?.sample(choice);
         match &self.emitters[index] {
             Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
+                // Most lamps have a back, and most points are behind some lamp: asked before more is looked up.
+                if !*two_sided && !shapes.is_in_front(*instance, *primitive, p) {
+                    return None;
+                }
                 let b = warp::triangle_uniform(u);
                 let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
                 let to = light.p - p;

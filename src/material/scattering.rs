@@ -68,7 +68,7 @@ impl Scattering {
 
     /// The BSDF at a surface; `eta` is the index of refraction behind the surface (its back) over the one before it. An interface that
     /// textures change is made in `arena`.
-    #[inline]
+    #[inline(always)]
     pub fn bsdf<'a>(&'a self, materials: &Materials, surface: &Surface, eta: f32, arena: &'a Bump) -> Bsdf<'a> {
         let (material, textures) = (&materials.list[surface.material as usize], &materials.textures);
         if material.unlit {

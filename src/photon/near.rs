@@ -85,7 +85,9 @@ impl<P: Located> PhotonMap<P> {
             return false;
         }
         for photons in near.photons.chunks(8) {
-            let of = |f: &dyn Fn(&P) -> f32| f32x8::from(std::array::from_fn::<f32, 8, _>(|k| photons.get(k).map_or(f32::INFINITY, f)));
+            let of = |f: &dyn Fn(&P) -> f32| {
+                f32x8::from(std::array::from_fn::<f32, 8, _>(|k| photons.get(k).map_or(f32::INFINITY, f)))
+            };
             near.eights.push(Eight {
                 p: std::array::from_fn(|a| of(&|photon| photon.position()[a])),
                 n: std::array::from_fn(|a| of(&|photon| photon.normal()[a])),

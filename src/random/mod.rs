@@ -89,6 +89,24 @@ fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// The draws of all paths of a domain in one pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Streams(u64);
+
+impl Streams {
+    /// Those of `domain` in pass `pass` of a render with `seed`.
+    pub fn new(seed: u64, pass: u64, domain: Domain) -> Streams {
+        let key = mix(seed.wrapping_add(GOLDEN));
+        Streams(mix(key ^ pass.wrapping_mul(GOLDEN).wrapping_add(domain as u64)))
+    }
+
+    /// Those of path `index`.
+    #[inline]
+    pub fn path(self, index: u64) -> Stream {
+        Stream(mix(self.0.wrapping_add(index.wrapping_mul(GOLDEN))))
+    }
+}
+
 /// The draws of one path.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream(u64);
@@ -97,9 +115,7 @@ impl Stream {
     /// The stream of path `index` in `domain` of pass `pass` of a render with `seed`.
     #[inline]
     pub fn new(seed: u64, pass: u64, domain: Domain, index: u64) -> Stream {
-        let key = mix(seed.wrapping_add(GOLDEN));
-        let key = mix(key ^ pass.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
-        Stream(mix(key.wrapping_add(index.wrapping_mul(GOLDEN))))
+        Streams::new(seed, pass, domain).path(index)
     }
 
     /// The draws at vertex `vertex` of the path (0 is the endpoint the path starts from).

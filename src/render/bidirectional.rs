@@ -17,8 +17,8 @@ use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat, Strategies, Surroundings,
-    path_measure,
+    Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat, Strategies,
+    Surroundings, path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;

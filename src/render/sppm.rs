@@ -6,12 +6,12 @@
 use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
 use super::result::{Phases, Rendered, relative_error};
 use super::settings::Settings;
-use crate::camera::{Camera, Place, par_pixels};
+use crate::camera::{Camera, par_pixels};
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::{Photon, PhotonMap};
-use crate::random::{Domain, Stream};
+use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
@@ -42,12 +42,13 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
     let (width, _) = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
-    let stream = |domain: Domain| move |place: &Place| Stream::new(settings.seed, i, domain, place.index);
+    let [independent, correlated] =
+        [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::new(settings.seed, i, domain));
     par_pixels(pixels, width, Scratch::default, |scratch, pixels, places| {
         let waiting = places.iter().flatten().map(|place| pixels[place.at].touch()).sum::<f64>();
         std::hint::black_box(waiting);
-        let independent = eye.starts(places, stream(Domain::EyeIndependent));
-        let correlated = levels.two_paths.then(|| eye.starts(places, stream(Domain::EyeCorrelated)));
+        let independent = eye.starts(places, independent);
+        let correlated = levels.two_paths.then(|| eye.starts(places, correlated));
         for (k, place) in places.iter().enumerate() {
             let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
             let pixel = &mut pixels[place.at];

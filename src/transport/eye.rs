@@ -14,7 +14,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::photon::{Near, Photon, PhotonMap};
-use crate::random::{Purpose, Stream};
+use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::trace::Ray;
 use bumpalo::Bump;
@@ -250,15 +250,11 @@ impl Eye<'_> {
         }
     }
 
-    /// The starts of the eye paths of neighbouring pixels (their streams come from `stream`), first rays traced together.
-    pub fn starts(
-        &self,
-        places: &[Option<Place>; GROUP],
-        stream: impl Fn(&Place) -> Stream,
-    ) -> [Option<(PathStart, Stream)>; GROUP] {
+    /// The starts of the eye paths of neighbouring pixels, first rays traced together.
+    pub fn starts(&self, places: &[Option<Place>; GROUP], streams: Streams) -> [Option<(PathStart, Stream)>; GROUP] {
         let mut starts = places.each_ref().map(|place| {
             place.as_ref().map(|place| {
-                let stream = stream(place);
+                let stream = streams.path(place.index);
                 (self.start(place.pixel, stream), stream)
             })
         });

@@ -70,7 +70,7 @@ enum Boundary {
     Scattering(f32, Option<Crossing>),
 }
 
-#[inline]
+#[inline(always)]
 fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3) -> Boundary {
     let material = &scene.materials.list[surface.material as usize];
     if !material.is_solid_glass() {
@@ -97,7 +97,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
 }
 
 /// The surface hit.
-#[inline]
+#[inline(always)]
 pub fn look(scene: &Scene, hit: Option<Hit>) -> Known {
     match hit {
         None => Known::Nothing,
@@ -106,7 +106,7 @@ pub fn look(scene: &Scene, hit: Option<Hit>) -> Known {
 }
 
 /// Follows a ray from inside `interior` to the next surface that scatters.
-#[inline]
+#[inline(always)]
 pub fn next_surface(
     scene: &Scene,
     origin: Vec3,

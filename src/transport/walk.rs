@@ -125,7 +125,14 @@ pub fn walk<'a, V: Visitor<'a>>(
     let mut scattered = None;
     for depth in 1..=max_depth {
         let token = stream.vertex(depth - 1).token(Purpose::Alpha);
-        let arrival = match next_surface(scene, origin, direction, interior, token, std::mem::replace(&mut known, &Known::Unknown)) {
+        let arrival = match next_surface(
+            scene,
+            origin,
+            direction,
+            interior,
+            token,
+            std::mem::replace(&mut known, &Known::Unknown),
+        ) {
             End::Surface(arrival) => arrival,
             End::Escaped(left) => {
                 visitor.escape(direction, throughput * left, scattered);
@@ -165,8 +172,7 @@ pub fn walk<'a, V: Visitor<'a>>(
         if draws.one(Purpose::Roulette) >= survival {
             return;
         }
-        let sample =
-            shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
+        let sample = shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
         let Some(sample) = sample else { return };
         visitor.scatter(&vertex, &sample);
         throughput *= sample.weight / survival;

@@ -266,7 +266,14 @@ impl SceneBuilder {
         // SAFETY: the device is alive.
         let eight = unsafe { (common.device_property)(device.raw(), api::DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) } != 0;
         let packets = eight && !self.has_filters;
-        Ok(Scene { raw: scene, trace, packets, filtered: self.has_filters, reach: self.reach, shared: Arc::new(shared) })
+        Ok(Scene {
+            raw: scene,
+            trace,
+            packets,
+            filtered: self.has_filters,
+            reach: self.reach,
+            shared: Arc::new(shared),
+        })
     }
 
     fn device(&self) -> &Device {
