@@ -353,7 +353,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         let arena = Bump::new();
         let mut vertices = LightVertices::new_in(&arena);
         let (mut left, mut by_light, mut by_eye) = (Left::default(), Said::default(), Said::default());
-        shared.light_path(&arena, &lights, index, false, &mut vertices, &mut left, &mut by_light);
+        shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
         let meets = Meets { vertices: &vertices, photons: Some(&map), levels: &levels };
         shared.eye_path(&arena, pixel, stream, &meets, &mut by_eye);

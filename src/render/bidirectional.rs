@@ -177,7 +177,7 @@ impl<'a> Passes<'a> {
                 for (_, (x, y)) in tiles.pixels(tile) {
                     arena.reset();
                     let mut vertices = LightVertices::new_in(&arena);
-                    shared.light_path(&arena, &pass, y * width + x, true, &mut vertices, &mut left, &mut ());
+                    shared.light_path(&pass, y * width + x, true, &mut vertices, &mut left, &mut ());
                 }
                 left.photons
             };
@@ -229,7 +229,7 @@ impl<'a> Passes<'a> {
                         let index = y * width + x;
                         arena.reset();
                         let mut vertices = LightVertices::new_in(&arena);
-                        shared.light_path(&arena, pass, index, false, &mut vertices, &mut left, &mut ());
+                        shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());
                         let levels = levels(bandwidths[index as usize].bandwidth, pair);
                         let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                         let stream = Stream::new(seed, i, pair.eye, u64::from(index));

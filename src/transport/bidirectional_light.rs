@@ -10,7 +10,6 @@ use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
-use bumpalo::Bump;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
 #[derive(Clone, Copy, Debug)]
@@ -170,7 +169,6 @@ impl<'s> Bidirectional<'s> {
     #[inline]
     pub fn light_path<R: Record>(
         &self,
-        arena: &'s Bump,
         pass: &LightPass,
         index: u32,
         photons_only: bool,
@@ -180,6 +178,7 @@ impl<'s> Bidirectional<'s> {
     ) {
         let eye = &self.eye;
         let Some(emitted) = pass.emit(eye.scene, self.surroundings, index) else { return };
+        let arena = vertices.bump();
         let mut start = emitted.start;
         start.throughput *= pass.paths() as f32;
         let mut visitor = LightWalk {

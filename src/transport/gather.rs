@@ -74,8 +74,8 @@ impl<'a> Batch<'a> {
     fn flush(&mut self) {
         let f = self.gathering.eight(self.wi.map(f32x8::from));
         let light: [[f32; 8]; 3] = std::array::from_fn(|c| (f[c] * f32x8::from(self.flux[c])).to_array());
-        for k in 0..self.count {
-            let bin = usize::from(self.bin[k]);
+        for (k, &bin) in self.bin[..self.count].iter().enumerate() {
+            let bin = usize::from(bin);
             self.bins[bin / MAX_LEVELS][bin % MAX_LEVELS] += Vec3A::new(light[0][k], light[1][k], light[2][k]);
         }
         self.count = 0;
