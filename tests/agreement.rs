@@ -9,7 +9,7 @@ use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Stream};
-use caustique::render::{Control, Levels, Settings, sppm};
+use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::{Eye, Interior, path_radiance};
@@ -47,7 +47,7 @@ fn by_photons(scene: &Scene, photons: u32, radius: f32, iterations: u64, seeds: 
                 iterations: Some(iterations),
                 ..Settings::default()
             };
-            let rendered = sppm(scene, &camera, &settings, |_, _| Control::Continue);
+            let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
             assert_eq!(rendered.rejected(), 0);
             tiles(|x, y| rendered.pixels[(y * SIZE + x) as usize].levels[0].mean.element_sum() / 3.0)
         })

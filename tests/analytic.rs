@@ -12,7 +12,7 @@ use caustique::light::Emitter;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::random::{Domain, Stream};
-use caustique::render::{Control, Levels, Settings, sppm};
+use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use caustique::transport::{Eye, Interior, path_radiance};
@@ -59,7 +59,7 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
     let mut means: [Vec<f64>; 5] = Default::default();
     for seed in 0..seeds {
         let settings = Settings { seed, ..settings.clone() };
-        let rendered = sppm(scene, &camera, &settings, |_, _| Control::Continue);
+        let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
         assert_eq!(rendered.rejected(), 0);
         for (level, means) in means.iter_mut().enumerate() {
             let sum = rendered.pixels.iter().map(|p| p.levels[level].mean.x).sum::<f64>();
@@ -289,7 +289,7 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
         let settings = settings(100, 1000, 0.05);
         check.run(what, &by_photons(&scene, &settings, 8, 24)[0]);
         let camera = scene.camera(&square(4)).expect("a camera");
-        let rendered = sppm(&scene, &camera, &settings, |_, _| Control::Continue);
+        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         for pixel in &rendered.pixels {
             assert_eq!((pixel.parts.caustic.x, pixel.parts.indirect.x), (0.0, 0.0), "{what}");
         }
@@ -313,7 +313,7 @@ fn the_two_eye_paths_are_independent() {
     let mut values = vec![[0.0; 3]; 64 * seeds as usize];
     for seed in 0..seeds {
         let settings = Settings { seed, ..settings(2, 0, 0.05) };
-        let rendered = sppm(&scene, &camera, &settings, |_, _| Control::Continue);
+        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         for (i, pixel) in rendered.pixels.iter().enumerate() {
             values[i * seeds as usize + seed as usize] = std::array::from_fn(|k| pixel.levels[k].mean.x);
         }

@@ -9,7 +9,7 @@ mod support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::render::{Control, Levels, Method, Rendered, Settings, Shard, paths, sppm};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, Shard};
 use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,
 };
@@ -22,7 +22,8 @@ const ALL: [Method; 5] = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm
 
 fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
     let camera = scene.camera(&square(size)).expect("a camera");
-    let rendered = paths(scene, &camera, settings, method, |_, _| Control::Continue);
+    let settings = Settings { method, ..settings.clone() };
+    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
     assert_eq!(rendered.rejected(), 0, "{method:?}");
     rendered
 }
@@ -259,7 +260,7 @@ fn agree_with(
     for &method in methods {
         let images = by(scene, method, radius, max_depth);
         println!("{what}: {:?} {:.5}", method.0, average(&images));
-        let bias = if method.0.merges() { bias } else { 0.0 };
+        let bias = if method.0.has_bandwidths() { bias } else { 0.0 };
         let found = disagreeing(&images, reference, tests, bias);
         assert!(found.is_empty(), "{what}, {:?}: {found:#?}", method.0);
         let mut wrong = images;
@@ -361,11 +362,10 @@ fn caustics_behind_glass() {
     description.lights.push(point_light(DVec3::new(0.1, 1.6, 0.3), 3.0));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.7, 0.0), 50.0));
     let scene = build(description);
-    let camera = scene.camera(&square(SIZE)).expect("a camera");
     let radius = 0.04;
     let by_sppm = |seed| {
         let settings = Settings { photons: 20_000, ..settings(16, radius, seed) };
-        tiles(&sppm(&scene, &camera, &settings, |_, _| Control::Continue), 0)
+        tiles(&render(&scene, Method::Sppm, SIZE, &settings), 0)
     };
     let reference: Vec<Vec<f64>> = (0..SEEDS).map(by_sppm).collect();
     println!("behind glass: sppm {:.5}", average(&reference));

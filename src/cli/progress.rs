@@ -123,7 +123,9 @@ fn sentence(progress: &Progress) -> String {
     if let Some(remaining) = progress.remaining {
         text += &format!(", {} left", duration(remaining));
     }
-    text += &format!(", {} photons/s", count(progress.light_paths as f64 / progress.seconds.max(1e-9)));
+    if progress.light_paths > 0 {
+        text += &format!(", {} photons/s", count(progress.light_paths as f64 / progress.seconds.max(1e-9)));
+    }
     if let Some(error) = progress.error {
         text += &format!(", error {}", percent(error));
     }

@@ -26,6 +26,8 @@ pub struct Shape {
     pub levels: usize,
     /// The level (from 0) that is the method's own image.
     pub own: usize,
+    /// Whether there are bandwidths.
+    pub bandwidths: bool,
     /// Squared bandwidth of the last iteration over that of the first.
     pub radius2_factor: f64,
     /// Whether an environment light can be seen.
@@ -67,7 +69,7 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, own, radius2_factor, environment } = *shape;
+    let Shape { levels, own, bandwidths, radius2_factor, environment } = *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
@@ -85,7 +87,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
     for level in 0..levels {
         columns.push(Column::rgb(format!("Variance{}", level + 1), move |p| variance(p, level)));
     }
-    for level in 0..levels {
+    for level in (0..levels).filter(|_| bandwidths) {
         // Each level's squared bandwidth is half that of the next larger.
         let factor = (radius2_factor * 0.5f64.powi((levels - 1 - level) as i32)).sqrt() as f32;
         columns.push(Column::one(format!("Radius{}", level + 1), "X", move |p| p.bandwidth * factor));
@@ -175,7 +177,7 @@ mod tests {
     use crate::math::Rgb;
     use crate::transport::{EyeMeasure, Features, FirstHit};
 
-    const SHAPE: Shape = Shape { levels: 5, own: 3, radius2_factor: 0.25, environment: false };
+    const SHAPE: Shape = Shape { levels: 5, own: 3, bandwidths: true, radius2_factor: 0.25, environment: false };
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
     fn measure(x: f32, hit: bool) -> EyeMeasure {

@@ -11,6 +11,9 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 /// Share of the choices that all lights get alike; the rest goes by power.
 const EQUAL_SHARE: f64 = 0.05;
 
+/// Light paths that leave a surface at a smaller cosine carry nothing.
+const LEAST_COSINE: f32 = 1e-6;
+
 /// A light seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectSample {
@@ -323,6 +326,10 @@ impl Lights {
                 let radiance =
                     material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
                 let cos = light.ng.dot(d).abs();
+                // Along the surface nothing leaves it, and densities over the cosine would not be numbers.
+                if cos < LEAST_COSINE {
+                    return None;
+                }
                 let flux = radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 });
                 (light.spawn(d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
             }

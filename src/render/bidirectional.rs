@@ -8,64 +8,28 @@
 //! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone, the other levels of the
 //! second. They share nothing but the photons, those of both light paths.
 
+use super::control::cpu_seconds;
+use super::drive::{Iterate, Work};
+use super::result::Phases;
 use super::settings::Settings;
 use crate::camera::Camera;
-use crate::estimator::Pixel;
+use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
+use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::PhotonMap;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat, Strategies,
+    Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
     Surroundings, path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
-use serde::Serialize;
 
 /// Width and height of a tile in pixels.
 const TILE: u32 = 16;
 const TILE_PIXELS: usize = (TILE * TILE) as usize;
-
-/// A method made of whole paths.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Path tracing with next-event estimation.
-    Path,
-    /// Light tracing with connections to the camera; of eye paths only what mirrors and clear glass show of lights.
-    Light,
-    /// Bidirectional path tracing.
-    Bdpt,
-    /// Bidirectional photon mapping: merging at all vertices, nothing else.
-    Bpm,
-    /// Vertex connection and merging.
-    Vcm,
-}
-
-impl Method {
-    /// The strategies of a bidirectional method.
-    fn strategies(self, camera: &Camera) -> Option<Strategies> {
-        match self {
-            Method::Path => None,
-            Method::Light => Some(Strategies::LIGHT),
-            Method::Bdpt => Some(Strategies::BDPT),
-            Method::Bpm => Some(Strategies::BPM),
-            Method::Vcm => Some(Strategies::vcm(camera.connects())),
-        }
-    }
-
-    /// Whether its bandwidths are several levels.
-    pub fn has_levels(self) -> bool {
-        self == Method::Vcm
-    }
-
-    /// Whether it has bandwidths.
-    pub fn merges(self) -> bool {
-        matches!(self, Method::Bpm | Method::Vcm)
-    }
-}
 
 /// The films' tiles.
 #[derive(Clone, Copy)]
@@ -131,7 +95,6 @@ impl<'a> Passes<'a> {
         camera: &'a Camera,
         settings: &'a Settings,
         surroundings: &'a Surroundings,
-        method: Method,
     ) -> Passes<'a> {
         let levels = settings.levels;
         let mut pairs = vec![Pair { light: Domain::Light, eye: Domain::EyeIndependent, levels: (0, levels.count) }];
@@ -143,7 +106,7 @@ impl<'a> Passes<'a> {
         let (width, height) = camera.size();
         let pixels = (width * height) as f32;
         let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
-        let shared = method.strategies(camera).map(|strategies| Bidirectional {
+        let shared = settings.method.strategies(camera).map(|strategies| Bidirectional {
             eye,
             surroundings,
             strategies,
@@ -187,11 +150,11 @@ impl<'a> Passes<'a> {
     }
 
     /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged.
-    pub fn iterate(&mut self, i: u64, pixels: &mut [Pixel]) -> (u64, usize) {
+    fn pass(&mut self, i: u64, pixels: &mut [Pixel]) -> Work {
         let Some(shared) = self.shared else {
             self.paths(i);
             self.add(pixels);
-            return (0, 0);
+            return Work { light_paths: 0, photons: 0 };
         };
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // The first pass of all can do without photons if it connects.
@@ -251,7 +214,7 @@ impl<'a> Passes<'a> {
         if shared.strategies.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons.concat())));
         }
-        (walked, merges)
+        Work { light_paths: walked, photons: merges }
     }
 
     /// Path tracing.
@@ -281,5 +244,29 @@ impl<'a> Passes<'a> {
             let others = self.measures.get(1).map(|measures| &measures[slot]);
             pixel.add(measure, others, levels.count, levels.own());
         });
+    }
+}
+
+impl Iterate for Passes<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        let (width, height) = self.camera.size();
+        if !self.settings.method.has_bandwidths() {
+            return vec![Pixel::new(0.0); width as usize * height as usize];
+        }
+        // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
+        let initial = match self.settings.initial {
+            InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
+            _ => InitialBandwidth::Footprint,
+        };
+        let none = PhotonMap::build(Vec::new());
+        initial_bandwidths(&self.eye(), initial, self.settings.seed, &none).into_iter().map(Pixel::new).collect()
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+        let start = cpu_seconds();
+        let work = self.pass(i, pixels);
+        // Light and eye paths take turns within a pixel.
+        phases.eye += cpu_seconds() - start;
+        work
     }
 }

@@ -15,6 +15,7 @@ pub fn shape(settings: &Settings, iterations: u64, environment: bool) -> output:
     output::Shape {
         levels: settings.levels.count,
         own: settings.levels.own(),
+        bandwidths: settings.method.has_bandwidths(),
         radius2_factor: radius2_factor(last, settings.alpha),
         environment,
     }
@@ -37,7 +38,7 @@ impl Rendered {
         let mut account = Map::new();
         let mut put = |key: &str, value: Value| account.insert(key.into(), value);
         put("version", env!("CARGO_PKG_VERSION").into());
-        put("method", "sppm".into());
+        put("method", self.settings.method.name().into());
         put("seed", self.settings.seed.into());
         put("iterations", self.iterations.into());
         put("light_paths", self.light_paths.into());

@@ -1,5 +1,6 @@
 //! What a render is asked to do.
 
+use super::method::Method;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::rule::memoryless;
 use crate::transport::MAX_LEVELS;
@@ -42,9 +43,11 @@ impl Levels {
     }
 }
 
-/// Settings of a progressive photon render.
+/// Settings of a render.
 #[derive(Clone, Debug)]
 pub struct Settings {
+    /// How light is found.
+    pub method: Method,
     /// Seed.
     pub seed: u64,
     /// Light paths per iteration.
@@ -70,6 +73,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings {
+            method: Method::Sppm,
             seed: 0,
             photons: DEFAULT_PHOTONS,
             levels: Levels::new(5),

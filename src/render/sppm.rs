@@ -3,8 +3,9 @@
 //! An iteration traces light paths, builds a photon map, and then two eye paths per pixel that share nothing but
 //! the photons: one measures level 1, the other levels 2 and up, each set of levels with one query per vertex.
 
-use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
-use super::result::{Phases, Rendered, relative_error};
+use super::control::cpu_seconds;
+use super::drive::{Iterate, Work};
+use super::result::Phases;
 use super::settings::Settings;
 use crate::camera::{Camera, par_pixels};
 use crate::estimator::bandwidth::initial_bandwidths;
@@ -81,108 +82,53 @@ fn keep_first_hit(eye: &Eye<'_>, pixel: &mut Pixel, measure: &EyeMeasure) {
     }
 }
 
-/// Renders. `observe` is called after every iteration and may stop the render; it also gets the pixels, to show or save them.
-pub fn sppm(
-    scene: &Scene,
-    camera: &Camera,
-    settings: &Settings,
-    mut observe: impl FnMut(&Progress, &[Pixel]) -> Control,
-) -> Rendered {
-    let clock = Clock::start();
-    let cpu_start = cpu_seconds();
-    let (width, height) = camera.size();
-    let mut phases = Phases::default();
-    let surroundings = Surroundings::new(scene, camera.position());
-    let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
-    let pilot = if matches!(settings.initial, InitialBandwidth::Nearest(_)) {
-        let pass = LightPass::new(settings.seed, 0, Domain::PilotLight, settings.photons, settings.max_depth);
-        PhotonMap::build(trace_photons(scene, &surroundings, &pass))
-    } else {
-        PhotonMap::build(Vec::new())
-    };
-    let bandwidths = initial_bandwidths(&eye, settings.initial, settings.seed, &pilot);
-    drop(pilot);
-    let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
-    phases.pilot = cpu_seconds() - cpu_start;
-    let pilot_seconds = clock.seconds();
+/// The passes of a render.
+pub(super) struct Sppm<'a> {
+    eye: Eye<'a>,
+    settings: &'a Settings,
+    surroundings: &'a Surroundings,
+}
 
-    let mut history = Vec::new();
-    let mut next_record = 1u64;
-    let (mut done, mut light_paths, mut stop) = (0u64, 0u64, StopReason::Iterations);
-    let mut iteration = settings.shard.index;
-    while settings.iterations.is_none_or(|n| iteration < n) {
+impl<'a> Sppm<'a> {
+    /// Nothing done yet.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        surroundings: &'a Surroundings,
+    ) -> Sppm<'a> {
+        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
+        Sppm { eye, settings, surroundings }
+    }
+
+    fn light_pass(&self, i: u64, domain: Domain) -> LightPass {
+        let Settings { seed, photons, max_depth, .. } = *self.settings;
+        LightPass::new(seed, i, domain, photons, max_depth)
+    }
+}
+
+impl Iterate for Sppm<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        let Settings { initial, seed, .. } = *self.settings;
+        let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
+            trace_photons(self.eye.scene, self.surroundings, &self.light_pass(0, Domain::PilotLight))
+        } else {
+            Vec::new()
+        };
+        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &PhotonMap::build(pilot));
+        bandwidths.into_iter().map(Pixel::new).collect()
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let t0 = cpu_seconds();
-        // Iterations count from 1; pass 0 is the pilot's.
-        let i = iteration + 1;
-        let pass = LightPass::new(settings.seed, i, Domain::Light, settings.photons, settings.max_depth);
-        let photons = trace_photons(scene, &surroundings, &pass);
+        let photons = trace_photons(self.eye.scene, self.surroundings, &self.light_pass(i, Domain::Light));
         let t1 = cpu_seconds();
         let map = PhotonMap::build(photons);
         let t2 = cpu_seconds();
-        eye_pass(&eye, settings, i, &map, &mut pixels);
-        let seconds = clock.seconds();
+        eye_pass(&self.eye, self.settings, i, &map, pixels);
         phases.light += t1 - t0;
         phases.map += t2 - t1;
         phases.eye += cpu_seconds() - t2;
-        done += 1;
-        light_paths += u64::from(settings.photons);
-        iteration += settings.shard.count;
-
-        let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
-        // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
-        let record = done >= next_record || Some(done) == total;
-        let error =
-            if record || settings.target_error.is_some() { relative_error(&pixels, settings.levels) } else { None };
-        if record {
-            next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
-            let cpu_seconds = cpu_seconds() - cpu_start;
-            history.push(History { seconds, cpu_seconds, iterations: done, light_paths, error });
-        }
-        let per_iteration = (seconds - pilot_seconds) / done as f64;
-        let by_count = total.map(|n| (n - done) as f64 * per_iteration);
-        let by_time = settings.time.map(|t| (t - seconds).max(0.0));
-        let remaining = match (by_count, by_time) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        };
-        let error = error.or_else(|| history.last().and_then(|h| h.error));
-        let progress = Progress {
-            iteration: done,
-            iterations: total,
-            seconds,
-            remaining,
-            light_paths,
-            photons: map.photons().len(),
-            error,
-        };
-        if observe(&progress, &pixels) == Control::Stop {
-            stop = StopReason::Interrupted;
-            break;
-        }
-        if settings.time.is_some_and(|t| seconds >= t) {
-            stop = StopReason::Time;
-            break;
-        }
-        if settings.target_error.is_some_and(|e| error.is_some_and(|x| x <= e)) {
-            stop = StopReason::Error;
-            break;
-        }
-    }
-    let seconds = clock.seconds();
-    if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels);
-        history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
-    }
-    Rendered {
-        width,
-        height,
-        pixels,
-        settings: settings.clone(),
-        iterations: done,
-        light_paths,
-        seconds,
-        phases,
-        history,
-        stop,
+        Work { light_paths: u64::from(self.settings.photons), photons: map.photons().len() }
     }
 }

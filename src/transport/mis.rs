@@ -14,6 +14,9 @@
 
 use crate::light::EmissionDensity;
 
+/// Directions nearer to a surface (cosine) than this count as if they were this far from it.
+const LEAST_COSINE: f32 = 1e-6;
+
 /// `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: how many merges there are for a connection, per unit of density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eta(pub f32);
@@ -92,7 +95,8 @@ impl MisState {
     #[must_use]
     #[inline]
     pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
-        let inverse = 1.0 / cos;
+        // A ray along the surface must not make sums that are not numbers.
+        let inverse = 1.0 / cos.max(LEAST_COSINE);
         MisState {
             d_vcm: self.d_vcm * distance2 * inverse,
             plain: self.plain * inverse,

@@ -3,7 +3,7 @@
 //! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/figures`.
 
 use caustique::estimator::InitialBandwidth;
-use caustique::render::{Control, Levels, Settings, peak_memory, sppm};
+use caustique::render::{Control, Levels, Settings, peak_memory, render};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
 
@@ -32,7 +32,7 @@ fn main() {
                 initial: InitialBandwidth::Nearest(*k),
                 ..Settings::default()
             };
-            let rendered = sppm(&scene, &camera, &settings, |_, _| Control::Continue);
+            let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
             let n = f64::from(rounds) * 2.0;
             let p = rendered.phases;
             for (sum, x) in phases[v].iter_mut().zip([p.light, p.map, p.eye]) {

@@ -7,7 +7,7 @@ mod support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Control, Levels, Method, Settings, paths};
+use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{Description, View};
 use support::scenes::{add, build, look_at, matte, mirror, quad, sphere};
 
@@ -37,6 +37,7 @@ fn main() {
         [(Method::Path, 1), (Method::Light, 1), (Method::Bdpt, 1), (Method::Bpm, 1), (Method::Vcm, 1), (Method::Vcm, 5)]
     {
         let settings = Settings {
+            method,
             initial: InitialBandwidth::Footprint,
             levels: Levels::new(levels),
             alpha: 0.75,
@@ -44,7 +45,7 @@ fn main() {
             ..Settings::default()
         };
         let mut photons = 0;
-        let rendered = paths(&scene, &camera, &settings, method, |progress, _| {
+        let rendered = render(&scene, &camera, &settings, |progress, _| {
             photons = progress.photons;
             Control::Continue
         });

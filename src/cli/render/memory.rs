@@ -1,17 +1,28 @@
 //! Whether a render fits into memory, asked before it begins.
 
-use super::options::RenderArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
+use caustique::render::Settings;
+use caustique::transport::EyeMeasure;
 use std::mem::size_of;
 
 /// Bytes per light path: the photons that a path leaves on average, in the list and in the map.
 const PER_LIGHT_PATH: u64 = 150;
+/// The same where photons carry what their weights are made of, and every bounce leaves one.
+const PER_MERGED_PATH: u64 = 800;
 
 /// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
-fn needed((width, height): (u32, u32), channels: usize, photons: u32) -> u64 {
-    let per_pixel = (size_of::<Pixel>() + channels * size_of::<f32>()) as u64;
-    u64::from(width) * u64::from(height) * per_pixel + u64::from(photons) * PER_LIGHT_PATH
+fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> u64 {
+    let pixels = u64::from(width) * u64::from(height);
+    let eye_paths = 1 + u64::from(settings.levels.two_paths);
+    let (method, measure) = (settings.method, size_of::<EyeMeasure>() as u64);
+    let (per_path, photons) = match (method.counts_photons(), method.has_bandwidths()) {
+        (true, _) => (0, u64::from(settings.photons) * PER_LIGHT_PATH),
+        (false, true) => (measure + PER_MERGED_PATH, 0),
+        (false, false) => (measure, 0),
+    };
+    let per_pixel = (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
+    pixels * per_pixel + photons
 }
 
 /// Bytes that the system can give without swapping; `None` where it does not tell.
@@ -25,15 +36,19 @@ fn available() -> Option<u64> {
 ///
 /// # Errors
 /// They need more memory than there is.
-pub fn check(args: &RenderArgs, size: (u32, u32), channels: usize) -> Result<()> {
-    let needed = needed(size, channels, args.photons);
+pub fn check(settings: &Settings, size: (u32, u32), channels: usize) -> Result<()> {
+    let needed = needed(size, channels, settings);
     let Some(available) = available().filter(|available| needed > *available) else { return Ok(()) };
     let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+    let paths = if settings.method.counts_photons() {
+        format!(" and {} light paths an iteration", settings.photons)
+    } else {
+        format!(" with --method {}", settings.method.name())
+    };
     let cause = format!(
-        "{} x {} pixels and {} light paths an iteration need about {:.1} GiB of memory, {:.1} GiB are available",
+        "{} x {} pixels{paths} need about {:.1} GiB of memory, {:.1} GiB are available",
         size.0,
         size.1,
-        args.photons,
         gib(needed),
         gib(available)
     );
@@ -44,11 +59,16 @@ pub fn check(args: &RenderArgs, size: (u32, u32), channels: usize) -> Result<()>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use caustique::render::Method;
 
     #[test]
     fn the_largest_picture_does_not_overflow() {
-        let one = needed((1, 1), 93, 0);
+        let none = Settings { photons: 0, ..Settings::default() };
+        let some = Settings { photons: 1000, ..Settings::default() };
+        let one = needed((1, 1), 93, &none);
         assert!(one > 93 * 4);
-        assert_eq!(needed((1 << 16, 1 << 16), 93, 1000), (one << 32) + 150_000);
+        assert_eq!(needed((1 << 16, 1 << 16), 93, &some), (one << 32) + 150_000);
+        let merged = Settings { method: Method::Vcm, ..none };
+        assert!(needed((1, 1), 93, &merged) > one);
     }
 }

@@ -17,7 +17,7 @@ use caustique::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use caustique::film::{Layer, LayerSet, Selection, describe, output as film};
 use caustique::image::exr::{self, Attributes};
 use caustique::render::output::shape;
-use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory, sppm};
+use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory};
 use caustique::scene::Scene;
 use options::Method;
 use rayon::prelude::*;
@@ -43,16 +43,17 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let scene = scene::read(&args.scene, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.view())?;
-    memory::check(args, camera.size(), channels(settings))?;
+    memory::check(settings, camera.size(), channels(settings))?;
     let plan = plan::plan(args, &scene, &camera);
-    let mut network = network(args)?;
+    let mut network = network(args, settings.levels.count)?;
     let talk = args.progress.for_people();
     let interrupt = Interrupt::listen()?;
     if talk && args.method == Method::Auto {
         say("method: sppm, chosen by auto");
     }
     let mut reporter = Reporter::new(args.progress, settings);
-    let rendered = sppm(&scene, &camera, settings, |progress, _| {
+    plan::tell_missed(args, &plan);
+    let rendered = caustique::render::render(&scene, &camera, settings, |progress, _| {
         reporter.report(progress);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     });
@@ -184,9 +185,9 @@ fn selection(args: &RenderArgs, settings: &Settings) -> Result<Selection> {
 }
 
 /// The combiner, if it is to run.
-fn network(args: &RenderArgs) -> Result<Option<Named>> {
+fn network(args: &RenderArgs, levels: usize) -> Result<Option<Named>> {
     // A single level leaves nothing to combine.
-    if args.no_combine || (args.levels == 1 && args.model.is_none()) {
+    if args.no_combine || (levels == 1 && args.model.is_none()) {
         return Ok(None);
     }
     let network = Named::open(args.model.as_deref().unwrap_or(DEFAULT_MODEL)).map_err(|mut error| {
@@ -196,10 +197,10 @@ fn network(args: &RenderArgs) -> Result<Option<Named>> {
         }
         error
     })?;
-    if network.levels() == args.levels {
+    if network.levels() == levels {
         return Ok(Some(network));
     }
-    let cause = format!("the network {} combines {} levels, not {}", network.name, network.levels(), args.levels);
+    let cause = format!("the network {} combines {} levels, not {}", network.name, network.levels(), levels);
     let error = Error::new(Kind::Usage, "command line", cause);
     Err(error.hint(format!("add --no-combine, or render with --levels {}", network.levels())))
 }

@@ -6,7 +6,6 @@ use crate::cli::progress::Form;
 use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
-use caustique::estimator::rule::memoryless;
 use caustique::render::{self, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_PHOTONS, Levels, Settings, Shard};
 use caustique::scene::{MAX_SIZE, View};
 use caustique::transport::MAX_LEVELS;
@@ -32,25 +31,25 @@ pub struct RenderArgs {
     /// How light is found
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
-    /// Light paths sent from the lights in each iteration: more give a smoother start, fewer faster iterations
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_PHOTONS, value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
-    pub photons: u32,
-    /// Bandwidth levels, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred, from which
-    /// the combiner makes one. The combiner that comes with the program takes 5
-    #[arg(long, value_name = "M", default_value_t = 5, value_parser = level_count, help_heading = "Method")]
-    pub levels: usize,
+    /// Light paths sent from the lights in each iteration of sppm: more give a smoother start, fewer faster iterations. The other
+    /// methods send one for every eye path, or none [default: 100000]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
+    pub photons: Option<u32>,
+    /// Bandwidth levels of sppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
+    /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
+    #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
+    pub levels: Option<usize>,
     /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
-    /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere
-    #[arg(long, value_name = "knn|footprint|R", default_value = "knn", help_heading = "Method")]
-    pub initial_bandwidth: BandwidthChoice,
+    /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
+    #[arg(long, value_name = "knn|footprint|R", help_heading = "Method")]
+    pub initial_bandwidth: Option<BandwidthChoice>,
     /// Photons within the largest bandwidth to begin with, 1 to 1024 [default: 20, with one level 10]
     #[arg(long, value_name = "K", value_parser = value_parser!(u32).range(1..=1024), help_heading = "Method")]
     pub knn: Option<u32>,
     /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
-    /// shrinks [default: 2/3]
-    #[arg(long, value_name = "A", default_value_t = memoryless::ALPHA, hide_default_value = true,
-          value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Method")]
-    pub alpha: f64,
+    /// shrinks [default: 2/3; bpm and vcm: 0.75]
+    #[arg(long, value_name = "A", value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Method")]
+    pub alpha: Option<f64>,
     /// How bandwidths shrink: 'memoryless' by the iteration's number alone
     #[arg(long, value_enum, default_value_t = RadiusRule::Memoryless, help_heading = "Method")]
     pub radius_rule: RadiusRule,
@@ -125,8 +124,32 @@ pub struct RenderArgs {
 pub enum Method {
     /// Whatever suits the scene; so far that is sppm
     Auto,
+    /// Path tracing
+    Path,
+    /// Light tracing: what mirrors and clear glass show stays black
+    Light,
+    /// Bidirectional path tracing
+    Bdpt,
     /// Stochastic progressive photon mapping
     Sppm,
+    /// Bidirectional photon mapping: merging alone
+    Bpm,
+    /// Vertex connection and merging
+    Vcm,
+}
+
+impl Method {
+    /// The method that renders.
+    pub fn chosen(self) -> render::Method {
+        match self {
+            Method::Auto | Method::Sppm => render::Method::Sppm,
+            Method::Path => render::Method::Path,
+            Method::Light => render::Method::Light,
+            Method::Bdpt => render::Method::Bdpt,
+            Method::Bpm => render::Method::Bpm,
+            Method::Vcm => render::Method::Vcm,
+        }
+    }
 }
 
 /// Rules by which bandwidths shrink.
@@ -202,15 +225,36 @@ impl RenderArgs {
         View { camera: self.camera.clone(), width: self.width, height: self.height }
     }
 
+    /// Errors: options that say nothing to the method.
+    fn check_method(&self, method: render::Method) -> Result<()> {
+        let given = [
+            (self.photons.is_some() && !method.counts_photons(), "--photons"),
+            (self.levels.is_some_and(|m| m > 1) && !method.has_levels(), "--levels"),
+            (self.knn.is_some() && !method.counts_photons(), "--knn"),
+            (self.initial_bandwidth.is_some() && !method.has_bandwidths(), "--initial-bandwidth"),
+            (
+                self.initial_bandwidth == Some(BandwidthChoice::Knn) && !method.counts_photons(),
+                "--initial-bandwidth knn",
+            ),
+            (self.alpha.is_some() && !method.has_bandwidths(), "--alpha"),
+        ];
+        let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
+        let cause = format!("{option} has no effect with --method {}", method.name());
+        Err(Error::new(Kind::Usage, "command line", cause).hint(format!("leave {option} out, or choose --method sppm")))
+    }
+
     /// The render asked for.
     ///
     /// # Errors
     /// Options that contradict each other.
     pub fn settings(&self) -> Result<Settings> {
-        let levels = Levels::new(self.levels);
-        let initial = match (self.initial_bandwidth, self.knn) {
+        let method = self.method.chosen();
+        self.check_method(method)?;
+        let levels = Levels::new(self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 }));
+        let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
+        let initial = match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
             (BandwidthChoice::Knn, k) => {
-                let default = if self.levels > 1 { DEFAULT_KNN.0 } else { DEFAULT_KNN.1 };
+                let default = if levels.count > 1 { DEFAULT_KNN.0 } else { DEFAULT_KNN.1 };
                 InitialBandwidth::Nearest(k.map_or(default, |k| k as usize))
             }
             (_, Some(_)) => {
@@ -229,11 +273,12 @@ impl RenderArgs {
             return Err(Error::new(Kind::Usage, "command line", cause).hint("use fewer shards or more --iterations"));
         }
         Ok(render::Settings {
+            method,
             seed: self.seed,
-            photons: self.photons,
+            photons: self.photons.unwrap_or(DEFAULT_PHOTONS),
             levels,
             initial,
-            alpha: self.alpha,
+            alpha: self.alpha.unwrap_or(method.alpha()),
             max_depth: self.max_depth.unwrap_or(u32::MAX),
             iterations,
             time: self.time,

@@ -1,9 +1,11 @@
 //! The plan in the header: the method and why, and for each effect whether the scene calls for it and whether it is simulated.
 
 use super::options::{Method, RenderArgs};
+use crate::cli::say;
 use caustique::camera::Camera;
 use caustique::light::Emitter;
 use caustique::material::{Material, MediumParameters};
+use caustique::render;
 use caustique::scene::Scene;
 use serde_json::{Value, json};
 
@@ -32,6 +34,7 @@ pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
     let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.sigma_s.max_element() > 0.0);
     let scattering = scatters(&scene.medium) || worn.iter().any(|material| scatters(&material.medium));
 
+    let method = args.method.chosen();
     // Segments of the shortest path that shows it; `--max-depth` cuts longer ones.
     let deep = |segments: u32| args.max_depth.is_none_or(|most| most >= segments);
     let surfaces = lit(when(!worn.is_empty(), "light falls on surfaces"));
@@ -40,8 +43,8 @@ pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
         ("direct", surfaces.clone(), deep(2)),
         ("indirect", surfaces, deep(3)),
         ("glossy", lit(by_material(narrow)), deep(2)),
-        ("caustic", caustic.clone(), deep(3)),
-        ("sds", caustic, deep(4)),
+        ("caustic", caustic.clone(), deep(3) && reaches(method, "caustic", scene)),
+        ("sds", caustic, deep(4) && reaches(method, "sds", scene)),
         // Media absorb; what they scatter is lost.
         ("volume", media.collect(), !scattering),
         ("dispersion", by_material(|m| m.transmission > 0.0 && m.dispersion > 0.0), false),
@@ -58,9 +61,40 @@ pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
         Method::Auto => {
             "auto: the one method here that reaches every class of light paths, caustics behind glass and in mirrors too"
         }
-        Method::Sppm => "asked for",
+        _ => "asked for",
     };
-    json!({"method": "sppm", "because": because, "effects": effects})
+    json!({"method": method.name(), "because": because, "effects": effects})
+}
+
+/// Whether the method finds all light of such an effect. A lamp without size is not hit by any path: without photons it shows no light behind
+/// glass, where it could be neither connected to nor run into.
+fn reaches(method: render::Method, effect: &str, scene: &Scene) -> bool {
+    let sizeless = scene.lights.emitters().iter().any(Emitter::is_delta);
+    match (method, effect) {
+        (render::Method::Path, _) => !sizeless,
+        (render::Method::Light, "sds") => false,
+        (render::Method::Bdpt, "sds") => !sizeless,
+        _ => true,
+    }
+}
+
+/// Warns of effects that the scene calls for and the method chosen does not find.
+pub fn tell_missed(args: &RenderArgs, plan: &Value) {
+    let method = args.method.chosen();
+    for effect in plan["effects"].as_array().into_iter().flatten() {
+        let name = effect["name"].as_str().unwrap_or_default();
+        if matches!(name, "caustic" | "sds")
+            && effect["present"] == true
+            && effect["simulated"] == false
+            && args.max_depth.is_none()
+        {
+            let scene = args.scene.path.display();
+            say(&format!(
+                "warning: {scene}: --method {} does not find all light of the effect '{name}'",
+                method.name()
+            ));
+        }
+    }
 }
 
 /// Reflects or bends light into narrow lobes.

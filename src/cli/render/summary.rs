@@ -37,14 +37,12 @@ impl Summary {
 
     /// For people: `combined` is the network that ran and its wall-clock seconds.
     pub fn tell(&self, combined: Option<(&str, f64)>) {
-        let rate = count(self.light_paths as f64 / self.seconds.max(1e-9));
-        say(&format!(
-            "{} iterations in {} ({}), {} light paths, {rate} a second",
-            self.iterations,
-            duration(self.seconds),
-            self.phases,
-            count(self.light_paths as f64)
-        ));
+        let mut line = format!("{} iterations in {} ({})", self.iterations, duration(self.seconds), self.phases);
+        if self.light_paths > 0 {
+            let rate = count(self.light_paths as f64 / self.seconds.max(1e-9));
+            line += &format!(", {} light paths, {rate} a second", count(self.light_paths as f64));
+        }
+        say(&line);
         if let Some(error) = self.error {
             say(&format!("estimated relative error before combining {}", percent(error)));
         }

@@ -1,0 +1,73 @@
+//! The methods, and what of a render's shape follows from the one chosen.
+
+use crate::camera::Camera;
+use crate::estimator::rule::memoryless;
+use crate::transport::Strategies;
+use serde::Serialize;
+
+/// How light is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Path tracing with next-event estimation.
+    Path,
+    /// Light tracing with connections to the camera; of eye paths only what mirrors and clear glass show of lights.
+    Light,
+    /// Bidirectional path tracing.
+    Bdpt,
+    /// Stochastic progressive photon mapping.
+    #[default]
+    Sppm,
+    /// Bidirectional photon mapping: merging at all vertices, nothing else.
+    Bpm,
+    /// Vertex connection and merging.
+    Vcm,
+}
+
+impl Method {
+    /// Its name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Path => "path",
+            Method::Light => "light",
+            Method::Bdpt => "bdpt",
+            Method::Sppm => "sppm",
+            Method::Bpm => "bpm",
+            Method::Vcm => "vcm",
+        }
+    }
+
+    /// The strategies of a bidirectional method.
+    pub(super) fn strategies(self, camera: &Camera) -> Option<Strategies> {
+        match self {
+            Method::Path | Method::Sppm => None,
+            Method::Light => Some(Strategies::LIGHT),
+            Method::Bdpt => Some(Strategies::BDPT),
+            Method::Bpm => Some(Strategies::BPM),
+            Method::Vcm => Some(Strategies::vcm(camera.connects())),
+        }
+    }
+
+    /// Whether its bandwidths are several levels.
+    pub fn has_levels(self) -> bool {
+        matches!(self, Method::Sppm | Method::Vcm)
+    }
+
+    /// Whether it has bandwidths.
+    pub fn has_bandwidths(self) -> bool {
+        matches!(self, Method::Sppm | Method::Bpm | Method::Vcm)
+    }
+
+    /// Whether the number of light paths is a setting; the other methods have one for every eye path, or none.
+    pub fn counts_photons(self) -> bool {
+        self == Method::Sppm
+    }
+
+    /// Reduction rate of the memoryless rule where none is asked for \[Georgiev et al. 2012 for merging with connections\].
+    pub fn alpha(self) -> f64 {
+        match self {
+            Method::Bpm | Method::Vcm => 0.75,
+            _ => memoryless::ALPHA,
+        }
+    }
+}
