@@ -106,6 +106,60 @@ fn the_header_has_the_plan_and_the_phases() {
     assert!((sum - total).abs() < 0.1, "{sum} of {total}");
 }
 
+/// Every method writes its own layers: levels and bandwidths where it has them, parts that sum to its image, and a plan that says what it
+/// cannot find.
+#[test]
+fn every_method_leaves_what_it_has() {
+    let folder = Folder::new();
+    let cases = [
+        ("path", 1, false, true),
+        ("light", 1, false, true),
+        ("bdpt", 1, false, true),
+        ("sppm", 5, true, false),
+        ("bpm", 1, true, false),
+        ("vcm", 5, true, false),
+    ];
+    let mut means = vec![];
+    for (method, levels, bandwidths, misses) in cases {
+        let options =
+            format!("render scene.glb --width 48 --height 36 -o {method}.exr --iterations 24 --method {method}");
+        let outcome = folder.run(&format!("{options} --progress none"));
+        assert_eq!(outcome.code, Some(0), "{method}: {}", outcome.stderr);
+        let warned = outcome.stderr.contains(&format!("--method {method} does not find all light of the effect 'sds'"));
+        assert_eq!(warned, misses, "{method}: {}", outcome.stderr);
+        let (set, header) = folder.read(&format!("{method}.exr"));
+        assert_eq!((&header["method"], &header["plan"]["method"]), (&method.into(), &method.into()));
+        assert_eq!(header["combined"].is_null(), levels == 1, "{method}");
+        for k in 1..=5 {
+            for (stem, there) in [("Level", true), ("Variance", true), ("Radius", bandwidths)] {
+                assert_eq!(set.get(&format!("{stem}{k}")).is_some(), there && k <= levels, "{method}: {stem}{k}");
+            }
+        }
+        let noisy = values(&set, "Noisy");
+        let parts = ["Direct", "Indirect", "Caustic", "Emission"].map(|name| values(&set, name));
+        for (i, noisy) in noisy.iter().enumerate() {
+            let sum: f32 = parts.iter().map(|part| part[i][1]).sum();
+            assert!(
+                (sum - noisy[1]).abs() <= 1e-5 * noisy[1].abs().max(1e-3),
+                "{method}, pixel {i}: {sum} {}",
+                noisy[1]
+            );
+        }
+        means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
+    }
+    // Those that find everything agree roughly here; closely in tests of their own.
+    assert!(means[3..].iter().all(|mean| (mean / means[3] - 1.0).abs() < 0.1), "{means:?}");
+
+    let idle = folder.run("render scene.glb -o out.exr --method vcm --photons 1000");
+    assert_eq!(
+        (idle.code, idle.stderr.as_str()),
+        (
+            Some(2),
+            "command line: --photons has no effect with --method vcm\nhint: leave --photons out, or choose --method sppm\n"
+        )
+    );
+}
+
 #[test]
 fn the_same_bytes_with_any_number_of_threads() {
     let folder = Folder::new();

@@ -73,9 +73,9 @@ fn errors_word_for_word() {
             help,
         ),
         (
-            &format!("{render} --method vcm"),
+            &format!("{render} --method teapot"),
             2,
-            "command line: invalid value 'vcm' for '--method <METHOD>' [possible values: auto, sppm]",
+            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, sppm, bpm, vcm]",
             help,
         ),
         (
@@ -164,7 +164,7 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     for option in ["--photons", "--exr-naming", "--target-error", "--strict", "--reproducible"] {
         assert!(help.stdout.contains(option), "{option}");
     }
-    for absent in ["--cppm", "--effects", "--checkpoint", "--kernel", "bdpt"] {
+    for absent in ["--cppm", "--effects", "--checkpoint", "--kernel", "appm"] {
         assert!(!help.stdout.contains(absent), "{absent}");
     }
     let commands = folder.run("--help").stdout;
