@@ -4,7 +4,7 @@ use super::output::{self, PictureArgs};
 use super::progress::duration;
 use super::say;
 use caustique::combine::{Combiner, LevelStack, Model, Runtime};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::Result;
 use caustique::film::{self, Layer, LayerSet, Naming, Plane, Role};
 use caustique::image::exr;
 use caustique::render::Clock;
@@ -56,7 +56,7 @@ impl Named {
 
     /// Combines the levels of `set` and makes the result its beauty; alpha stays. Returns what the header says about it.
     pub fn apply(&mut self, set: &mut LayerSet) -> Result<Value> {
-        let combined = self.combiner.run(&stack(set)?)?;
+        let combined = self.combiner.run(&LevelStack::of(set)?)?;
         let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
         set.layers.retain(|layer| layer.name != "Combined");
         let layer = match alpha {
@@ -69,30 +69,6 @@ impl Named {
         set.push(layer)?;
         Ok(json!({"model": self.name, "levels": self.levels(), "training": self.combiner.facts().training}))
     }
-}
-
-/// The layers that the combiner reads. Those that are missing are empty, which the combiner refuses by name.
-fn stack(set: &LayerSet) -> Result<LevelStack> {
-    let numbered = |stem: &str| {
-        let layers = (1..).map_while(|k| set.get(&format!("{stem}{k}")));
-        layers.map(Layer::triples).collect::<Vec<_>>()
-    };
-    let of_role = |role| set.find(role).map(Layer::triples).unwrap_or_default();
-    let levels = numbered("Level");
-    if levels.is_empty() {
-        let error = Error::new(Kind::Image, "", "the file has no bandwidth levels (Level1, Level2, ...)");
-        return Err(error.hint("render with --layers all"));
-    }
-    let depth = set.find(Role::Depth).and_then(|layer| layer.planes.first());
-    Ok(LevelStack {
-        width: set.width,
-        height: set.height,
-        levels,
-        variances: numbered("Variance"),
-        albedo: of_role(Role::Albedo),
-        normal: of_role(Role::Normal),
-        depth: depth.map(|plane| plane.values.clone()).unwrap_or_default(),
-    })
 }
 
 /// Names as Blender gives them back to ours. Layers with names that we cannot write are left out and returned.

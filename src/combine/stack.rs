@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::{Error, Kind, Result};
+use crate::film::{Layer, LayerSet, Role};
 
 /// The layers of one render that the combiner reads; every plane holds `width * height` pixels, rows from the top.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +25,33 @@ pub struct LevelStack {
 }
 
 impl LevelStack {
+    /// The layers that the combiner reads. Those that are missing are empty, which the combiner refuses by name.
+    ///
+    /// # Errors
+    /// There are no levels.
+    pub fn of(set: &LayerSet) -> Result<LevelStack> {
+        let numbered = |stem: &str| {
+            let layers = (1..).map_while(|k| set.get(&format!("{stem}{k}")));
+            layers.map(Layer::triples).collect::<Vec<_>>()
+        };
+        let of_role = |role| set.find(role).map(Layer::triples).unwrap_or_default();
+        let levels = numbered("Level");
+        if levels.is_empty() {
+            let error = Error::new(Kind::Image, "", "the file has no bandwidth levels (Level1, Level2, ...)");
+            return Err(error.hint("render with --layers all"));
+        }
+        let depth = set.find(Role::Depth).and_then(|layer| layer.planes.first());
+        Ok(LevelStack {
+            width: set.width,
+            height: set.height,
+            levels,
+            variances: numbered("Variance"),
+            albedo: of_role(Role::Albedo),
+            normal: of_role(Role::Normal),
+            depth: depth.map(|plane| plane.values.clone()).unwrap_or_default(),
+        })
+    }
+
     /// Checks that all planes are there, of one size, and that there are `expected` levels.
     pub(crate) fn check(&self, expected: usize) -> Result<()> {
         let pixels = self.width.checked_mul(self.height).unwrap_or(0);

@@ -2,8 +2,10 @@
 //!
 //! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/figures`.
 
+use caustique::camera::Camera;
+use caustique::combine::{Combiner, LevelStack, Model, Runtime};
 use caustique::estimator::InitialBandwidth;
-use caustique::render::{Control, Levels, Settings, peak_memory, render};
+use caustique::render::{Control, Levels, Settings, cpu_seconds, peak_memory, render};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
 
@@ -48,16 +50,43 @@ fn main() {
         let [light, map, eye] = phases[v];
         println!("{name:<30}{light:>8.3}{map:>8.3}{eye:>8.3}{:>8.3}{:>10.3}", all(v), seconds[v]);
     }
+    let combiner = combine(&scene, &camera);
+    println!("layers and combiner, once{:>47.3}", combiner);
     println!("five levels over one, both with two eye paths: {:+.1} %", (all(0) / all(1) - 1.0) * 100.0);
     println!("five levels over one on one eye path: {:+.1} %", (all(0) / all(2) - 1.0) * 100.0);
+    // What a whole render pays for levels and combiner, against the plain method: pilot and combiner once.
+    let whole = |v: usize, iterations: f64, once: f64| seconds[v] + once + iterations * all(v);
+    for iterations in [16.0, 64.0, 256.0, 1024.0] {
+        let (ours, plain) = (whole(0, iterations, combiner), whole(2, iterations, 0.0));
+        println!(
+            "{iterations:>6} iterations: {ours:.0} core-seconds with five levels and combiner, {plain:.0} with one level and one path: {:+.1} %",
+            (ours / plain - 1.0) * 100.0
+        );
+    }
     println!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30));
     let [light, map, eye] = phases[0];
     println!(
-        "{{\"light\": {light:.3}, \"map\": {map:.3}, \"eye\": {eye:.3}, \"all\": {:.3}, \"pilot\": {:.3}, \"one_level_two_paths\": {:.3}, \"one_level_one_path\": {:.3}, \"peak_gib\": {:.3}}}",
+        "{{\"light\": {light:.3}, \"map\": {map:.3}, \"eye\": {eye:.3}, \"all\": {:.3}, \"pilot\": {:.3}, \"one_level_two_paths\": {:.3}, \"one_level_one_path\": {:.3}, \"combiner\": {combiner:.3}, \"peak_gib\": {:.3}}}",
         all(0),
         seconds[0],
         all(1),
         all(2),
         peak_memory() as f64 / f64::from(1 << 30)
     );
+}
+
+/// Core-seconds of the combiner with all that it reads, after a render of two iterations.
+fn combine(scene: &Scene, camera: &Camera) -> f64 {
+    let settings = Settings { iterations: Some(2), ..Settings::default() };
+    let rendered = render(scene, camera, &settings, |_, _| Control::Continue);
+    let runtime = Runtime::find().unwrap_or_else(|e| panic!("{e}"));
+    let model = Model::open("compact").unwrap_or_else(|e| panic!("{e}"));
+    let mut combiner = Combiner::new(&model, &runtime).unwrap_or_else(|e| panic!("{e}"));
+    let start = cpu_seconds();
+    let set = rendered.layers(false, |_| true).unwrap_or_else(|e| panic!("{e}"));
+    drop(rendered);
+    let stack = LevelStack::of(&set).unwrap_or_else(|e| panic!("{e}"));
+    let combined = combiner.run(&stack).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(combined.len(), set.pixels());
+    cpu_seconds() - start
 }
