@@ -76,7 +76,7 @@ def spline(points, steps=7):
 
 outline, lining = spline(outer), spline(inner)
 outline[-1], lining[0] = (0.0, 0.1), (0.0, 0.095)
-casing = b.lathe("casing", outline + lining + [outline[0]], 320, sharp=60)
+casing = b.lathe("casing", outline + lining, 320, closed=True, sharp=60)
 for vertex in casing.vertices:
     x, y, z = vertex.co
     radius, turn = math.hypot(x, y), math.atan2(y, x)
