@@ -8,7 +8,7 @@
 use super::direct::{balance, direct_light};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
-use super::segment::{Known, look};
+use super::segment::Known;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
@@ -267,11 +267,12 @@ impl Eye<'_> {
             })
         });
         let hits = self.scene.tracer.intersect8(&rays);
+        // Looked at together here, their memory is there when one path after the other asks for it.
         let triangles = hits.iter().flatten().map(|hit| (hit.instance, hit.primitive));
         std::hint::black_box(self.scene.shapes.touch(triangles));
         for (start, hit) in starts.iter_mut().zip(hits) {
             if let Some((start, _)) = start {
-                start.first = look(self.scene, hit);
+                start.first = hit.map_or(Known::Nothing, Known::Hit);
             }
         }
         starts

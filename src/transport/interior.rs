@@ -17,10 +17,10 @@ const MAX_NESTED: usize = 6;
 /// Surfaces looked at to find where a path starts; a scene with more along one ray has walls enough around the point.
 const MAX_SURROUNDING_HITS: u32 = 1000;
 
-/// The solids a path is inside of: (object, material), in order of entry.
+/// The solids a path is inside of, in order of entry: each by the instance through whose surface it was entered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Interior {
-    inside: [(u32, u32); MAX_NESTED],
+    inside: [u32; MAX_NESTED],
     len: u8,
 }
 
@@ -36,7 +36,7 @@ pub struct Crossing {
 }
 
 impl Interior {
-    fn entries(&self) -> &[(u32, u32)] {
+    fn entries(&self) -> &[u32] {
         &self.inside[..usize::from(self.len)]
     }
 
@@ -50,7 +50,7 @@ impl Interior {
         let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
         let mut ray = Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 };
         let mut entered: Vec<u32> = Vec::new();
-        let mut left: Vec<(u32, u32)> = Vec::new();
+        let mut left: Vec<u32> = Vec::new();
         for _ in 0..MAX_SURROUNDING_HITS {
             let Some(hit) = scene.tracer.intersect(&ray) else { break };
             let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { break };
@@ -64,7 +64,7 @@ impl Interior {
             } else if let Some(at) = entered.iter().position(|&o| o == object) {
                 entered.swap_remove(at);
             } else {
-                left.push((object, surface.material));
+                left.push(surface.instance);
             }
         }
         // What is left last was entered first.
@@ -78,9 +78,9 @@ impl Interior {
     /// Material that fills the space here; `None` is the open space.
     #[inline]
     pub fn material(&self, scene: &Scene) -> Option<u32> {
-        let priority = |&(_, m): &(u32, u32)| scene.materials.list[m as usize].priority;
+        let material = |instance: &u32| scene.shapes.instances[*instance as usize].material;
         // `max_by_key` keeps the last of equals: the one entered last.
-        self.entries().iter().max_by_key(|e| priority(e)).map(|&(_, m)| m)
+        self.entries().iter().map(material).max_by_key(|&m| scene.materials.list[m as usize].priority)
     }
 
     /// Absorption and scattering here.
@@ -98,20 +98,21 @@ impl Interior {
         ior(scene, self.material(scene))
     }
 
-    /// What crossing the surface of `object`, made of `material`, means; `entering`: from its front to its back.
+    /// What crossing the surface of `instance` means; `entering`: from its front to its back.
     #[inline]
-    pub fn crossing(&self, scene: &Scene, object: u32, material: u32, entering: bool) -> Crossing {
+    pub fn crossing(&self, scene: &Scene, instance: u32, entering: bool) -> Crossing {
+        let object_of = |instance: u32| scene.shapes.instances[instance as usize].object;
         let mut interior = *self;
         let mut before = self.material(scene);
         if entering {
             let at = usize::from(interior.len).min(MAX_NESTED - 1);
-            interior.inside[at] = (object, material);
+            interior.inside[at] = instance;
             interior.len = at as u8 + 1;
-        } else if let Some(at) = self.entries().iter().rposition(|e| e.0 == object) {
+        } else if let Some(at) = self.entries().iter().rposition(|&e| object_of(e) == object_of(instance)) {
             interior.inside.copy_within(at + 1.., at);
             interior.len -= 1;
         } else {
-            before = Some(material);
+            before = Some(scene.shapes.instances[instance as usize].material);
         }
         Crossing { before, after: interior.material(scene), interior }
     }

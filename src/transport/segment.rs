@@ -33,8 +33,8 @@ pub enum Known {
     Unknown,
     /// Nothing.
     Nothing,
-    /// This triangle at this distance; no surface if it has no area.
-    Hit(f32, Option<Surface>),
+    /// This triangle.
+    Hit(Hit),
 }
 
 /// How a ray ended.
@@ -79,8 +79,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
         return Boundary::Scattering(material.ior / around, None);
     }
     let entering = direction.dot(surface.ng) < 0.0;
-    let object = scene.shapes.instances[surface.instance as usize].object;
-    let crossing = interior.crossing(scene, object, surface.material, entering);
+    let crossing = interior.crossing(scene, surface.instance, entering);
     // What gives light of its own is there whatever is behind it.
     if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
@@ -94,15 +93,6 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
         }
     }
     Boundary::Scattering(eta, Some(crossing))
-}
-
-/// The surface hit.
-#[inline(always)]
-pub fn look(scene: &Scene, hit: Option<Hit>) -> Known {
-    match hit {
-        None => Known::Nothing,
-        Some(hit) => Known::Hit(hit.t, scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)),
-    }
 }
 
 /// Follows a ray from inside `interior` to the next surface that scatters.
@@ -121,19 +111,22 @@ pub fn next_surface(
     let mut distance = 0.0;
     for crossed in 0..MAX_NULL_CROSSINGS {
         let met = match known {
-            Known::Nothing | Known::Hit(..) if crossed == 0 => *known,
-            _ => look(scene, scene.tracer.intersect(&ray)),
+            Known::Nothing if crossed == 0 => None,
+            Known::Hit(hit) if crossed == 0 => Some(*hit),
+            _ => scene.tracer.intersect(&ray),
         };
-        let Known::Hit(t, surface) = met else {
+        let Some(hit) = met else {
             if scene.survey.media {
                 transmittance *= absorb(scene, &interior, f32::INFINITY);
             }
             return End::Escaped(transmittance);
         };
-        let Some(surface) = surface else { return End::Lost };
-        distance += t;
+        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
+            return End::Lost;
+        };
+        distance += hit.t;
         if scene.survey.media {
-            transmittance *= absorb(scene, &interior, t);
+            transmittance *= absorb(scene, &interior, hit.t);
         }
         match boundary(scene, &surface, &interior, direction) {
             Boundary::Scattering(eta, crossing) => {
