@@ -4,6 +4,7 @@
 //! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/` of the current directory or of a
 //! folder above the executable (where `scripts/setup.sh` puts it).
 
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -114,10 +115,13 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     let mut refusals = Vec::new();
     for candidate in candidates {
         // `init_from` reports failures; the route through ORT_DYLIB_PATH panics.
-        match ort::init_from(candidate) {
+        let quiet = Quiet::new();
+        let loaded = ort::init_from(candidate);
+        match loaded {
             Ok(builder) => {
                 let path = located(candidate);
                 let environment = builder.with_name("caustique").with_telemetry(false).build();
+                drop(quiet);
                 let environment = environment.map_err(|cause| Error::new(Kind::Library, path.display(), cause))?;
                 return Ok(Runtime { environment, path });
             }
@@ -131,6 +135,28 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
         Some(first) => format!("the shared library cannot be used: {first}"),
     };
     Err(Error::new(Kind::Library, "ONNX Runtime", cause).hint(HINT))
+}
+
+/// While it lives, what is written to stderr is lost. Debian 13's ONNX Runtime is linked to a libonnx that has registered all operators already,
+/// and complains of each of them, past its own logger, some 500 lines each time it is loaded. Errors come back as values all the same.
+struct Quiet(Option<OwnedFd>);
+
+impl Quiet {
+    fn new() -> Quiet {
+        let nowhere = std::fs::OpenOptions::new().write(true).open("/dev/null");
+        let saved = rustix::io::fcntl_dupfd_cloexec(rustix::stdio::stderr(), 3);
+        let (Ok(nowhere), Ok(saved)) = (nowhere, saved) else { return Quiet(None) };
+        Quiet(rustix::stdio::dup2_stderr(nowhere).is_ok().then_some(saved))
+    }
+}
+
+impl Drop for Quiet {
+    fn drop(&mut self) {
+        if let Some(saved) = self.0.take() {
+            // Nothing is left to tell a failure to.
+            let _ = rustix::stdio::dup2_stderr(saved);
+        }
+    }
 }
 
 /// The real file behind a candidate; for a bare name, the file that this process has mapped.
