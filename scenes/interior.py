@@ -120,7 +120,7 @@ seat, back = b.box("seat cushion", (1.05, 0.72, 0.17), 0.065, 8), b.box("back cu
 for side in (-1, 1):
     b.thing("seat cushion", seat, linen, (SOFA[0] + side * 0.53, SOFA[1] - 0.09, 0.43))
     b.thing("back cushion", back, linen, (SOFA[0] + side * 0.53, SOFA[1] + 0.22, 0.69), (-10, 0, 0))
-foot = b.lathe("foot", b.rounded([(0, 0), (0.014, 0), (0.024, 0.15), (0, 0.15)], 0.004), 32)
+foot = b.lathe("foot", b.rounded([(0, 0), (0.014, 0), (0.024, 0.15), (0, 0.15)], 0.004), 32, uv=0.8)
 for x in (-1.08, 1.08):
     for y in (-0.36, 0.36):
         b.thing("foot", foot, wood, (SOFA[0] + x, SOFA[1] + y, 0))
