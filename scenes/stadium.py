@@ -60,7 +60,7 @@ b.thing("plinth", b.box("plinth", (0.62, 0.62, 0.20), 0.012, 4), stone, (0, 0, 0
 b.thing("ball", b.sphere("ball", 0.05, 7), b.glass("glass", 1.52), (0, 0, 0.25005))
 
 # Stands in two tiers, stepped; seats in blocks of colour; a roof.
-lower = [(4.0, 0.0), (4.0, 1.2)]
+lower = [(4.0, 0.0)]
 for k in range(22):
     lower += [(4.0 + 0.85 * k, 1.2 + 0.42 * k), (4.85 + 0.85 * k, 1.2 + 0.42 * k)]
 upper = [(20.0, 13.5)]
