@@ -19,13 +19,16 @@ const FAR_FROM_ORIGIN: f64 = 8.0;
 /// Embree is missing, or out of memory.
 pub(super) fn build(mut description: Description, threads: usize) -> Result<Scene> {
     let mut warnings = std::mem::take(&mut description.warnings);
-    for light in &description.lights {
-        if light.radius > 0.0 && !matches!(light.kind, PunctualKind::Point) {
-            warnings.push(format!(
-                "light \"{}\": a radius is simulated for point lights only; it shines from a point",
-                light.name
-            ));
-        }
+    let mut sized = description.lights.iter().filter(|l| l.radius > 0.0 && !matches!(l.kind, PunctualKind::Point));
+    if let Some(first) = sized.next() {
+        let others = match sized.count() {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        warnings.push(format!(
+            "light \"{}\"{others}: a radius is simulated for point lights only; it shines from a point",
+            first.name
+        ));
     }
     for placed in &description.instances {
         let material = &description.materials[placed.material as usize];
