@@ -9,8 +9,8 @@ Exactly the same function, up to rounding:
     absorption in it                a homogeneous medium of albedo 0
     any mixture of the above        blendbsdf
 
-The same but for masking (Mitsuba's is separable, caustique's height-correlated for reflection) and the light that facets scatter
-more than once (Mitsuba drops it); see `lobes.py`:
+The same but for masking (Mitsuba's is separable, caustique's height-correlated for reflection), the light that facets scatter
+more than once (Mitsuba drops it) and what lies below rough facets; see `lobes.py`:
 
     metal                           principled, metallic 1: GGX with Schlick's reflectance
     rough glass                     roughdielectric
@@ -109,38 +109,40 @@ class Materials:
         strength = specular.get("specularFactor", 1.0)
         if strength not in (0.0, 1.0) or (strength and list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]):
             raise Unsupported(f"material {name}: specular strengths between 0 and 1, and colours")
+        if raw.get("alphaMode", "OPAQUE") != "OPAQUE":
+            raise Unsupported(f"material {name}: alpha")
+        metal = {"type": "twosided", "nested": self._metal(base, roughness)}
+        if metallic == 1.0:
+            return metal
         parts = []
         if share > 0.0:
             if not self.is_solid(mesh):
                 raise Unsupported(f"material {name}: thin walls (Mitsuba's also scatter back and forth inside)")
-            parts.append((share, self._glass(name, base, roughness, ior, strength)))
+            parts.append(self._glass(name, base, roughness, ior, strength))
         if share < 1.0:
             matte = {"type": "diffuse", "reflectance": base} if strength == 0.0 else self._matte(name, base, roughness, ior)
-            parts.append((1.0 - share, {"type": "twosided", "nested": matte}))
-        dielectric = _blend(parts[0][1], parts[1][1], parts[1][0]) if len(parts) == 2 else parts[0][1]
-        if metallic == 0.0:
-            chosen = dielectric
-        else:
-            metal = {"type": "twosided", "nested": self._metal(name, base, roughness)}
-            chosen = metal if metallic == 1.0 else _blend(dielectric, metal, metallic)
-        mode = raw.get("alphaMode", "OPAQUE")
-        if mode != "OPAQUE":
-            raise Unsupported(f"material {name}: alpha")
-        return chosen
+            parts.append({"type": "twosided", "nested": matte})
+        dielectric = parts[0] if len(parts) == 1 else _blend(parts[1], parts[0], share)
+        return dielectric if metallic == 0.0 else _blend(dielectric, metal, metallic)
 
     def _matte(self, name, base, roughness, ior):
         alpha = _plain(roughness, name) ** 2
-        common = {"diffuse_reflectance": base, "int_ior": float(ior), "ext_ior": 1.0, "nonlinear": False}
+        common = {"int_ior": float(ior), "ext_ior": 1.0, "nonlinear": False}
         if alpha < SMOOTH:
-            return {"type": "plastic", **common}
-        return {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, **common}
+            return {"type": "plastic", "diffuse_reflectance": base, **common}
+        rough = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, **common}
+        if not self.correct:
+            return {"diffuse_reflectance": base, **rough}
+        # Its facets alone.
+        nested = {"diffuse_reflectance": {"type": "rgb", "value": 0.0}, **rough}
+        return {"type": "corrected", "kind": "matte", "nested": nested, "alpha": alpha, "base": base, "ior": float(ior)}
 
-    def _metal(self, name, base, roughness):
+    def _metal(self, base, roughness):
         nested = {"type": "principled", "base_color": base, "metallic": 1.0, "roughness": roughness, "specular": 0.5}
         if not self.correct or not isinstance(roughness, float) or roughness**2 < SMOOTH:
             # A smooth mirror: principled's narrowest lobe, a thousandth of a radian wide.
             return nested
-        return {"type": "corrected", "nested": nested, "alpha": roughness**2, "base": base}
+        return {"type": "corrected", "kind": "metal", "nested": nested, "alpha": roughness**2, "base": base}
 
     def _glass(self, name, base, roughness, ior, strength):
         if strength != 1.0:
@@ -152,7 +154,7 @@ class Materials:
         nested = {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha, **common}
         if not self.correct:
             return nested
-        return {"type": "corrected", "nested": nested, "alpha": alpha, "base": base, "ior": float(ior)}
+        return {"type": "corrected", "kind": "glass", "nested": nested, "alpha": alpha, "base": base, "ior": float(ior)}
 
     def color(self, raw, info, factor):
         """A colour: factor times texture (sRGB)."""
@@ -164,24 +166,31 @@ class Materials:
         """One channel of a data texture times a factor; a number where the factor makes it one."""
         if factor == 0.0:
             return 0.0
+        texels = self._texels(info)[..., channel]
+        if texels.min() == texels.max():
+            return float(texels.min()) / 255 * factor
         return self._bitmap(info, lambda texels: texels[..., channel:channel + 1] * np.float32(factor))
+
+    def _texels(self, info):
+        """The bytes of a texture, RGBA."""
+        if info["index"] not in self.textures:
+            stream = mi.MemoryStream()
+            stream.write(self.scene.image(info["index"])[0])
+            stream.seek(0)
+            bitmap = mi.Bitmap(stream)
+            bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGBA, mi.Struct.Type.UInt8, bitmap.srgb_gamma())
+            self.textures[info["index"]] = np.array(bitmap)
+        return self.textures[info["index"]]
 
     def _bitmap(self, info, convert):
         transform = extension(info, "KHR_texture_transform") or {}
         if transform.get("texCoord", info.get("texCoord", 0)) != 0:
             raise Unsupported("second texture coordinates")
-        encoded, sampler = self.scene.image(info["index"])
-        if info["index"] not in self.textures:
-            stream = mi.MemoryStream()
-            stream.write(encoded)
-            stream.seek(0)
-            bitmap = mi.Bitmap(stream)
-            bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGBA, mi.Struct.Type.UInt8, bitmap.srgb_gamma())
-            self.textures[info["index"]] = np.array(bitmap)
+        sampler = self.scene.image(info["index"])[1]
         wraps = {WRAPS[sampler.get(key, 10497)] for key in ("wrapS", "wrapT")}
         if len(wraps) > 1:
             raise Unsupported("two wrap modes on one texture")
-        texels = self.textures[info["index"]].astype(np.float32) / np.float32(255)
+        texels = self._texels(info).astype(np.float32) / np.float32(255)
         scale, offset = transform.get("scale", [1, 1]), transform.get("offset", [0, 0])
         sine, cosine = np.sin(transform.get("rotation", 0.0)), np.cos(transform.get("rotation", 0.0))
         matrix = [[cosine * scale[0], sine * scale[1], offset[0]], [-sine * scale[0], cosine * scale[1], offset[1]], [0, 0, 1]]

@@ -117,7 +117,7 @@ def main():
     parser.add_argument("--correct", action="store_true", help="give Mitsuba correlated masking and multiple scattering")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--png", type=Path, help="difference picture")
-    parser.add_argument("--save", type=Path, help="both mean pictures, as .npz")
+    parser.add_argument("--save", type=Path, help="all pictures, as .npz")
     parser.add_argument("--json", action="store_true", help="one object on stdout instead of the table")
     parser.add_argument("--check", action="store_true", help="exit with 1 where the two do not agree")
     arguments = parser.parse_args()
@@ -149,7 +149,7 @@ def main():
     if arguments.png:
         tiles.picture(ours, theirs, arguments.png)
     if arguments.save:
-        np.savez_compressed(arguments.save, ours=ours.mean(axis=0), theirs=theirs.mean(axis=0))
+        np.savez_compressed(arguments.save, ours=ours, theirs=theirs)
     if arguments.json:
         print(json.dumps(values))
     else:

@@ -68,7 +68,7 @@ def _light(light, center, radius):
     strength = {"type": "rgb", "value": [float(x) for x in light.intensity]}
     if light.kind == "point" and light.radius > 0.0:
         radiance = [float(x) for x in light.intensity / (np.pi * light.radius**2)]
-        return {"type": "sphere", "center": position.tolist(), "radius": light.radius, "bsdf": BLACK,
+        return {"type": "sphere", "center": position.tolist(), "radius": float(light.radius), "bsdf": BLACK,
                 "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}}}
     if light.kind == "point":
         return {"type": "point", "position": position.tolist(), "intensity": strength}
@@ -85,7 +85,7 @@ def _light(light, center, radius):
     half = light.angle / 2
     radiance = [float(x) for x in light.intensity / (np.pi * np.sin(half) ** 2)]
     away = _look(center - axis * FAR * radius, axis)
-    return {"type": "disk", "to_world": away @ mi.ScalarTransform4f().scale(FAR * radius * np.tan(half)), "bsdf": BLACK,
+    return {"type": "disk", "to_world": away @ mi.ScalarTransform4f().scale(float(FAR * radius * np.tan(half))), "bsdf": BLACK,
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}}}
 
 
