@@ -127,8 +127,11 @@ class Corrected(mi.BSDF):
         else:
             self.loss = _loss(self.alpha)
         if self.kind == "matte":
-            again = self.again = float(_again(_average_fresnel(ior), 1 - self.loss.average))
-            self.through = Profile(lambda mu: 1 - _scattered(self.alpha, mu, ior)[0] - again * (1 - _scattered(self.alpha, mu)[0]))
+            # KHR_materials_specular's strength scales Fresnel's term, F0 and F90 alike.
+            strength = properties.get("strength", 1.0)
+            again = self.again = float(_again(strength * _average_fresnel(ior), 1 - self.loss.average))
+            self.through = Profile(lambda mu: 1 - strength * _scattered(self.alpha, mu, ior)[0]
+                                   - again * (1 - _scattered(self.alpha, mu)[0]))
         self.m_components = [flags]
         self.m_flags = flags
 

@@ -107,8 +107,8 @@ class Materials:
         if set(specular) - {"specularFactor", "specularColorFactor"}:
             raise Unsupported(f"material {name}: specular textures")
         strength = specular.get("specularFactor", 1.0)
-        if strength not in (0.0, 1.0) or (strength and list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]):
-            raise Unsupported(f"material {name}: specular strengths between 0 and 1, and colours")
+        if strength and list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]:
+            raise Unsupported(f"material {name}: specular colours")
         if raw.get("alphaMode", "OPAQUE") != "OPAQUE":
             raise Unsupported(f"material {name}: alpha")
         metal = {"type": "twosided", "nested": self._metal(base, roughness)}
@@ -120,22 +120,25 @@ class Materials:
                 raise Unsupported(f"material {name}: thin walls (Mitsuba's also scatter back and forth inside)")
             parts.append(self._glass(name, base, roughness, ior, strength))
         if share < 1.0:
-            matte = {"type": "diffuse", "reflectance": base} if strength == 0.0 else self._matte(name, base, roughness, ior)
+            matte = {"type": "diffuse", "reflectance": base} if strength == 0.0 else self._matte(name, base, roughness, ior, strength)
             parts.append({"type": "twosided", "nested": matte})
         dielectric = parts[0] if len(parts) == 1 else _blend(parts[1], parts[0], share)
         return dielectric if metallic == 0.0 else _blend(dielectric, metal, metallic)
 
-    def _matte(self, name, base, roughness, ior):
+    def _matte(self, name, base, roughness, ior, strength):
         alpha = _plain(roughness, name) ** 2
         common = {"int_ior": float(ior), "ext_ior": 1.0, "nonlinear": False}
+        if strength != 1.0 and (alpha < SMOOTH or not self.correct):
+            raise Unsupported(f"material {name}: a specular strength between 0 and 1 that is smooth, or without --correct")
         if alpha < SMOOTH:
             return {"type": "plastic", "diffuse_reflectance": base, **common}
         rough = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, **common}
         if not self.correct:
             return {"diffuse_reflectance": base, **rough}
         # Its facets alone.
-        nested = {"diffuse_reflectance": {"type": "rgb", "value": 0.0}, **rough}
-        return {"type": "corrected", "kind": "matte", "nested": nested, "alpha": alpha, "base": base, "ior": float(ior)}
+        facets = {"specular_reflectance": {"type": "rgb", "value": strength}, "diffuse_reflectance": {"type": "rgb", "value": 0.0}}
+        return {"type": "corrected", "kind": "matte", "nested": {**rough, **facets}, "alpha": alpha, "base": base, "ior": float(ior),
+                "strength": float(strength)}
 
     def _metal(self, base, roughness):
         nested = {"type": "principled", "base_color": base, "metallic": 1.0, "roughness": roughness, "specular": 0.5}
