@@ -98,10 +98,8 @@ class Glb:
 
     def texture(self, pixels, wrap=10497, scale=None, offset=None, rotation=None):
         """A use of an image of display values in [0, 1], top row first."""
-        file = Path(f"/tmp/caustique-texture-{len(self.document['images'])}.png")
-        tiles.write_png(file, (np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
-        image = self.add("images", {"bufferView": self.view(file.read_bytes()), "mimeType": "image/png"})
-        file.unlink()
+        encoded = tiles.png((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
+        image = self.add("images", {"bufferView": self.view(encoded), "mimeType": "image/png"})
         sampler = self.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": wrap, "wrapT": wrap})
         info = {"index": self.add("textures", {"source": image, "sampler": sampler})}
         transform = {k: v for k, v in (("scale", scale), ("offset", offset), ("rotation", rotation)) if v is not None}
@@ -325,11 +323,16 @@ def wide(folder):
     g.write(folder / "wide.glb")
 
 
+ALL = (glass, frosted, metal, textures, wide)
+
+
 def main():
     """The command."""
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (glass, frosted, metal, textures, wide):
+    for make in ALL:
         make(folder)
 
 
