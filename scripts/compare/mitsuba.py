@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""Renders a glTF scene with caustique and with Mitsuba 3, both from the same file, and says how far they differ.
+
+    scripts/compare/mitsuba.py SCENE.glb [--seeds 8] [--spp 256] [--method path] [--png DIFFERENCE.png] [--json]
+
+Prints the ratio of the means (caustique over Mitsuba) with its standard error, relMSE, and statistics over tiles of 16x16 pixels.
+Standard errors come from the spread over independent seeds on both sides. Everything that Mitsuba cannot say is an error.
+`--correct` puts into Mitsuba what its rough surfaces lack of caustique's (see lobes.py). CAUSTIQUE_BIN is the program to compare.
+
+The picture: caustique, Mitsuba; the relative difference by pixel and by tile, red where caustique is brighter, blue where it is
+darker, full colour at 10 %. Runs in .venv-compare, which it makes (setup.sh).
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+PYTHON = ROOT / ".venv-compare" / "bin" / "python"
+
+if Path(sys.prefix) != PYTHON.parents[1]:
+    subprocess.run(["bash", HERE / "setup.sh"], check=True)
+    os.execv(PYTHON, [str(PYTHON), str(Path(__file__).resolve()), *sys.argv[1:]])
+
+# This file has the name of the module that it imports.
+sys.path = [p for p in sys.path if Path(p or ".").resolve() != HERE]
+import mitsuba as mi  # noqa: E402
+
+sys.path.append(str(HERE))
+import numpy as np  # noqa: E402
+import OpenEXR  # noqa: E402
+
+import gltf  # noqa: E402
+import tiles  # noqa: E402
+
+#: Samples that Mitsuba takes at once: what a wave of them needs of memory stays below a gibibyte.
+WAVE = 1 << 22
+
+
+def set_variant():
+    """The vectorised variant where there is an LLVM, the scalar one otherwise."""
+    libraries = [Path(p) for pattern in ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so") for p in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
+    if libraries and "DRJIT_LIBLLVM_PATH" not in os.environ:
+        # LLVM 14 and 15 cannot compile all that Mitsuba 3.9 asks for: the newest.
+        newest = max(libraries, key=lambda p: [int(n) for n in re.findall("[0-9]+", p.name)])
+        os.environ["DRJIT_LIBLLVM_PATH"] = str(newest)
+    try:
+        mi.set_variant("llvm_ad_rgb")
+        import drjit as dr
+        dr.eval(dr.arange(mi.Float, 2) + 1)
+    except Exception as error:  # noqa: BLE001, whatever Dr.Jit raises without LLVM
+        print(f"mitsuba: no LLVM ({error}); the scalar variant", file=sys.stderr)
+        mi.set_variant("scalar_rgb")
+    return mi.variant()
+
+
+def render_mitsuba(world, size, spp, seeds):
+    """Renders by seed, (seeds, height, width, 3)."""
+    each = max(1, min(spp, WAVE // (size[0] * size[1])))
+    pictures = []
+    for seed in seeds:
+        total, done = 0.0, 0
+        while done < spp:
+            n = min(each, spp - done)
+            picture = np.array(mi.render(world, spp=n, seed=seed * 65536 + done), dtype=np.float64)
+            total, done = total + n * picture[..., :3], done + n
+        pictures.append(total / done)
+    return np.array(pictures)
+
+
+def render_caustique(arguments, seeds):
+    """Renders by seed, (seeds, height, width, 3)."""
+    program = os.environ.get("CAUSTIQUE_BIN", str(ROOT / "target" / "release" / "caustique"))
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in seeds:
+            file = os.path.join(folder, "picture.exr")
+            command = [program, "render", arguments.scene, "-o", file, "--method", arguments.method, "--seed", str(seed),
+                       "--iterations", str(arguments.iterations), "--width", str(arguments.width),
+                       "--height", str(arguments.height), "--threads", str(arguments.threads), "--layers", "beauty",
+                       "--no-combine", "--progress", "none", "--glass", arguments.glass, *arguments.option]
+            done = subprocess.run(command, capture_output=True, text=True)
+            if done.returncode != 0:
+                sys.exit(f"{' '.join(command)}\n{done.stderr}")
+            pictures.append(read(file))
+        if done.stderr:
+            print(done.stderr, end="", file=sys.stderr)
+    return np.array(pictures)
+
+
+def read(path):
+    """The picture of an EXR."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = file.channels()
+        return np.stack([channels[c].pixels for c in "RGB"], axis=-1).astype(np.float64)
+
+
+def main():
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene")
+    parser.add_argument("--width", type=int, default=256)
+    parser.add_argument("--height", type=int, help="default: the camera's aspect")
+    parser.add_argument("--seeds", type=int, default=8, help="independent renders on each side")
+    parser.add_argument("--spp", type=int, default=128, help="Mitsuba's samples per pixel and seed")
+    parser.add_argument("--iterations", type=int, help="caustique's, per seed; default: --spp")
+    parser.add_argument("--method", default="path", help="caustique's method")
+    parser.add_argument("--glass", default="auto", choices=("auto", "solid", "thin"))
+    parser.add_argument("--option", action="append", default=[], help="one more argument for caustique")
+    parser.add_argument("--correct", action="store_true", help="give Mitsuba correlated masking and multiple scattering")
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--png", type=Path, help="difference picture")
+    parser.add_argument("--save", type=Path, help="all pictures, as .npz")
+    parser.add_argument("--json", action="store_true", help="one object on stdout instead of the table")
+    parser.add_argument("--check", action="store_true", help="exit with 1 where the two do not agree")
+    arguments = parser.parse_args()
+    arguments.iterations = arguments.iterations or arguments.spp
+
+    variant = set_variant()
+    if arguments.threads:
+        import drjit as dr
+        dr.set_thread_count(arguments.threads)
+    import world
+    try:
+        scene = gltf.read(arguments.scene)
+        if arguments.height is None and scene.cameras:
+            arguments.height = max(1, round(arguments.width / scene.cameras[0].aspect))
+        peer = world.build(scene, arguments.width, arguments.height, arguments.correct, arguments.glass)
+    except gltf.Unsupported as unsupported:
+        sys.exit(f"{arguments.scene}: not comparable: {unsupported}")
+    size, seeds = (arguments.width, arguments.height), range(1, arguments.seeds + 1)
+    start = time.monotonic()
+    theirs = render_mitsuba(peer, size, arguments.spp, seeds)
+    middle = time.monotonic()
+    ours = render_caustique(arguments, seeds)
+    end = time.monotonic()
+
+    values = tiles.compare(ours, theirs)
+    values.update(scene=Path(arguments.scene).stem, method=arguments.method, corrected=arguments.correct, seeds=arguments.seeds,
+                  spp=arguments.spp, iterations=arguments.iterations, width=size[0], height=size[1], mitsuba=mi.__version__,
+                  variant=variant, seconds_mitsuba=round(middle - start, 1), seconds_caustique=round(end - middle, 1))
+    if arguments.png:
+        tiles.picture(ours, theirs, arguments.png)
+    if arguments.save:
+        np.savez_compressed(arguments.save, ours=ours, theirs=theirs)
+    if arguments.json:
+        print(json.dumps(values))
+    else:
+        print(tiles.table(values))
+    if arguments.check and not values["agrees"]:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
