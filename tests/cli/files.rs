@@ -115,6 +115,7 @@ fn every_method_leaves_what_it_has() {
         ("path", 1, false, true),
         ("light", 1, false, true),
         ("bdpt", 1, false, true),
+        ("pm", 1, false, false),
         ("sppm", 5, true, false),
         ("bpm", 1, true, false),
         ("vcm", 5, true, false),
@@ -148,7 +149,7 @@ fn every_method_leaves_what_it_has() {
         means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
     }
     // Those that find everything agree roughly here; closely in tests of their own.
-    assert!(means[3..].iter().all(|mean| (mean / means[3] - 1.0).abs() < 0.1), "{means:?}");
+    assert!(means[3..].iter().all(|mean| (mean / means[4] - 1.0).abs() < 0.1), "{means:?}");
 
     let idle = folder.run("render scene.glb -o out.exr --method vcm --photons 1000");
     assert_eq!(
@@ -158,6 +159,37 @@ fn every_method_leaves_what_it_has() {
             "command line: --photons has no effect with --method vcm\nhint: leave --photons out, or choose --method sppm\n"
         )
     );
+}
+
+/// A map that does not fit ends early, says so, and shines no less.
+#[test]
+fn a_full_photon_map_is_said() {
+    let folder = Folder::new();
+    let pm = "render scene.glb --width 48 --height 36 --iterations 4 --method pm --photons 60000 --progress none";
+    let mut means = vec![];
+    for (name, memory, full) in [("all.exr", 64, false), ("some.exr", 1, true)] {
+        let outcome = folder.run(&format!("{pm} -o {name} --photon-memory {memory}"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        assert_eq!(outcome.stderr.contains("warning: the photon map was full at "), full, "{}", outcome.stderr);
+        let (set, header) = folder.read(name);
+        let photons = header["map"]["photons"].as_u64().expect("a number");
+        assert_eq!(header["map"]["full"], full);
+        assert_eq!(header["light_paths"].as_u64() < Some(60_000), full);
+        assert!(photons > 0 && photons * 152 <= memory << 20, "{photons}");
+        let noisy = values(&set, "Noisy");
+        means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
+    }
+    // Some 7000 photons, in clusters.
+    assert!((means[1] / means[0] - 1.0).abs() < 0.05, "{means:?}");
+    for (option, cause) in [
+        ("--method pm --knn 1", "--knn must be 2 or more with --method pm"),
+        ("--method vcm --photon-memory 10", "--photon-memory has no effect with --method vcm"),
+        ("--method pm --initial-bandwidth 0.1", "--initial-bandwidth has no effect with --method pm"),
+    ] {
+        let outcome = folder.run(&format!("render scene.glb -o out.exr {option}"));
+        assert_eq!(outcome.code, Some(2));
+        assert!(outcome.stderr.starts_with(&format!("command line: {cause}\nhint: ")), "{}", outcome.stderr);
+    }
 }
 
 #[test]

@@ -92,6 +92,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     if talk {
         summary.tell(name);
     }
+    summary.tell_full();
     summary.tell_rejected(args);
     written?;
     pictured?;

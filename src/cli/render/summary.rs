@@ -16,6 +16,8 @@ pub struct Summary {
     error: Option<f64>,
     rejected: u64,
     stop: StopReason,
+    /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
+    full: Option<(u64, u32, u64)>,
 }
 
 impl Summary {
@@ -32,6 +34,10 @@ impl Summary {
             error: rendered.relative_error(),
             rejected: rendered.rejected(),
             stop: rendered.stop,
+            full: rendered.map_is_full().then(|| {
+                let settings = &rendered.settings;
+                (rendered.photons, settings.photons, settings.photon_memory)
+            }),
         }
     }
 
@@ -58,6 +64,17 @@ impl Summary {
         say(&format!("{}: {} x {}, {channels} channels", args.output.display(), set.width, set.height));
         if let Some(png) = &args.picture.png {
             say(&png.display().to_string());
+        }
+    }
+
+    /// A warning if the photon map became full.
+    pub fn tell_full(&self) {
+        if let Some((photons, asked, bytes)) = self.full {
+            say(&format!(
+                "warning: the photon map was full at {photons} photons ({} MiB) after {} of {asked} light paths; --photon-memory allows more",
+                bytes >> 20,
+                self.light_paths
+            ));
         }
     }
 
