@@ -7,6 +7,7 @@ use super::pm::Pm;
 use super::result::{Phases, Rendered, relative_error};
 use super::settings::{Levels, Settings};
 use super::sppm::Sppm;
+use super::techniques::TechniquePicture;
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::scene::Scene;
@@ -26,6 +27,11 @@ pub(super) trait Iterate {
     fn pixels(&mut self) -> Vec<Pixel>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
+    /// Pictures per technique after so many iterations, of methods that have them.
+    fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
+        let _ = iterations;
+        Vec::new()
+    }
 }
 
 /// Renders. `observe` is called after every iteration and may stop the render; it also gets the pixels, to show or save them.
@@ -114,6 +120,7 @@ fn drive(
         width,
         height,
         pixels,
+        techniques: passes.techniques(done),
         settings: settings.clone(),
         iterations: done,
         light_paths,

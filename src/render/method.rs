@@ -52,6 +52,11 @@ impl Method {
         }
     }
 
+    /// Whether it weighs sampling techniques against each other path by path, or has but one.
+    pub fn has_techniques(self) -> bool {
+        !matches!(self, Method::Pm | Method::Sppm)
+    }
+
     /// Whether its bandwidths are several levels.
     pub fn has_levels(self) -> bool {
         matches!(self, Method::Sppm | Method::Vcm)

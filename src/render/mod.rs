@@ -9,6 +9,8 @@ mod pm;
 mod result;
 mod settings;
 mod sppm;
+mod techniques;
+mod tiles;
 
 pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
 pub use drive::render;
@@ -19,3 +21,4 @@ pub use settings::{
     DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Levels,
     Settings, Shard,
 };
+pub use techniques::{MAX_TECHNIQUES, TechniquePicture};

@@ -3,6 +3,7 @@
 use super::control::{History, StopReason};
 use super::method::Method;
 use super::settings::{Levels, Settings};
+use super::techniques::TechniquePicture;
 use crate::estimator::{Pixel, SquaredError};
 use serde::Serialize;
 
@@ -27,6 +28,8 @@ pub struct Rendered {
     pub height: u32,
     /// Pixels, row by row from the top.
     pub pixels: Vec<Pixel>,
+    /// A picture per technique, if [`Settings::techniques`] and the method has several.
+    pub techniques: Vec<TechniquePicture>,
     /// The settings it was made with.
     pub settings: Settings,
     /// Iterations done.

@@ -62,6 +62,8 @@ pub struct Settings {
     pub photon_memory: u64,
     /// Bandwidth levels.
     pub levels: Levels,
+    /// Also make a picture per sampling technique ([`Method::has_techniques`]).
+    pub techniques: bool,
     /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is its bandwidth.
     pub initial: InitialBandwidth,
     /// Reduction rate of the memoryless rule, in (0, 1].
@@ -86,6 +88,7 @@ impl Default for Settings {
             photons: DEFAULT_PHOTONS,
             photon_memory: DEFAULT_MAP_MEMORY,
             levels: Levels::new(5),
+            techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             alpha: memoryless::ALPHA,
             max_depth: u32::MAX,

@@ -2,7 +2,7 @@
 
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
-use caustique::render::{Method, Settings};
+use caustique::render::{MAX_TECHNIQUES, Method, Settings};
 use caustique::transport::EyeMeasure;
 use std::mem::size_of;
 
@@ -10,6 +10,9 @@ use std::mem::size_of;
 const PER_LIGHT_PATH: u64 = 150;
 /// The same where photons carry what their weights are made of, and every bounce leaves one.
 const PER_MERGED_PATH: u64 = 800;
+
+/// Bytes per pixel of a technique's weighted and unweighted picture.
+const PER_TECHNIQUE: u64 = 24;
 
 /// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
 fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> u64 {
@@ -22,7 +25,9 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
         (false, true) => (measure + PER_MERGED_PATH, 0),
         (false, false) => (measure, 0),
     };
-    let per_pixel = (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
+    // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
+    let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
+    let per_pixel = pictures + (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
     pixels * per_pixel + photons
 }
 

@@ -114,6 +114,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     #[serde(skip)]
     pub threads: usize,
+    /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG: how path, light, bdpt, bpm or vcm share the light
+    /// among their strategies. Weighted pictures sum to the layer Noisy
+    #[arg(long, value_name = "DIR", help_heading = "Running")]
+    #[serde(skip)]
+    pub debug_techniques: Option<PathBuf>,
     /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
@@ -247,10 +252,15 @@ impl RenderArgs {
                 "--initial-bandwidth knn",
             ),
             (self.alpha.is_some() && !method.has_bandwidths(), "--alpha"),
+            (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
         let cause = format!("{option} has no effect with --method {}", method.name());
-        let other = if *option == "--photon-memory" { "pm" } else { "sppm" };
+        let other = match *option {
+            "--photon-memory" => "pm",
+            "--debug-techniques" => "vcm",
+            _ => "sppm",
+        };
         Err(Error::new(Kind::Usage, "command line", cause)
             .hint(format!("leave {option} out, or choose --method {other}")))
     }
@@ -294,6 +304,7 @@ impl RenderArgs {
             photons: self.photons.unwrap_or(method.photons()),
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
+            techniques: self.debug_techniques.is_some(),
             initial,
             alpha: self.alpha.unwrap_or(method.alpha()),
             max_depth: self.max_depth.unwrap_or(u32::MAX),

@@ -59,11 +59,14 @@ impl Summary {
     }
 
     /// The files that are written.
-    pub fn tell_files(args: &RenderArgs, set: &LayerSet) {
+    pub fn tell_files(args: &RenderArgs, set: &LayerSet, techniques: usize) {
         let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
         say(&format!("{}: {} x {}, {channels} channels", args.output.display(), set.width, set.height));
         if let Some(png) = &args.picture.png {
             say(&png.display().to_string());
+        }
+        if let Some(folder) = &args.debug_techniques {
+            say(&format!("{}: {techniques} techniques, weighted and unweighted", folder.display()));
         }
     }
 
