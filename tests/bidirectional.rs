@@ -373,6 +373,19 @@ fn caustics_behind_glass() {
     agree_with("behind glass", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.3);
 }
 
+/// Classical photon mapping, too, with a map so large that its bandwidths are small.
+#[test]
+fn one_large_photon_map() {
+    let scene = small_room();
+    let reference = by(&scene, (Method::Path, 64), 0.1, u32::MAX);
+    let settings = |seed| Settings { photons: 400_000, ..settings(16, 0.1, seed) };
+    let images: Vec<Vec<f64>> =
+        (0..SEEDS).map(|seed| tiles(&render(&scene, Method::Pm, SIZE, &settings(seed)), 0)).collect();
+    println!("one map: {:.5}, paths {:.5}", average(&images), average(&reference));
+    let found = disagreeing(&images, &reference, TILES, 0.03);
+    assert!(found.is_empty(), "{found:#?}");
+}
+
 // ---------------------------------------------------------------- levels, shards, threads
 
 fn small_room() -> Scene {

@@ -17,7 +17,7 @@ pub const SCREEN_CAP: f32 = 0.05;
 /// `--initial-bandwidth footprint`: radius over the width of a pixel at the gathering point.
 pub const FOOTPRINT_PIXELS: f32 = 3.0;
 /// Smallest bandwidth over the scene's radius: where photons fall on one point (a perfect focus) the distance is zero.
-const LEAST: f32 = 1e-7;
+pub const LEAST: f32 = 1e-7;
 
 /// What sets the largest initial bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub enum InitialBandwidth {
 }
 
 /// Width that the picture spans at the end of a path of some length.
-fn span(camera: &Camera, length: f32) -> f32 {
+pub fn span(camera: &Camera, length: f32) -> f32 {
     let (slope, at_zero) = camera.span();
     slope * length + at_zero
 }

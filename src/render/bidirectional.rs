@@ -12,6 +12,8 @@ use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
+use super::techniques::{TechniquePicture, TilePictures, Watch, collect};
+use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
@@ -27,50 +29,19 @@ use crate::transport::{
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// Width and height of a tile in pixels.
-const TILE: u32 = 16;
-const TILE_PIXELS: usize = (TILE * TILE) as usize;
-
-/// The films' tiles.
-#[derive(Clone, Copy)]
-struct Tiles {
-    width: u32,
-    height: u32,
-    across: u32,
-}
-
-impl Tiles {
-    fn new(camera: &Camera) -> Tiles {
-        let (width, height) = camera.size();
-        Tiles { width, height, across: width.div_ceil(TILE) }
-    }
-
-    fn count(&self) -> usize {
-        self.across as usize * self.height.div_ceil(TILE) as usize
-    }
-
-    /// Where pixel `index` (row by row) is kept, tile by tile.
-    #[inline]
-    fn slot(&self, index: u32) -> usize {
-        let (x, y) = (index % self.width, index / self.width);
-        (y / TILE * self.across + x / TILE) as usize * TILE_PIXELS + (y % TILE * TILE + x % TILE) as usize
-    }
-
-    /// Pixels of a tile: slot in the tile and place on the film.
-    fn pixels(self, tile: usize) -> impl Iterator<Item = (usize, (u32, u32))> {
-        let (x0, y0) = (tile as u32 % self.across * TILE, tile as u32 / self.across * TILE);
-        (0..TILE * TILE)
-            .map(move |i| (i as usize, (x0 + i % TILE, y0 + i / TILE)))
-            .filter(move |(_, (x, y))| *x < self.width && *y < self.height)
-    }
-}
-
 /// A light path and an eye path for every pixel, and the levels they make.
 struct Pair {
     light: Domain,
     eye: Domain,
     /// First level and number of levels.
     levels: (usize, usize),
+}
+
+impl Pair {
+    /// Which of its levels is the method's own image, if any.
+    fn own(&self, own: usize) -> Option<usize> {
+        own.checked_sub(self.levels.0).filter(|level| *level < self.levels.1)
+    }
 }
 
 /// What iterations share.
@@ -86,6 +57,8 @@ pub struct Passes<'a> {
     measures: Vec<Vec<EyeMeasure>>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
+    /// Pictures per technique, by tile, if asked for.
+    techniques: Option<Vec<TilePictures>>,
 }
 
 impl<'a> Passes<'a> {
@@ -115,7 +88,8 @@ impl<'a> Passes<'a> {
         });
         let tiles = Tiles::new(camera);
         let measures = pairs.iter().map(|_| vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS]).collect();
-        Passes { scene, camera, settings, surroundings, shared, pairs, tiles, measures, photons: None }
+        let techniques = settings.techniques.then(|| (0..tiles.count()).map(|_| TilePictures::new()).collect());
+        Passes { scene, camera, settings, surroundings, shared, pairs, tiles, measures, photons: None, techniques }
     }
 
     fn eye(&self) -> Eye<'a> {
@@ -130,7 +104,7 @@ impl<'a> Passes<'a> {
 
     /// The photons that pass `i` leaves, where it was not rendered here.
     fn photons_of(&self, i: u64, shared: &Bidirectional<'_>) -> PhotonMap<MergePhoton> {
-        let (width, tiles) = (self.tiles.width, self.tiles);
+        let tiles = self.tiles;
         let mut parts = Vec::new();
         // In the order of `iterate`, so that even photons in one place are summed alike.
         for pair in &self.pairs {
@@ -140,7 +114,7 @@ impl<'a> Passes<'a> {
                 for (_, (x, y)) in tiles.pixels(tile) {
                     arena.reset();
                     let mut vertices = LightVertices::new_in(&arena);
-                    shared.light_path(&pass, y * width + x, true, &mut vertices, &mut left, &mut ());
+                    shared.light_path(&pass, tiles.index(x, y), true, &mut vertices, &mut left, &mut ());
                 }
                 left.photons
             };
@@ -150,9 +124,9 @@ impl<'a> Passes<'a> {
     }
 
     /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged.
-    fn pass(&mut self, i: u64, pixels: &mut [Pixel]) -> Work {
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Work {
         let Some(shared) = self.shared else {
-            self.paths(i);
+            self.paths(i, watches);
             self.add(pixels);
             return Work { light_paths: 0, photons: 0 };
         };
@@ -176,27 +150,30 @@ impl<'a> Passes<'a> {
                 (radius2, eta)
             }))
         };
-        let (width, seed, tiles) = (self.tiles.width, self.settings.seed, self.tiles);
+        let (seed, tiles) = (self.settings.seed, self.tiles);
         let map = self.photons.as_ref().map(|(_, map)| map);
         let merges = map.map_or(0, |map| map.photons().len());
         let bandwidths: &[Pixel] = pixels;
         let mut photons: Vec<Vec<MergePhoton>> = Vec::new();
         let passes: Vec<LightPass> = self.pairs.iter().map(|pair| self.light_pass(i, pair)).collect();
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
+            let own = pair.own(self.settings.levels.own());
             let left: Vec<(Vec<Splat>, Vec<MergePhoton>)> = measures
                 .par_chunks_mut(TILE_PIXELS)
+                .zip(watches.par_iter_mut())
                 .enumerate()
-                .map(|(tile, measures)| {
+                .map(|(tile, (measures, watch))| {
                     let (mut left, mut arena) = (Left::default(), Bump::new());
                     for (slot, (x, y)) in tiles.pixels(tile) {
-                        let index = y * width + x;
+                        let index = tiles.index(x, y);
                         arena.reset();
                         let mut vertices = LightVertices::new_in(&arena);
                         shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());
                         let levels = levels(bandwidths[index as usize].bandwidth, pair);
                         let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                         let stream = Stream::new(seed, i, pair.eye, u64::from(index));
-                        measures[slot] = shared.eye_path(&arena, (x, y), stream, &meets, &mut ());
+                        watch.begin(slot, own);
+                        measures[slot] = shared.eye_path(&arena, (x, y), stream, &meets, watch);
                     }
                     (left.splats, left.photons)
                 })
@@ -204,7 +181,9 @@ impl<'a> Passes<'a> {
             for (splats, left) in left {
                 for splat in splats {
                     let levels = levels(bandwidths[splat.pixel as usize].bandwidth, pair);
-                    splat.apply(&levels, &mut measures[tiles.slot(splat.pixel)]);
+                    let (tile, slot) = tiles.place(splat.pixel);
+                    watches[tile].splat(slot, own, &splat, &levels);
+                    splat.apply(&levels, &mut measures[tile * TILE_PIXELS + slot]);
                 }
                 photons.push(left);
             }
@@ -218,15 +197,17 @@ impl<'a> Passes<'a> {
     }
 
     /// Path tracing.
-    fn paths(&mut self, i: u64) {
+    fn paths<W: Watch>(&mut self, i: u64, watches: &mut [W]) {
         let (eye, tiles, seed) = (self.eye(), self.tiles, self.settings.seed);
         let domain = self.pairs[0].eye;
-        self.measures[0].par_chunks_mut(TILE_PIXELS).enumerate().for_each(|(tile, measures)| {
+        let parts = self.measures[0].par_chunks_mut(TILE_PIXELS).zip(watches);
+        parts.enumerate().for_each(|(tile, (measures, watch))| {
             let mut arena = Bump::new();
             for (slot, (x, y)) in tiles.pixels(tile) {
                 arena.reset();
-                let stream = Stream::new(seed, i, domain, u64::from(y * tiles.width + x));
-                measures[slot] = path_measure(&eye, &arena, (x, y), stream);
+                let stream = Stream::new(seed, i, domain, u64::from(tiles.index(x, y)));
+                watch.begin(slot, Some(0));
+                measures[slot] = path_measure(&eye, &arena, (x, y), stream, watch);
             }
         });
     }
@@ -264,9 +245,22 @@ impl Iterate for Passes<'_> {
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let start = cpu_seconds();
-        let work = self.pass(i, pixels);
+        let work = match self.techniques.take() {
+            Some(mut pictures) => {
+                let work = self.pass(i, pixels, &mut pictures);
+                self.techniques = Some(pictures);
+                work
+            }
+            None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
+        };
         // Light and eye paths take turns within a pixel.
         phases.eye += cpu_seconds() - start;
         work
+    }
+
+    fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
+        let (width, height) = self.camera.size();
+        let pixels = width as usize * height as usize;
+        self.techniques.take().map_or(Vec::new(), |parts| collect(&self.tiles, pixels, parts, iterations))
     }
 }

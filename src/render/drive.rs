@@ -3,9 +3,11 @@
 use super::bidirectional::Passes;
 use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
 use super::method::Method;
+use super::pm::Pm;
 use super::result::{Phases, Rendered, relative_error};
 use super::settings::{Levels, Settings};
 use super::sppm::Sppm;
+use super::techniques::TechniquePicture;
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::scene::Scene;
@@ -25,6 +27,11 @@ pub(super) trait Iterate {
     fn pixels(&mut self) -> Vec<Pixel>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
+    /// Pictures per technique after so many iterations, of methods that have them.
+    fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
+        let _ = iterations;
+        Vec::new()
+    }
 }
 
 /// Renders. `observe` is called after every iteration and may stop the render; it also gets the pixels, to show or save them.
@@ -42,10 +49,10 @@ pub fn render(
         settings.levels = Levels::new(1);
     }
     let surroundings = Surroundings::new(scene, camera.position());
-    if settings.method == Method::Sppm {
-        drive(Sppm::new(scene, camera, &settings, &surroundings), camera, &settings, observe)
-    } else {
-        drive(Passes::new(scene, camera, &settings, &surroundings), camera, &settings, observe)
+    match settings.method {
+        Method::Sppm => drive(Sppm::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
+        Method::Pm => drive(Pm::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
+        _ => drive(Passes::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
     }
 }
 
@@ -64,7 +71,7 @@ fn drive(
 
     let mut history: Vec<History> = Vec::new();
     let mut next_record = 1u64;
-    let (mut done, mut light_paths, mut stop) = (0u64, 0u64, StopReason::Iterations);
+    let (mut done, mut light_paths, mut photons, mut stop) = (0u64, 0u64, 0, StopReason::Iterations);
     let mut iteration = settings.shard.index;
     let total = settings.iterations.map(|n| n.saturating_sub(settings.shard.index).div_ceil(settings.shard.count));
     while settings.iterations.is_none_or(|n| iteration < n) {
@@ -73,6 +80,7 @@ fn drive(
         let seconds = clock.seconds();
         done += 1;
         light_paths += work.light_paths;
+        photons = work.photons;
         iteration += settings.shard.count;
 
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
@@ -91,7 +99,7 @@ fn drive(
             seconds,
             remaining: settings.remaining(done, total, seconds, pilot_seconds),
             light_paths,
-            photons: work.photons,
+            photons,
             error,
         };
         if observe(&progress, &pixels) == Control::Stop {
@@ -112,9 +120,11 @@ fn drive(
         width,
         height,
         pixels,
+        techniques: passes.techniques(done),
         settings: settings.clone(),
         iterations: done,
         light_paths,
+        photons: photons as u64,
         seconds,
         phases,
         history,

@@ -1,5 +1,6 @@
 //! The methods, and what of a render's shape follows from the one chosen.
 
+use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS};
 use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
 use crate::transport::Strategies;
@@ -15,6 +16,8 @@ pub enum Method {
     Light,
     /// Bidirectional path tracing.
     Bdpt,
+    /// Classical photon mapping: one map, nearest neighbours.
+    Pm,
     /// Stochastic progressive photon mapping.
     #[default]
     Sppm,
@@ -31,6 +34,7 @@ impl Method {
             Method::Path => "path",
             Method::Light => "light",
             Method::Bdpt => "bdpt",
+            Method::Pm => "pm",
             Method::Sppm => "sppm",
             Method::Bpm => "bpm",
             Method::Vcm => "vcm",
@@ -40,12 +44,17 @@ impl Method {
     /// The strategies of a bidirectional method.
     pub(super) fn strategies(self, camera: &Camera) -> Option<Strategies> {
         match self {
-            Method::Path | Method::Sppm => None,
+            Method::Path | Method::Pm | Method::Sppm => None,
             Method::Light => Some(Strategies::LIGHT),
             Method::Bdpt => Some(Strategies::BDPT),
             Method::Bpm => Some(Strategies::BPM),
             Method::Vcm => Some(Strategies::vcm(camera.connects())),
         }
+    }
+
+    /// Whether it weighs sampling techniques against each other path by path, or has but one.
+    pub fn has_techniques(self) -> bool {
+        !matches!(self, Method::Pm | Method::Sppm)
     }
 
     /// Whether its bandwidths are several levels.
@@ -58,9 +67,24 @@ impl Method {
         matches!(self, Method::Sppm | Method::Bpm | Method::Vcm)
     }
 
-    /// Whether the number of light paths is a setting; the other methods have one for every eye path, or none.
+    /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have one for every eye path,
+    /// or none.
     pub fn counts_photons(self) -> bool {
-        self == Method::Sppm
+        matches!(self, Method::Pm | Method::Sppm)
+    }
+
+    /// Light paths where no number is asked for, of methods that count them.
+    pub fn photons(self) -> u32 {
+        if self == Method::Pm { DEFAULT_MAP_PHOTONS } else { DEFAULT_PHOTONS }
+    }
+
+    /// Neighbours that set bandwidths where no number is asked for.
+    pub fn neighbours(self, levels: usize) -> usize {
+        match (self, levels) {
+            (Method::Pm, _) => DEFAULT_MAP_KNN,
+            (_, 1) => DEFAULT_KNN.1,
+            _ => DEFAULT_KNN.0,
+        }
     }
 
     /// Reduction rate of the memoryless rule where none is asked for \[Georgiev et al. 2012 for merging with connections\].

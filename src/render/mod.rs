@@ -5,12 +5,20 @@ mod control;
 mod drive;
 mod method;
 pub mod output;
+mod pm;
 mod result;
 mod settings;
 mod sppm;
+mod techniques;
+mod tiles;
 
 pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
 pub use drive::render;
 pub use method::Method;
+pub use pm::PHOTON_BYTES;
 pub use result::{Phases, Rendered};
-pub use settings::{DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_PHOTONS, Levels, Settings, Shard};
+pub use settings::{
+    DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Levels,
+    Settings, Shard,
+};
+pub use techniques::{MAX_TECHNIQUES, TechniquePicture};

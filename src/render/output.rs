@@ -1,6 +1,7 @@
 //! What a render leaves in its file: layers, and the account in the header.
 
 use super::control::StopReason;
+use super::method::Method;
 use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
@@ -43,6 +44,9 @@ impl Rendered {
         put("iterations", self.iterations.into());
         put("light_paths", self.light_paths.into());
         put("shard", json!({"index": shard.index, "count": shard.count}));
+        if self.settings.method == Method::Pm {
+            put("map", json!({"photons": self.photons, "full": self.map_is_full()}));
+        }
         put("levels", self.settings.levels.count.into());
         put("stopped", stop_name(self.stop).into());
         put("error", self.relative_error().into());

@@ -1,7 +1,9 @@
 //! What a render leaves behind.
 
 use super::control::{History, StopReason};
+use super::method::Method;
 use super::settings::{Levels, Settings};
+use super::techniques::TechniquePicture;
 use crate::estimator::{Pixel, SquaredError};
 use serde::Serialize;
 
@@ -26,12 +28,16 @@ pub struct Rendered {
     pub height: u32,
     /// Pixels, row by row from the top.
     pub pixels: Vec<Pixel>,
+    /// A picture per technique, if [`Settings::techniques`] and the method has several.
+    pub techniques: Vec<TechniquePicture>,
     /// The settings it was made with.
     pub settings: Settings,
     /// Iterations done.
     pub iterations: u64,
     /// Light paths emitted.
     pub light_paths: u64,
+    /// Photons of the last map.
+    pub photons: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Core-seconds per phase.
@@ -43,6 +49,11 @@ pub struct Rendered {
 }
 
 impl Rendered {
+    /// Whether the one map of [`Method::Pm`] had no room for the photons of all its light paths.
+    pub fn map_is_full(&self) -> bool {
+        self.settings.method == Method::Pm && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)
+    }
+
     /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over RGB of
     /// the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + 0.01), the papers' relMSE with the estimate in place of the
     /// squared difference. `None` before two iterations.

@@ -9,6 +9,12 @@ use crate::transport::MAX_LEVELS;
 pub const DEFAULT_ITERATIONS: u64 = 64;
 /// Light paths per iteration: the papers' setting.
 pub const DEFAULT_PHOTONS: u32 = 100_000;
+/// Light paths of the one map of [`Method::Pm`].
+pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
+/// Bytes that this map may take.
+pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
+/// Neighbours whose distance is its bandwidth.
+pub const DEFAULT_MAP_KNN: usize = 100;
 /// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with one.
 pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
@@ -50,11 +56,15 @@ pub struct Settings {
     pub method: Method,
     /// Seed.
     pub seed: u64,
-    /// Light paths per iteration.
+    /// Light paths per iteration; with [`Method::Pm`] of the whole render.
     pub photons: u32,
+    /// Most bytes that the map of [`Method::Pm`] may take, while it is built.
+    pub photon_memory: u64,
     /// Bandwidth levels.
     pub levels: Levels,
-    /// What sets the largest initial bandwidth.
+    /// Also make a picture per sampling technique ([`Method::has_techniques`]).
+    pub techniques: bool,
+    /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is its bandwidth.
     pub initial: InitialBandwidth,
     /// Reduction rate of the memoryless rule, in (0, 1].
     pub alpha: f64,
@@ -76,7 +86,9 @@ impl Default for Settings {
             method: Method::Sppm,
             seed: 0,
             photons: DEFAULT_PHOTONS,
+            photon_memory: DEFAULT_MAP_MEMORY,
             levels: Levels::new(5),
+            techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             alpha: memoryless::ALPHA,
             max_depth: u32::MAX,

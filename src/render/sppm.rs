@@ -17,18 +17,30 @@ use crate::scene::Scene;
 use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Light paths per unit of work. Constant, so that the photons' order does not depend on threads.
 const CHUNK: u32 = 1024;
 
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
 pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Vec<Photon> {
-    let chunks = pass.paths().div_ceil(CHUNK);
-    let parts: Vec<Vec<Photon>> = (0..chunks)
+    trace_some(scene, surroundings, pass, 0..pass.paths())
+}
+
+/// Traces some of the light paths of a pass.
+pub(super) fn trace_some(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    pass: &LightPass,
+    paths: Range<u32>,
+) -> Vec<Photon> {
+    let parts: Vec<Vec<Photon>> = (0..paths.len() as u32)
         .into_par_iter()
-        .map_init(Bump::new, |arena, chunk| {
+        .step_by(CHUNK as usize)
+        .map_init(Bump::new, |arena, first| {
             let mut photons = Vec::with_capacity(CHUNK as usize * 2);
-            for index in chunk * CHUNK..((chunk + 1) * CHUNK).min(pass.paths()) {
+            let first = paths.start + first;
+            for index in first..paths.end.min(first.saturating_add(CHUNK)) {
                 light_path(scene, arena, surroundings, pass, index, &mut photons);
                 arena.reset();
             }
@@ -75,7 +87,7 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
     });
 }
 
-fn keep_first_hit(eye: &Eye<'_>, pixel: &mut Pixel, measure: &EyeMeasure) {
+pub(super) fn keep_first_hit(eye: &Eye<'_>, pixel: &mut Pixel, measure: &EyeMeasure) {
     if let (0, Some(first)) = (pixel.iterations, measure.first) {
         pixel.z = eye.camera.depth(first.p);
         pixel.p = (first.p.as_dvec3() + eye.scene.origin).as_vec3();

@@ -117,6 +117,13 @@ pub trait Record {
     fn contribution(&mut self, technique: Technique, value: Rgb, from: Vec3, ratios: Ratios) {
         let _ = (technique, value, from, ratios);
     }
+
+    /// `technique` brings light to the eye path's own pixel: on a `level`, `value` unweighted, with visibility and kernel, and its weight.
+    /// Depths count from 1, also for light from infinity.
+    #[inline]
+    fn arrival(&mut self, technique: Technique, level: usize, value: Rgb, weight: f32) {
+        let _ = (technique, level, value, weight);
+    }
 }
 
 impl Record for () {}

@@ -32,6 +32,8 @@ struct EyeWalk<'a, R> {
     trail: Trail,
     /// The last vertex.
     last: Vec3,
+    /// Its depth.
+    depth: u32,
     measure: EyeMeasure,
     record: &'a mut R,
 }
@@ -74,7 +76,10 @@ pub(super) fn visible(scene: &Scene, vertex: &Vertex<'_, '_>, wi: Vec3, target: 
 
 impl<R: Record> EyeWalk<'_, R> {
     #[inline]
-    fn add(&mut self, part: Part, value: Rgb, ratios: Ratios) {
+    fn add(&mut self, technique: Technique, part: Part, value: Rgb, ratios: Ratios) {
+        for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
+            self.record.arrival(technique, level, value, ratios.weight(eta));
+        }
         add(&mut self.measure, self.meets.levels, part, value, ratios);
     }
 
@@ -89,7 +94,7 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         };
         self.record.contribution(Technique::Hit { eye: depth }, value, at, ratios);
-        self.add(self.trail.hit(scattered.map(|s| s.lobe)), value, ratios);
+        self.add(Technique::Hit { eye: self.depth }, self.trail.hit(scattered.map(|s| s.lobe)), value, ratios);
     }
 
     #[inline]
@@ -112,7 +117,7 @@ impl<R: Record> EyeWalk<'_, R> {
         self.record.contribution(Technique::NextEvent { eye: vertex.depth }, value, at, ratios);
         let token = draws.token(Purpose::ShadowAlpha);
         let value = value * visible(scene, vertex, light.wi, light.target, token);
-        self.add(self.trail.next_event(), value, ratios);
+        self.add(Technique::NextEvent { eye: vertex.depth }, self.trail.next_event(), value, ratios);
     }
 
     #[inline]
@@ -150,7 +155,7 @@ impl<R: Record> EyeWalk<'_, R> {
         // Every pair of vertices has its own decisions at cut-outs.
         let token = mix(vertex.draws.bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
         let value = value * visible(eye.scene, vertex, d, Some(light.surface.spawn(-d)), token);
-        self.add(Part::Indirect, value, ratios);
+        self.add(technique, Part::Indirect, value, ratios);
     }
 }
 
@@ -159,6 +164,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, .. } = self.shared;
         look(&mut self.trail, vertex, scattered, &mut self.measure);
+        self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos);
         if let Some((radiance, density)) = eye.scene.lights.emitted(&eye.scene.materials, vertex.surface, vertex.wo) {
@@ -206,6 +212,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }
+        self.depth += 1;
         let lights = &self.shared.eye.scene.lights;
         let onward = lights.entry_pdf_a(self.last, direction);
         lights.escape(direction, |radiance, direct| {
@@ -235,6 +242,7 @@ impl Bidirectional<'_> {
             mis: MisState::camera(self.light_paths, pdf_w),
             trail: Trail::START,
             last: start.origin,
+            depth: 0,
             measure: EyeMeasure::default(),
             record,
         };

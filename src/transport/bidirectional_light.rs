@@ -16,6 +16,8 @@ use crate::random::Purpose;
 pub struct Splat {
     /// Index of the pixel, row by row.
     pub pixel: u32,
+    /// Depth of the light path's vertex.
+    pub light: u32,
     /// Where it belongs.
     pub part: Part,
     /// Radiance of the pixel, unweighted.
@@ -100,7 +102,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
                 (_, true) => Part::Caustic,
                 _ => Part::Indirect,
             };
-            self.left.splats.push(Splat { pixel: y * width + x, part, value, ratios });
+            self.left.splats.push(Splat { pixel: y * width + x, light: vertex.depth, part, value, ratios });
         }
     }
 }

@@ -54,6 +54,20 @@ impl LevelRadii {
     }
 }
 
+/// Bandwidths where an eye path gathers.
+pub trait Bandwidths {
+    /// Those at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
+    fn at(&mut self, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+}
+
+/// The same all along the path.
+impl Bandwidths for &LevelRadii {
+    #[inline]
+    fn at(&mut self, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
+        **self
+    }
+}
+
 /// What denoisers want to know about a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features {
@@ -112,11 +126,11 @@ enum Stage {
     Later,
 }
 
-struct Gather<'a> {
+struct Gather<'a, B> {
     scene: &'a Scene,
     photons: &'a PhotonMap,
     near: &'a mut Near<Photon>,
-    radii: &'a LevelRadii,
+    bandwidths: B,
     max_depth: u32,
     measure: EyeMeasure,
     /// Length of the path so far.
@@ -126,7 +140,7 @@ struct Gather<'a> {
     last: Vec3,
 }
 
-impl Gather<'_> {
+impl<B: Bandwidths> Gather<'_, B> {
     /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with
     /// which next-event estimation at the last vertex would have found it.
     #[inline]
@@ -151,7 +165,8 @@ impl Gather<'_> {
     /// 2021, (2) and (3)].
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
-        let radii = &self.radii.radius2[..self.radii.count];
+        let radii = self.bandwidths.at(self.photons, vertex.surface.p, vertex.surface.ng, self.length);
+        let radii = &radii.radius2[..radii.count];
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
         let mut batch = Batch::new(radii, vertex.shading, broad, broad | sharp);
@@ -172,7 +187,7 @@ impl Gather<'_> {
     }
 }
 
-impl<'a> Visitor<'a> for Gather<'_> {
+impl<'a, B: Bandwidths> Visitor<'a> for Gather<'_, B> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let (surface, shading) = (vertex.surface, vertex.shading);
@@ -278,20 +293,20 @@ impl Eye<'_> {
         starts
     }
 
-    /// Traces one eye path and measures all levels of `radii`. `scratch` has served no other photons.
+    /// Traces one eye path and measures all levels of `bandwidths`. `scratch` has served no other photons.
     #[inline]
     pub fn measure(
         &self,
         scratch: &mut Scratch,
         (start, stream): &(PathStart, Stream),
         photons: &PhotonMap,
-        radii: &LevelRadii,
+        bandwidths: impl Bandwidths,
     ) -> EyeMeasure {
         let mut gather = Gather {
             scene: self.scene,
             photons,
             near: &mut scratch.near,
-            radii,
+            bandwidths,
             max_depth: self.max_depth,
             measure: EyeMeasure::default(),
             length: 0.0,

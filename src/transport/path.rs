@@ -3,7 +3,7 @@
 //! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
 //! (`direct_light` splits them), so that the two check each other.
 
-use super::bidirectional::{Part, Trail};
+use super::bidirectional::{Part, Record, Technique, Trail};
 use super::bidirectional_eye::look;
 use super::eye::{Eye, EyeMeasure};
 use super::segment::transmittance;
@@ -14,15 +14,18 @@ use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
 
-struct PathTracer<'a> {
+struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
     measure: EyeMeasure,
     trail: Trail,
     last: Vec3,
+    /// Depth of the last vertex.
+    depth: u32,
+    record: &'a mut R,
 }
 
-impl PathTracer<'_> {
+impl<R: Record> PathTracer<'_, R> {
     /// Weight of having run into an emitter: full where next-event estimation could not have found it.
     fn weight(scattered: Option<Scattered>, pdf_light: f32) -> f32 {
         match scattered {
@@ -31,18 +34,19 @@ impl PathTracer<'_> {
         }
     }
 
-    fn next_event(&self, vertex: &Vertex<'_, '_>) -> Rgb {
+    /// Light straight from a light, weighted, and its weight.
+    fn next_event(&self, vertex: &Vertex<'_, '_>) -> (Rgb, f32) {
         let (scene, surface, draws) = (self.scene, vertex.surface, vertex.draws);
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
-            return Rgb::ZERO;
+            return (Rgb::ZERO, 1.0);
         };
         let (f, pdf) = vertex.shading.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         let pdf = pdf * vertex.survival(LobeSet::ALL);
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let arriving = f * light.radiance * (weight / light.pdf_w);
         if arriving.max_element() <= 0.0 {
-            return Rgb::ZERO;
+            return (Rgb::ZERO, 1.0);
         }
         let origin = surface.spawn(light.wi);
         let (direction, tmax) = light.target.map_or((light.wi, f32::INFINITY), |target| {
@@ -51,12 +55,15 @@ impl PathTracer<'_> {
         });
         let crosses = light.wi.dot(surface.ng) * vertex.wo.dot(surface.ng) < 0.0;
         let interior = if crosses { vertex.interior_behind } else { vertex.interior };
-        arriving * transmittance(scene, origin, direction, tmax, interior, draws.token(Purpose::ShadowAlpha))
+        let token = draws.token(Purpose::ShadowAlpha);
+        (arriving * transmittance(scene, origin, direction, tmax, interior, token), weight)
     }
-}
 
-impl PathTracer<'_> {
-    fn add(&mut self, part: Part, light: Rgb) {
+    /// Adds weighted light.
+    fn add(&mut self, technique: Technique, part: Part, light: Rgb, weight: f32) {
+        if weight > 0.0 {
+            self.record.arrival(technique, 0, light / weight, weight);
+        }
         let measure = &mut self.measure;
         *match part {
             Part::Emission => &mut measure.emission,
@@ -67,17 +74,21 @@ impl PathTracer<'_> {
     }
 }
 
-impl<'a> Visitor<'a> for PathTracer<'_> {
+impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         look(&mut self.trail, vertex, scattered, &mut self.measure);
+        self.depth = vertex.depth;
         let from = if scattered.is_none() { vertex.from } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, from, vertex.surface) {
             let part = self.trail.hit(scattered.map(|s| s.lobe));
-            self.add(part, vertex.throughput * radiance * Self::weight(scattered, pdf));
+            let weight = Self::weight(scattered, pdf);
+            self.add(Technique::Hit { eye: self.depth }, part, vertex.throughput * radiance * weight, weight);
         }
         self.last = vertex.surface.p;
         if vertex.depth < self.max_depth {
-            self.add(self.trail.next_event(), vertex.throughput * self.next_event(vertex));
+            let (light, weight) = self.next_event(vertex);
+            let technique = Technique::NextEvent { eye: self.depth };
+            self.add(technique, self.trail.next_event(), vertex.throughput * light, weight);
         }
         self.trail.leave(vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH));
         Next::Continue(LobeSet::ALL)
@@ -88,21 +99,31 @@ impl<'a> Visitor<'a> for PathTracer<'_> {
             self.trail.scattered(scattered.lobe);
         }
         let part = self.trail.hit(scattered.map(|s| s.lobe));
-        let scene = self.scene;
-        scene.lights.escape(direction, |light, pdf| self.add(part, throughput * light * Self::weight(scattered, pdf)));
+        let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
+        scene.lights.escape(direction, |light, pdf| {
+            let weight = Self::weight(scattered, pdf);
+            self.add(technique, part, throughput * light * weight, weight);
+        });
     }
 }
 
 /// What one path through a uniform point of pixel `(x, y)` measures, on one level.
-pub fn path_measure(eye: &Eye<'_>, arena: &Bump, pixel: (u32, u32), stream: Stream) -> EyeMeasure {
+pub fn path_measure(
+    eye: &Eye<'_>,
+    arena: &Bump,
+    pixel: (u32, u32),
+    stream: Stream,
+    record: &mut impl Record,
+) -> EyeMeasure {
     let start = eye.start(pixel, stream);
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
-    let mut tracer = PathTracer { scene: eye.scene, max_depth: eye.max_depth, measure, trail, last: start.origin };
+    let (scene, max_depth, last) = (eye.scene, eye.max_depth, start.origin);
+    let mut tracer = PathTracer { scene, max_depth, measure, trail, last, depth: 0, record };
     walk(eye.scene, arena, &start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    path_measure(eye, &Bump::new(), pixel, stream).radiance(0)
+    path_measure(eye, &Bump::new(), pixel, stream, &mut ()).radiance(0)
 }

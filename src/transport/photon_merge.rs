@@ -100,7 +100,9 @@ pub(super) fn merge_photons<R: Record>(
         record.contribution(technique, value, photon.p, ratios);
         for (level, (&radius2, &eta)) in radii.iter().zip(levels.eta()).enumerate() {
             if distance2 < radius2 {
-                add(photon, level, value * (ratios.merge_weight(eta) * FRAC_1_PI / radius2));
+                let weight = ratios.merge_weight(eta);
+                record.arrival(technique, level, value * (FRAC_1_PI / radius2), weight);
+                add(photon, level, value * (weight * FRAC_1_PI / radius2));
             }
         }
     });

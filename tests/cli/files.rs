@@ -1,6 +1,7 @@
 //! What a render leaves in its files.
 
 use crate::{Folder, values};
+use caustique::image::exr;
 use serde_json::Value;
 
 #[test]
@@ -115,6 +116,7 @@ fn every_method_leaves_what_it_has() {
         ("path", 1, false, true),
         ("light", 1, false, true),
         ("bdpt", 1, false, true),
+        ("pm", 1, false, false),
         ("sppm", 5, true, false),
         ("bpm", 1, true, false),
         ("vcm", 5, true, false),
@@ -148,7 +150,7 @@ fn every_method_leaves_what_it_has() {
         means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
     }
     // Those that find everything agree roughly here; closely in tests of their own.
-    assert!(means[3..].iter().all(|mean| (mean / means[3] - 1.0).abs() < 0.1), "{means:?}");
+    assert!(means[3..].iter().all(|mean| (mean / means[4] - 1.0).abs() < 0.1), "{means:?}");
 
     let idle = folder.run("render scene.glb -o out.exr --method vcm --photons 1000");
     assert_eq!(
@@ -158,6 +160,94 @@ fn every_method_leaves_what_it_has() {
             "command line: --photons has no effect with --method vcm\nhint: leave --photons out, or choose --method sppm\n"
         )
     );
+}
+
+/// The pictures per technique are where and what they should be: weighted ones sum to the method's own image, and each is at most what is
+/// found without weights.
+#[test]
+fn a_picture_per_technique() {
+    let folder = Folder::new();
+    let cases = [
+        ("path", &["hit_s0_t3", "nextevent_s1_t2"][..]),
+        ("light", &["camera_s2_t1", "camera_s3_t1"]),
+        ("bdpt", &["hit_s0_t3", "nextevent_s1_t2", "camera_s2_t1", "connect_s2_t2"]),
+        ("bpm", &["merge_s2_t2", "merge_s3_t2"]),
+        ("vcm", &["hit_s0_t3", "nextevent_s1_t2", "camera_s2_t1", "connect_s2_t2", "merge_s3_t3"]),
+    ];
+    for (method, expected) in cases {
+        let options = format!("--width 40 --height 30 --iterations 4 --method {method} --no-combine --progress none");
+        let outcome =
+            folder.run(&format!("render scene.glb -o {method}.exr {options} --debug-techniques {method}/techniques"));
+        assert_eq!((outcome.code, outcome.stderr.contains("panicked")), (Some(0), false), "{}", outcome.stderr);
+        let path = format!("{method}/techniques");
+        let names = std::fs::read_dir(folder.path(&path)).expect("the folder is there");
+        let names: Vec<String> = names.map(|e| e.expect("an entry").file_name().to_string_lossy().into()).collect();
+        for name in expected {
+            for end in ["weighted.exr", "weighted.png", "unweighted.exr", "unweighted.png"] {
+                assert!(names.contains(&format!("{name}.{end}")), "{method}: {name}.{end} in {names:?}");
+            }
+        }
+        let (set, _) = folder.read(&format!("{method}.exr"));
+        let noisy = values(&set, "Noisy");
+        let mut sum = vec![[0f64; 3]; noisy.len()];
+        let picture = |name: &str| {
+            let (set, _) = exr::read(&folder.path(&format!("{path}/{name}"))).expect("a picture");
+            values(&set, "")
+        };
+        for name in names.iter().filter(|name| name.ends_with(".weighted.exr")) {
+            let (weighted, unweighted) = (picture(name), picture(&name.replace(".weighted", ".unweighted")));
+            for (i, sum) in sum.iter_mut().enumerate() {
+                for c in 0..3 {
+                    assert!(weighted[i][c] <= unweighted[i][c] * 1.00001, "{method}: {name}, pixel {i}");
+                    sum[c] += f64::from(weighted[i][c]);
+                }
+            }
+        }
+        for (i, (sum, noisy)) in sum.iter().zip(&noisy).enumerate() {
+            for c in 0..3 {
+                let (sum, noisy) = (sum[c], f64::from(noisy[c]));
+                assert!((sum - noisy).abs() <= 1e-5 * noisy.max(1e-3), "{method}, pixel {i}: {sum} {noisy}");
+            }
+        }
+        assert!(noisy.iter().any(|p| p[1] > 0.0));
+    }
+    let idle = folder.run("render scene.glb -o out.exr --debug-techniques d");
+    let cause = "command line: --debug-techniques has no effect with --method sppm\nhint: ";
+    assert!(idle.code == Some(2) && idle.stderr.starts_with(cause), "{}", idle.stderr);
+    std::fs::write(folder.path("file"), "").expect("a file");
+    let refused = folder.run("render scene.glb -o out.exr --method path --debug-techniques file");
+    assert!(refused.code == Some(1) && refused.stderr.starts_with("file: "), "{}", refused.stderr);
+}
+
+/// A map that does not fit ends early, says so, and shines no less.
+#[test]
+fn a_full_photon_map_is_said() {
+    let folder = Folder::new();
+    let pm = "render scene.glb --width 48 --height 36 --iterations 4 --method pm --photons 60000 --progress none";
+    let mut means = vec![];
+    for (name, memory, full) in [("all.exr", 64, false), ("some.exr", 1, true)] {
+        let outcome = folder.run(&format!("{pm} -o {name} --photon-memory {memory}"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        assert_eq!(outcome.stderr.contains("warning: the photon map was full at "), full, "{}", outcome.stderr);
+        let (set, header) = folder.read(name);
+        let photons = header["map"]["photons"].as_u64().expect("a number");
+        assert_eq!(header["map"]["full"], full);
+        assert_eq!(header["light_paths"].as_u64() < Some(60_000), full);
+        assert!(photons > 0 && photons * 152 <= memory << 20, "{photons}");
+        let noisy = values(&set, "Noisy");
+        means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
+    }
+    // Some 7000 photons, in clusters.
+    assert!((means[1] / means[0] - 1.0).abs() < 0.05, "{means:?}");
+    for (option, cause) in [
+        ("--method pm --knn 1", "--knn must be 2 or more with --method pm"),
+        ("--method vcm --photon-memory 10", "--photon-memory has no effect with --method vcm"),
+        ("--method pm --initial-bandwidth 0.1", "--initial-bandwidth has no effect with --method pm"),
+    ] {
+        let outcome = folder.run(&format!("render scene.glb -o out.exr {option}"));
+        assert_eq!(outcome.code, Some(2));
+        assert!(outcome.stderr.starts_with(&format!("command line: {cause}\nhint: ")), "{}", outcome.stderr);
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
-use caustique::render::Settings;
+use caustique::render::{MAX_TECHNIQUES, Method, Settings};
 use caustique::transport::EyeMeasure;
 use std::mem::size_of;
 
@@ -11,17 +11,23 @@ const PER_LIGHT_PATH: u64 = 150;
 /// The same where photons carry what their weights are made of, and every bounce leaves one.
 const PER_MERGED_PATH: u64 = 800;
 
+/// Bytes per pixel of a technique's weighted and unweighted picture.
+const PER_TECHNIQUE: u64 = 24;
+
 /// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
 fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
     let eye_paths = 1 + u64::from(settings.levels.two_paths);
     let (method, measure) = (settings.method, size_of::<EyeMeasure>() as u64);
     let (per_path, photons) = match (method.counts_photons(), method.has_bandwidths()) {
+        _ if method == Method::Pm => (0, settings.photon_memory.min(u64::from(settings.photons) * PER_LIGHT_PATH)),
         (true, _) => (0, u64::from(settings.photons) * PER_LIGHT_PATH),
         (false, true) => (measure + PER_MERGED_PATH, 0),
         (false, false) => (measure, 0),
     };
-    let per_pixel = (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
+    // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
+    let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
+    let per_pixel = pictures + (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
     pixels * per_pixel + photons
 }
 
@@ -41,7 +47,8 @@ pub fn check(settings: &Settings, size: (u32, u32), channels: usize) -> Result<(
     let Some(available) = available().filter(|available| needed > *available) else { return Ok(()) };
     let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
     let paths = if settings.method.counts_photons() {
-        format!(" and {} light paths an iteration", settings.photons)
+        let each = if settings.method == Method::Pm { "" } else { " an iteration" };
+        format!(" and {} light paths{each}", settings.photons)
     } else {
         format!(" with --method {}", settings.method.name())
     };
@@ -59,7 +66,6 @@ pub fn check(settings: &Settings, size: (u32, u32), channels: usize) -> Result<(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use caustique::render::Method;
 
     #[test]
     fn the_largest_picture_does_not_overflow() {

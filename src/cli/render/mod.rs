@@ -4,6 +4,7 @@ mod memory;
 mod options;
 mod plan;
 mod summary;
+mod techniques;
 
 pub use options::RenderArgs;
 
@@ -35,6 +36,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let selection = selection(args, &settings)?;
     output::check(&args.output, "exr")?;
     args.picture.check()?;
+    techniques::prepare(args)?;
     super::pool(args.threads)?.install(|| render(args, &settings, &selection))
 }
 
@@ -53,7 +55,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     }
     let mut reporter = Reporter::new(args.progress, settings);
     plan::tell_missed(args, &plan);
-    let rendered = caustique::render::render(&scene, &camera, settings, |progress, _| {
+    let mut rendered = caustique::render::render(&scene, &camera, settings, |progress, _| {
         reporter.report(progress);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     });
@@ -67,6 +69,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let mut set = rendered.layers(environment, wanted)?;
     let mut attributes = cryptomattes(&scene, &rendered, args, selection, &mut set)?;
     let summary = Summary::of(&rendered);
+    let (size, pictures) = ((set.width, set.height), std::mem::take(&mut rendered.techniques));
     // The pixels are most of the memory, and all that is wanted of them is in the layers now.
     drop(rendered);
     let mut refusal = None;
@@ -89,14 +92,17 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let written = write(args, &set, &attributes);
     let pictured = args.picture.write_png(&set);
+    let debugged = techniques::write(args, size, &pictures);
     if talk {
         summary.tell(name);
     }
+    summary.tell_full();
     summary.tell_rejected(args);
     written?;
     pictured?;
+    debugged?;
     if talk {
-        Summary::tell_files(args, &set);
+        Summary::tell_files(args, &set, pictures.len());
     }
     if let Some(error) = refusal {
         let output = args.output.display();

@@ -6,7 +6,9 @@ use crate::cli::progress::Form;
 use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
-use caustique::render::{self, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_PHOTONS, Levels, Settings, Shard};
+use caustique::render::{
+    self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, Levels, PHOTON_BYTES, Settings, Shard,
+};
 use caustique::scene::{MAX_SIZE, View};
 use caustique::transport::MAX_LEVELS;
 use clap::{ValueEnum, value_parser};
@@ -31,10 +33,14 @@ pub struct RenderArgs {
     /// How light is found
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
-    /// Light paths sent from the lights in each iteration of sppm: more give a smoother start, fewer faster iterations. The other
-    /// methods send one for every eye path, or none [default: 100000]
+    /// Light paths sent from the lights, by sppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
+    /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
+    /// Memory for the map of pm in MiB, while it is built: 152 bytes a photon. Where it is full, light paths end, and a warning says
+    /// so [default: 1024]
+    #[arg(long, value_name = "MIB", value_parser = value_parser!(u32).range(1..), help_heading = "Method")]
+    pub photon_memory: Option<u32>,
     /// Bandwidth levels of sppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
     /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
     #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
@@ -43,7 +49,7 @@ pub struct RenderArgs {
     /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
     #[arg(long, value_name = "knn|footprint|R", help_heading = "Method")]
     pub initial_bandwidth: Option<BandwidthChoice>,
-    /// Photons within the largest bandwidth to begin with, 1 to 1024 [default: 20, with one level 10]
+    /// Photons within the largest bandwidth to begin with, 1 to 1024; with pm within every bandwidth [default: 20, with one level 10; pm: 100]
     #[arg(long, value_name = "K", value_parser = value_parser!(u32).range(1..=1024), help_heading = "Method")]
     pub knn: Option<u32>,
     /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
@@ -108,6 +114,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     #[serde(skip)]
     pub threads: usize,
+    /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG: how path, light, bdpt, bpm or vcm share the light
+    /// among their strategies. Weighted pictures sum to the layer Noisy
+    #[arg(long, value_name = "DIR", help_heading = "Running")]
+    #[serde(skip)]
+    pub debug_techniques: Option<PathBuf>,
     /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
@@ -130,6 +141,8 @@ pub enum Method {
     Light,
     /// Bidirectional path tracing
     Bdpt,
+    /// Classical photon mapping: one map, the nearest photons; tends to a blurred picture
+    Pm,
     /// Stochastic progressive photon mapping
     Sppm,
     /// Bidirectional photon mapping: merging alone
@@ -146,6 +159,7 @@ impl Method {
             Method::Path => render::Method::Path,
             Method::Light => render::Method::Light,
             Method::Bdpt => render::Method::Bdpt,
+            Method::Pm => render::Method::Pm,
             Method::Bpm => render::Method::Bpm,
             Method::Vcm => render::Method::Vcm,
         }
@@ -211,8 +225,8 @@ impl FromStr for ShardChoice {
     }
 }
 
-/// The help of `--levels` names the limit.
-const _: () = assert!(MAX_LEVELS == 5);
+/// The helps of `--levels` and `--photon-memory` name these.
+const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 152);
 
 fn level_count(text: &str) -> std::result::Result<usize, String> {
     let range = format!("it must be a whole number from 1 to {MAX_LEVELS}");
@@ -229,6 +243,7 @@ impl RenderArgs {
     fn check_method(&self, method: render::Method) -> Result<()> {
         let given = [
             (self.photons.is_some() && !method.counts_photons(), "--photons"),
+            (self.photon_memory.is_some() && method != render::Method::Pm, "--photon-memory"),
             (self.levels.is_some_and(|m| m > 1) && !method.has_levels(), "--levels"),
             (self.knn.is_some() && !method.counts_photons(), "--knn"),
             (self.initial_bandwidth.is_some() && !method.has_bandwidths(), "--initial-bandwidth"),
@@ -237,10 +252,17 @@ impl RenderArgs {
                 "--initial-bandwidth knn",
             ),
             (self.alpha.is_some() && !method.has_bandwidths(), "--alpha"),
+            (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
         let cause = format!("{option} has no effect with --method {}", method.name());
-        Err(Error::new(Kind::Usage, "command line", cause).hint(format!("leave {option} out, or choose --method sppm")))
+        let other = match *option {
+            "--photon-memory" => "pm",
+            "--debug-techniques" => "vcm",
+            _ => "sppm",
+        };
+        Err(Error::new(Kind::Usage, "command line", cause)
+            .hint(format!("leave {option} out, or choose --method {other}")))
     }
 
     /// The render asked for.
@@ -250,12 +272,16 @@ impl RenderArgs {
     pub fn settings(&self) -> Result<Settings> {
         let method = self.method.chosen();
         self.check_method(method)?;
+        if method == render::Method::Pm && self.knn == Some(1) {
+            // The k-th photon is on the rim: with one neighbour there would be none inside.
+            let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
+            return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
+        }
         let levels = Levels::new(self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 }));
         let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
         let initial = match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
             (BandwidthChoice::Knn, k) => {
-                let default = if levels.count > 1 { DEFAULT_KNN.0 } else { DEFAULT_KNN.1 };
-                InitialBandwidth::Nearest(k.map_or(default, |k| k as usize))
+                InitialBandwidth::Nearest(k.map_or(method.neighbours(levels.count), |k| k as usize))
             }
             (_, Some(_)) => {
                 let error =
@@ -275,8 +301,10 @@ impl RenderArgs {
         Ok(render::Settings {
             method,
             seed: self.seed,
-            photons: self.photons.unwrap_or(DEFAULT_PHOTONS),
+            photons: self.photons.unwrap_or(method.photons()),
+            photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
+            techniques: self.debug_techniques.is_some(),
             initial,
             alpha: self.alpha.unwrap_or(method.alpha()),
             max_depth: self.max_depth.unwrap_or(u32::MAX),

@@ -16,6 +16,8 @@ pub struct Summary {
     error: Option<f64>,
     rejected: u64,
     stop: StopReason,
+    /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
+    full: Option<(u64, u32, u64)>,
 }
 
 impl Summary {
@@ -32,6 +34,10 @@ impl Summary {
             error: rendered.relative_error(),
             rejected: rendered.rejected(),
             stop: rendered.stop,
+            full: rendered.map_is_full().then(|| {
+                let settings = &rendered.settings;
+                (rendered.photons, settings.photons, settings.photon_memory)
+            }),
         }
     }
 
@@ -53,11 +59,25 @@ impl Summary {
     }
 
     /// The files that are written.
-    pub fn tell_files(args: &RenderArgs, set: &LayerSet) {
+    pub fn tell_files(args: &RenderArgs, set: &LayerSet, techniques: usize) {
         let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
         say(&format!("{}: {} x {}, {channels} channels", args.output.display(), set.width, set.height));
         if let Some(png) = &args.picture.png {
             say(&png.display().to_string());
+        }
+        if let Some(folder) = &args.debug_techniques {
+            say(&format!("{}: {techniques} techniques, weighted and unweighted", folder.display()));
+        }
+    }
+
+    /// A warning if the photon map became full.
+    pub fn tell_full(&self) {
+        if let Some((photons, asked, bytes)) = self.full {
+            say(&format!(
+                "warning: the photon map was full at {photons} photons ({} MiB) after {} of {asked} light paths; --photon-memory allows more",
+                bytes >> 20,
+                self.light_paths
+            ));
         }
     }
 

@@ -1,0 +1,49 @@
+//! `--debug-techniques`: pictures per sampling technique, as files.
+
+use super::options::RenderArgs;
+use caustique::error::{Error, Kind, Result};
+use caustique::film::{Layer, LayerSet};
+use caustique::image::exr::{self, Attributes};
+use caustique::image::png;
+use caustique::render::TechniquePicture;
+use std::path::Path;
+
+/// Makes the folder.
+///
+/// # Errors
+/// It can be neither found nor made.
+pub fn prepare(args: &RenderArgs) -> Result<()> {
+    let Some(folder) = &args.debug_techniques else { return Ok(()) };
+    std::fs::create_dir_all(folder).map_err(|cause| {
+        Error::new(Kind::Io, folder.display(), cause).hint("--debug-techniques wants a folder that can be written to")
+    })
+}
+
+/// Writes all pictures, each weighted and unweighted, as EXR and as PNG under the picture's exposure and tone curve.
+///
+/// # Errors
+/// The file system.
+pub fn write(args: &RenderArgs, size: (usize, usize), pictures: &[TechniquePicture]) -> Result<()> {
+    let Some(folder) = &args.debug_techniques else { return Ok(()) };
+    for picture in pictures {
+        for (values, kind) in [(&picture.weighted, "weighted"), (&picture.unweighted, "unweighted")] {
+            one(args, folder, &format!("{}.{kind}", picture.name()), size, values)?;
+        }
+    }
+    Ok(())
+}
+
+fn one(
+    args: &RenderArgs,
+    folder: &Path,
+    name: &str,
+    (width, height): (usize, usize),
+    values: &[[f32; 3]],
+) -> Result<()> {
+    let mut set = LayerSet::new(width, height);
+    set.push(Layer::interleaved("", "RGB", values.iter().copied()))?;
+    let options = args.picture.exr_options(args.exr_naming.into());
+    exr::write(&folder.join(format!("{name}.exr")), &set, &Attributes::default(), options)?;
+    let (exposure, curve) = (args.picture.exposure as f32, args.picture.tonemap.into());
+    png::write_tonemapped(&folder.join(format!("{name}.png")), width, height, values, exposure, curve)
+}

@@ -1,0 +1,143 @@
+//! Classical photon mapping \[Jensen 1996\]: one photon map, traced once, and the nearest photons around every point that an eye path sees.
+//!
+//! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by next-event estimation, caustics and
+//! all other indirect light from the map. Eye paths accumulate over iterations, the map stays. So the picture tends to the map's
+//! own blurred and blotched one, never to the truth: only more photons help, and memory bounds their number. The
+//! estimated error, which is told from differences between iterations, does not know of it.
+//!
+//! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the number of paths that were
+//! traced.
+
+use super::control::cpu_seconds;
+use super::drive::{Iterate, Work};
+use super::result::Phases;
+use super::settings::Settings;
+use super::sppm::{keep_first_hit, trace_some};
+use crate::camera::{Camera, par_pixels};
+use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
+use crate::estimator::{InitialBandwidth, Pixel};
+use crate::math::Vec3;
+use crate::photon::{MAX_NEIGHBOURS, Nearest, Photon, PhotonMap};
+use crate::random::{Domain, Streams};
+use crate::scene::Scene;
+use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Scratch, Surroundings, light_path};
+use bumpalo::Bump;
+
+/// Light paths traced between two looks at the memory.
+const BATCH: u32 = 1 << 16;
+/// Bytes per photon while the map is built: the photon as traced and as sorted, its place on the curve, its share of the tree.
+pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
+
+/// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by it.
+fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (Vec<Photon>, u32) {
+    let (mut photons, mut traced) = (Vec::new(), 0);
+    while traced < pass.paths() {
+        let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
+        let end = paths.end;
+        let batch = trace_some(scene, surroundings, pass, paths);
+        if photons.len() + batch.len() > most {
+            break;
+        }
+        photons.extend(batch);
+        traced = end;
+    }
+    // The memory ends within a batch: path by path.
+    let mut arena = Bump::new();
+    while traced < pass.paths() {
+        let before = photons.len();
+        light_path(scene, &arena, surroundings, pass, traced, &mut photons);
+        arena.reset();
+        if photons.len() > most {
+            photons.truncate(before);
+            break;
+        }
+        traced += 1;
+    }
+    let more = pass.paths() as f32 / traced.max(1) as f32;
+    photons.iter_mut().for_each(|photon| photon.flux *= more);
+    (photons, traced)
+}
+
+/// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this area holds on average.
+struct Neighbours<'a> {
+    count: usize,
+    nearest: &'a mut Nearest,
+    camera: &'a Camera,
+    least: f32,
+}
+
+impl Bandwidths for Neighbours<'_> {
+    fn at(&mut self, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
+        let cap = (SCREEN_CAP * span(self.camera, length)).max(self.least);
+        let cap2 = cap * cap;
+        let radius2 = self.nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
+        LevelRadii::new(std::iter::once(radius2.max(self.least * self.least)))
+    }
+}
+
+/// The passes of a render.
+pub(super) struct Pm<'a> {
+    eye: Eye<'a>,
+    settings: &'a Settings,
+    surroundings: &'a Surroundings,
+    /// Built by the first iteration.
+    map: Option<PhotonMap>,
+}
+
+impl<'a> Pm<'a> {
+    /// Nothing done yet.
+    pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &'a Settings, surroundings: &'a Surroundings) -> Pm<'a> {
+        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
+        Pm { eye, settings, surroundings, map: None }
+    }
+
+    fn build(&self, phases: &mut Phases) -> (PhotonMap, u32) {
+        let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
+        let start = cpu_seconds();
+        let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth);
+        let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
+        let (photons, traced) = trace(self.eye.scene, self.surroundings, &pass, most);
+        phases.light += cpu_seconds() - start;
+        let start = cpu_seconds();
+        let map = PhotonMap::build(photons);
+        phases.map += cpu_seconds() - start;
+        (map, traced)
+    }
+}
+
+impl Iterate for Pm<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        let (width, height) = self.eye.camera.size();
+        vec![Pixel::new(0.0); width as usize * height as usize]
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+        let (map, traced) = match self.map.take() {
+            Some(map) => (map, 0),
+            None => self.build(phases),
+        };
+        let start = cpu_seconds();
+        let (eye, camera) = (&self.eye, self.eye.camera);
+        let count = match self.settings.initial {
+            InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
+            _ => self.settings.method.neighbours(1),
+        };
+        let least = LEAST * eye.scene.lights.sky().radius;
+        let streams = Streams::new(self.settings.seed, i, Domain::EyeIndependent);
+        let scratch = <(Scratch, Nearest)>::default;
+        par_pixels(pixels, camera.size().0, scratch, |(scratch, nearest), pixels, places| {
+            let starts = eye.starts(places, streams);
+            for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                let pixel = &mut pixels[place.at];
+                let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
+                let measure = eye.measure(scratch, start, &map, neighbours);
+                keep_first_hit(eye, pixel, &measure);
+                pixel.add(&measure, None, 1, 0);
+            }
+        });
+        phases.eye += cpu_seconds() - start;
+        let photons = map.photons().len();
+        self.map = Some(map);
+        Work { light_paths: u64::from(traced), photons }
+    }
+}

@@ -1,0 +1,130 @@
+//! Classical photon mapping against closed forms.
+//!
+//! Every check is a t test over independent seeds (each with a map of its own) at a family-wise error rate of 0.1 % for the file, plus a stated
+//! bias: nearest neighbours of points as regular as emission draws them give up to 1 / 2k too little. Each also rejects an expectation shifted by
+//! a little more, which is less than what a wrong number of light paths or direct light counted twice would do.
+
+mod support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
+use caustique::render::{Control, Levels, Method, PHOTON_BYTES, Rendered, Settings, Shard, render};
+use caustique::scene::description::{PunctualKind, PunctualLight};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, square};
+use support::stats::{mean_and_error, t_critical};
+
+const TESTS: usize = 4;
+const ERROR_RATE: f64 = 1e-3;
+const SEEDS: u64 = 32;
+const SIZE: u32 = 8;
+
+fn settings(photons: u32, seed: u64) -> Settings {
+    Settings {
+        method: Method::Pm,
+        seed,
+        photons,
+        initial: InitialBandwidth::Nearest(100),
+        levels: Levels::new(1),
+        iterations: Some(4),
+        ..Settings::default()
+    }
+}
+
+fn picture(scene: &Scene, settings: &Settings) -> Rendered {
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let rendered = render(scene, &camera, settings, |_, _| Control::Continue);
+    assert_eq!(rendered.rejected(), 0);
+    rendered
+}
+
+fn mean(rendered: &Rendered) -> f64 {
+    rendered.pixels.iter().map(|p| p.levels[0].mean.x).sum::<f64>() / rendered.pixels.len() as f64
+}
+
+/// Checks the mean over seeds against `expected`; `detects` is a relative shift that is told.
+fn check(what: &str, values: &[f64], expected: f64, bias: f64, detects: f64) {
+    let (mean, error) = mean_and_error(values);
+    println!("{what}: {mean:.6} +- {error:.6}, expected {expected:.6}");
+    let critical = t_critical(ERROR_RATE, TESTS, values.len() as f64 - 1.0);
+    let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected;
+    assert!(passes(expected), "{what}: {mean} +- {error}, expected {expected}");
+    for planted in [expected * (1.0 - detects), expected * (1.0 + detects)] {
+        assert!(!passes(planted), "{what}: cannot tell {planted} ({mean} +- {error})");
+    }
+}
+
+/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho). The picture stays clear of
+/// the edges.
+fn furnace() -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    build(description)
+}
+
+#[test]
+fn furnace_box() {
+    let scene = furnace();
+    let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&picture(&scene, &settings(200_000, seed)))).collect();
+    check("furnace", &values, 1.0, 5e-3, 0.025);
+}
+
+/// Where the memory ends, light is divided by the light paths that were traced.
+#[test]
+fn a_full_map_is_no_darker() {
+    let scene = furnace();
+    let most = 30_000;
+    let mut values = vec![];
+    for seed in 0..SEEDS {
+        let all = Settings { photon_memory: most * PHOTON_BYTES, ..settings(200_000, seed) };
+        let rendered = picture(&scene, &all);
+        assert!(rendered.map_is_full() && rendered.light_paths < 100_000, "{} light paths", rendered.light_paths);
+        // The path that did not fit had a few photons.
+        assert!((most - 100..=most).contains(&rendered.photons), "{} photons", rendered.photons);
+        values.push(mean(&rendered));
+    }
+    check("full", &values, 1.0, 5e-3, 0.03);
+}
+
+/// The sun straight down through a glass slab on to a plane: a uniform caustic.
+#[test]
+fn sun_through_a_slab() {
+    let (rho, e, n) = (0.5f32, 3.0f32, 1.5f64);
+    let mut description = Description::default();
+    let floor = quad(Vec3::new(-0.5, 0.0, -0.5), Vec3::Z, Vec3::X);
+    add(&mut description, "plane", floor, matte(rho, 0.0));
+    // High above, so that what the plane sends back into the slab returns too thinly to matter (1e-3).
+    add(&mut description, "slab", cuboid(Vec3::new(-0.5, 4.0, -0.5), Vec3::new(0.5, 4.1, 0.5), false), glass(n as f32));
+    description.lights.push(PunctualLight {
+        name: "sun".into(),
+        to_world: DAffine3::from_quat(glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
+        intensity: Rgb::splat(e),
+        kind: PunctualKind::Sun { angle: 0.0 },
+        radius: 0.0,
+    });
+    description.cameras.push(look_at(DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, 14.0));
+    let scene = build(description);
+    let reflectance = ((n - 1.0) / (n + 1.0)).powi(2);
+    let slab = (1.0 - reflectance) / (1.0 + reflectance);
+    let expected = f64::from(rho * e) / std::f64::consts::PI * slab;
+    let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&picture(&scene, &settings(200_000, seed)))).collect();
+    check("caustic", &values, expected, 6e-3, 0.02);
+}
+
+/// All iterations and all shards see the same map, whatever the threads.
+#[test]
+fn threads_and_shards_change_nothing() {
+    let scene = furnace();
+    let base = Settings { photon_memory: 20_000 * PHOTON_BYTES, ..settings(50_000, 3) };
+    let all = |settings: &Settings, threads: usize| -> Vec<DVec3> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| picture(&scene, settings)).pixels.iter().map(|p| p.levels[0].mean).collect()
+    };
+    let whole = all(&base, 1);
+    assert!(whole == all(&base, 3), "threads change the picture");
+    let shard = |index| all(&Settings { shard: Shard { index, count: 2 }, ..base.clone() }, 2);
+    for ((a, b), whole) in shard(0).iter().zip(&shard(1)).zip(&whole) {
+        assert!(((*a + *b) * 0.5 - *whole).abs().max_element() <= 1e-6 * whole.max_element(), "{a} {b} {whole}");
+    }
+}
