@@ -410,6 +410,50 @@ fn levels_agree() {
     }
 }
 
+/// A picture per technique: the weighted ones sum to the method's own image, on a room with a lamp that can be hit.
+#[test]
+fn techniques_share_the_picture() {
+    let mut description = room(matte(0.6, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 64), mirror());
+    let scene = build(description);
+    let cases = [
+        (Method::Path, 1, &["hit_s0_t2", "hit_s0_t3", "hit_s0_t7up", "nextevent_s1_t2"][..]),
+        (Method::Light, 1, &["hit_s0_t2", "camera_s2_t1", "camera_s7up_t1"]),
+        (Method::Bdpt, 1, &["hit_s0_t3", "nextevent_s1_t2", "camera_s2_t1", "connect_s2_t2", "connect_s7up_t7up"]),
+        (Method::Bpm, 1, &["hit_s0_t2", "merge_s2_t2", "merge_s3_t2"]),
+        (Method::Vcm, 1, &["hit_s0_t3", "nextevent_s1_t3", "connect_s3_t2", "merge_s3_t3"]),
+        (Method::Vcm, 5, &["hit_s0_t3", "nextevent_s1_t3", "connect_s3_t2", "merge_s3_t3"]),
+    ];
+    for (method, levels, expected) in cases {
+        let settings = Settings { levels: Levels::new(levels), techniques: true, ..settings(5, 0.08, 3) };
+        let rendered = render(&scene, method, 40, &settings);
+        let plain = render(&scene, method, 40, &Settings { techniques: false, ..settings.clone() });
+        let own = settings.levels.own();
+        assert!(plain.techniques.is_empty());
+        let names: Vec<String> = rendered.techniques.iter().map(|picture| picture.name()).collect();
+        assert!(expected.iter().all(|name| names.iter().any(|n| n == name)), "{method:?}: {names:?}");
+        let (mut sums, mut alone) = (vec![0.0; 1600], 0.0);
+        for picture in &rendered.techniques {
+            for (i, (weighted, unweighted)) in picture.weighted.iter().zip(&picture.unweighted).enumerate() {
+                assert!(weighted[0] <= 1.00001 * unweighted[0], "{method:?}, {}, pixel {i}", picture.name());
+                sums[i] += f64::from(weighted[0]);
+                alone += f64::from(unweighted[0]);
+            }
+        }
+        for (i, sum) in sums.iter().enumerate() {
+            let image = rendered.pixels[i].levels[own].mean;
+            assert!(image == plain.pixels[i].levels[own].mean, "watching changes {method:?}");
+            assert!(
+                (sum - image.x).abs() <= 1e-5 * image.x.max(1e-3),
+                "{method:?}, {levels}, pixel {i}: {sum} {image}"
+            );
+        }
+        // Left out, weights would show: the strategies overlap.
+        let share = sums.iter().sum::<f64>() / alone;
+        assert_eq!(share < 0.9, !matches!(method, Method::Light), "{method:?}: {share}");
+    }
+}
+
 /// The same bits from one thread and from three, on a picture that tiles do not fill; and two shards make the whole.
 #[test]
 fn threads_and_shards_change_nothing() {

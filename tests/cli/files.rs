@@ -168,11 +168,11 @@ fn every_method_leaves_what_it_has() {
 fn a_picture_per_technique() {
     let folder = Folder::new();
     let cases = [
-        ("path", &["hit_s0_t3", "nextevent_s1_t2"][..]),
+        ("path", &["nextevent_s1_t2", "nextevent_s1_t3"][..]),
         ("light", &["camera_s2_t1", "camera_s3_t1"]),
-        ("bdpt", &["hit_s0_t3", "nextevent_s1_t2", "camera_s2_t1", "connect_s2_t2"]),
+        ("bdpt", &["nextevent_s1_t2", "camera_s2_t1", "camera_s3_t1"]),
         ("bpm", &["merge_s2_t2", "merge_s3_t2"]),
-        ("vcm", &["hit_s0_t3", "nextevent_s1_t2", "camera_s2_t1", "connect_s2_t2", "merge_s3_t3"]),
+        ("vcm", &["nextevent_s1_t2", "camera_s2_t1", "merge_s3_t3"]),
     ];
     for (method, expected) in cases {
         let options = format!("--width 40 --height 30 --iterations 4 --method {method} --no-combine --progress none");
@@ -223,7 +223,7 @@ fn a_picture_per_technique() {
 #[test]
 fn a_full_photon_map_is_said() {
     let folder = Folder::new();
-    let pm = "render scene.glb --width 48 --height 36 --iterations 4 --method pm --photons 60000 --progress none";
+    let pm = "render scene.glb --width 48 --height 36 --iterations 4 --method pm --photons 400000 --progress none";
     let mut means = vec![];
     for (name, memory, full) in [("all.exr", 64, false), ("some.exr", 1, true)] {
         let outcome = folder.run(&format!("{pm} -o {name} --photon-memory {memory}"));
@@ -232,13 +232,13 @@ fn a_full_photon_map_is_said() {
         let (set, header) = folder.read(name);
         let photons = header["map"]["photons"].as_u64().expect("a number");
         assert_eq!(header["map"]["full"], full);
-        assert_eq!(header["light_paths"].as_u64() < Some(60_000), full);
+        assert_eq!(header["light_paths"].as_u64() < Some(400_000), full);
         assert!(photons > 0 && photons * 152 <= memory << 20, "{photons}");
-        let noisy = values(&set, "Noisy");
-        means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
+        let by_photons = ["Caustic", "Indirect"].map(|name| values(&set, name).iter().map(|p| p[1]).sum::<f32>());
+        means.push(by_photons[0] + by_photons[1]);
     }
-    // Some 7000 photons, in clusters.
-    assert!((means[1] / means[0] - 1.0).abs() < 0.05, "{means:?}");
+    // Some 7000 photons, in wide kernels; without dividing by fewer paths it would be a fraction.
+    assert!((means[1] / means[0] - 1.0).abs() < 0.15, "{means:?}");
     for (option, cause) in [
         ("--method pm --knn 1", "--knn must be 2 or more with --method pm"),
         ("--method vcm --photon-memory 10", "--photon-memory has no effect with --method vcm"),

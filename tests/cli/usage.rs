@@ -75,7 +75,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --method teapot"),
             2,
-            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, sppm, bpm, vcm]",
+            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, sppm, bpm, vcm]",
             help,
         ),
         (
