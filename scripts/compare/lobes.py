@@ -5,10 +5,12 @@ Both use GGX with exact or Schlick's Fresnel terms and draw visible normals. Thr
 - Masking on one side: Mitsuba multiplies G1(o) G1(i) [Walter et al. 2007, 23], caustique correlates heights [Heitz 2014, 99].
 - Light that facets scatter more than once: Mitsuba drops it, caustique gives it back by the separable lobe of Kulla and Conty
   ["Revisiting Physically Based Shading at Imageworks", 2017], for glass on both sides.
+- Rough matte: Mitsuba's roughplastic takes the transmittances of its interface from facets that lose light, so that a white
+  one in a white furnace keeps 0.84 of the light at alpha 0.16 and 0.4 at 0.81. Only its reflecting facets are taken; the
+  diffuse base below is coupled as in Kelemen and Szirmay-Kalos [2001], (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), which leaves
+  a white furnace white.
 
-- Rough matte: Mitsuba's roughplastic takes the transmittances of its two-way interface from facets that lose light, so that a white one
-  in a white furnace keeps 0.84 of the light at alpha 0.16 and 0.4 at 0.81. Only its reflecting facets are taken; the diffuse base below
-  is coupled as in Kelemen and Szirmay-Kalos [2001], (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), which a white furnace leaves white.
+Not corrected: metals whose roughness is a texture (their tables would change from point to point).
 
 `corrected` wraps one of Mitsuba's BSDFs, multiplies by the ratio of the maskings and adds the lobe. If the two renderers agree with
 it and not without, these are all the difference. The albedos come from a quadrature of this module's own.
@@ -57,7 +59,7 @@ def _fresnel(cos, eta):
 
 
 def _scattered(alpha, mu, eta=None):
-    """Shares of light along mu that facets reflect and transmit at once: those of a perfect reflector, or of the relative index eta."""
+    """Shares of light along mu that facets reflect and transmit at once; of a perfect reflector, or of glass of the index eta."""
     h, weights, o = _visible_normals(alpha, mu)
     cos = np.clip(h @ o, 0, 1)
     mirrored = 2 * cos[..., None] * h - o

@@ -290,15 +290,18 @@ def textures(folder):
     mirrored = g.texture(pattern(seed=7), wrap=33648, scale=[3, 3])
     clamped = g.texture(pattern(seed=8), wrap=33071, scale=[1.6, 1.4], offset=[-0.3, -0.2])
     turned = g.texture(pattern(seed=9), scale=[2, 2], rotation=0.7)
-    room(g, g.matte("floor", (1, 1, 1), texture=mirrored), [g.matte("back", (0.9, 0.9, 0.9), texture=clamped),
-                                                             g.matte("left", (0.8, 0.6, 0.5)), g.material("right", (0.5, 0.7, 0.8), 0.5, specular={"specularFactor": 0.5})])
+    half = g.material("right", (0.5, 0.7, 0.8), 0.5, specular={"specularFactor": 0.5})
+    room(g, g.matte("floor", (1, 1, 1), texture=mirrored),
+         [g.matte("back", (0.9, 0.9, 0.9), texture=clamped), g.matte("left", (0.8, 0.6, 0.5)), half])
     surface = pattern(seed=11, cells=4)
     surface[..., 1] = 0.2 + 0.12 * surface[..., 1]
     surface[..., 2] = 1.0
-    ball(g, "brushed", g.material("brushed", (0.9, 0.8, 0.6), 1.0, 1.0, surface=g.texture(surface, scale=[4, 2])), (-0.7, 0.41, 0.2), 0.4)
+    brushed = g.material("brushed", (0.9, 0.8, 0.6), 1.0, 1.0, surface=g.texture(surface, scale=[4, 2]))
+    ball(g, "brushed", brushed, (-0.7, 0.41, 0.2), 0.4)
     mixed = pattern(seed=12, cells=4, low=0.0, high=1.0)
     mixed[..., 1] = 1.0
-    ball(g, "patina", g.material("patina", (0.7, 0.5, 0.35), 0.3, 1.0, surface=g.texture(mixed, scale=[4, 2])), (0.75, 0.41, 0.1), 0.4)
+    patina = g.material("patina", (0.7, 0.5, 0.35), 0.3, 1.0, surface=g.texture(mixed, scale=[4, 2]))
+    ball(g, "patina", patina, (0.75, 0.41, 0.1), 0.4)
     g.node(name="crate", mesh=g.mesh(box((-0.3, 0, -0.3), (0.3, 0.6, 0.3)), g.material("crate", (1, 1, 1), 0.4, texture=turned)),
            translation=[0, 0.01, -0.6], rotation=[0, 0.1736481777, 0, 0.9848077530])
     ball(g, "glazed", g.material("glazed", (1, 1, 1), 0.3, texture=turned), (0.1, 0.26, 0.65), 0.25)
