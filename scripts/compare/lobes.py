@@ -5,10 +5,12 @@ Both use GGX with exact or Schlick's Fresnel terms and draw visible normals. Thr
 - Masking on one side: Mitsuba multiplies G1(o) G1(i) [Walter et al. 2007, 23], caustique correlates heights [Heitz 2014, 99].
 - Light that facets scatter more than once: Mitsuba drops it, caustique gives it back by the separable lobe of Kulla and Conty
   ["Revisiting Physically Based Shading at Imageworks", 2017], for glass on both sides.
+- Rough matte: Mitsuba's roughplastic takes the transmittances of its interface from facets that lose light, so that a white
+  one in a white furnace keeps 0.84 of the light at alpha 0.16 and 0.4 at 0.81. Only its reflecting facets are taken; the
+  diffuse base below is coupled as in Kelemen and Szirmay-Kalos [2001], (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), which leaves
+  a white furnace white.
 
-- Rough matte: Mitsuba's roughplastic takes the transmittances of its two-way interface from facets that lose light, so that a white one
-  in a white furnace keeps 0.84 of the light at alpha 0.16 and 0.4 at 0.81. Only its reflecting facets are taken; the diffuse base below
-  is coupled as in Kelemen and Szirmay-Kalos [2001], (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), which a white furnace leaves white.
+Not corrected: metals whose roughness is a texture (their tables would change from point to point).
 
 `corrected` wraps one of Mitsuba's BSDFs, multiplies by the ratio of the maskings and adds the lobe. If the two renderers agree with
 it and not without, these are all the difference. The albedos come from a quadrature of this module's own.
@@ -21,8 +23,8 @@ import numpy as np
 NODES = 128
 #: Points of the quadrature along each axis of the square of visible normals.
 POINTS = 96
-#: Share of directions drawn for the separable lobes, where they complete facets and where they are the base.
-SHARES = {"metal": 0.15, "glass": 0.15, "matte": 0.6}
+#: Share of directions drawn for the diffuse base of matte surfaces.
+DIFFUSE = 0.6
 
 
 def _lambda(alpha, z):
@@ -32,17 +34,18 @@ def _lambda(alpha, z):
 
 
 def _visible_normals(alpha, mu):
-    """Facet normals seen along the cosine mu, equally likely [Dupuy and Benyoub 2023]; and the direction."""
-    u, v = np.meshgrid(*[(np.arange(POINTS) + 0.5) / POINTS] * 2)
+    """Facet normals seen along the cosine mu [Dupuy and Benyoub 2023], their weights, and the direction."""
+    u, rest = np.meshgrid(*[(np.arange(POINTS) + 0.5) / POINTS] * 2)
+    # Graded towards steep facets, which are few and lose most of the light that they meet.
+    v, weights = 1 - rest**2, 2 * rest / POINTS**2
     o = np.array([np.sqrt(1 - mu * mu), 0.0, mu])
     stretched = o * [alpha, alpha, 1.0]
     stretched /= np.linalg.norm(stretched)
-    # Denser where a cap ends: grazing facets matter most.
     z = (1 - v) * (1 + stretched[2]) - stretched[2]
     r = np.sqrt(np.maximum(1 - z * z, 0))
     cap = np.stack([r * np.cos(2 * np.pi * u), r * np.sin(2 * np.pi * u), z], axis=-1) + stretched
     h = cap * [alpha, alpha, 1.0]
-    return h / np.linalg.norm(h, axis=-1, keepdims=True), o
+    return h / np.linalg.norm(h, axis=-1, keepdims=True), weights, o
 
 
 def _fresnel(cos, eta):
@@ -56,20 +59,20 @@ def _fresnel(cos, eta):
 
 
 def _scattered(alpha, mu, eta=None):
-    """Shares of light along mu that facets reflect and transmit at once: those of a perfect reflector, or of the relative index eta."""
-    h, o = _visible_normals(alpha, mu)
+    """Shares of light along mu that facets reflect and transmit at once; of a perfect reflector, or of glass of the index eta."""
+    h, weights, o = _visible_normals(alpha, mu)
     cos = np.clip(h @ o, 0, 1)
     mirrored = 2 * cos[..., None] * h - o
     lambda_o = _lambda(alpha, mu)
     up = mirrored[..., 2] > 0
     reflected = np.where(up, (1 + lambda_o) / (1 + lambda_o + _lambda(alpha, mirrored[..., 2])), 0)
     if eta is None:
-        return reflected.mean(), 0.0
+        return (weights * reflected).sum(), 0.0
     f, cos_t = _fresnel(cos, eta)
     refracted = (cos / eta - cos_t)[..., None] * h - o / eta
     down = refracted[..., 2] < 0
     transmitted = np.where(down, 1 / (1 + _lambda(alpha, refracted[..., 2])), 0)
-    return (f * reflected).mean(), ((1 - f) * transmitted).mean()
+    return (weights * f * reflected).sum(), (weights * (1 - f) * transmitted).sum()
 
 
 class Profile:
@@ -82,6 +85,18 @@ class Profile:
         weighted = values * 4 * roots**3
         self.average = float(((weighted[1:] + weighted[:-1]) / 2).sum() / (NODES - 1))
         self.values = mi.Float(values.astype(np.float32))
+        self.roots = mi.ContinuousDistribution(mi.ScalarVector2f(0, 1), mi.Float((weighted + 1e-6).astype(np.float32)))
+
+    def draw(self, sample):
+        """A direction of the upper hemisphere, in proportion to the profile and the cosine."""
+        mu = dr.square(self.roots.sample(sample.x))
+        sine, (s, c) = dr.sqrt(dr.maximum(1 - mu * mu, 0)), dr.sincos(dr.two_pi * sample.y)
+        return mi.Vector3f(sine * c, sine * s, mu)
+
+    def pdf(self, mu):
+        """Density per solid angle of `draw`: with mu = t^2, dmu = 2 t dt."""
+        t = dr.sqrt(dr.clip(mu, 1e-6, 1))
+        return self.roots.eval_pdf_normalized(t) / (4 * dr.pi * t)
 
     def at(self, mu):
         """Interpolated."""
@@ -113,7 +128,7 @@ class Corrected(mi.BSDF):
     def __init__(self, properties):
         mi.BSDF.__init__(self, properties)
         self.kind, self.nested, self.base = properties["kind"], properties["nested"], properties.get_texture("base")
-        self.alpha, self.share = properties["alpha"], SHARES[self.kind]
+        self.alpha = properties["alpha"]
         ior = self.ior = properties.get("ior", 1.5)
         flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide
         if self.kind == "glass":
@@ -123,7 +138,8 @@ class Corrected(mi.BSDF):
             # Reciprocity asks for shares that pass of k n^2 average, n and average those of the other side.
             transmitted = [1 - _average_fresnel(ior), 1 - _average_fresnel(1 / ior)]
             self.passed = float(min(transmitted[0] / index2[1], transmitted[1]) / max(averages))
-            self.returned = [float((1 - self.passed * index2[1 - s] * averages[1 - s]) / averages[s]) for s in (0, 1)]
+            self.passes = [float(self.passed * index2[1 - s] * averages[1 - s]) for s in (0, 1)]
+            self.returned = [(1 - self.passes[s]) / averages[s] for s in (0, 1)]
         else:
             self.loss = _loss(self.alpha)
         if self.kind == "matte":
@@ -164,14 +180,30 @@ class Corrected(mi.BSDF):
         through = base * (self.passed * dr.select(above, 1.0, self.ior**2))
         return dr.select(si.wi.z * wo.z > 0, mi.Color3f(back), through) * (own_i * own_o * mu_o * dr.inv_pi)
 
+    def _share(self, wi):
+        """Share of directions drawn for the separable lobes: about their share of what is scattered."""
+        if self.kind == "matte":
+            return DIFFUSE
+        mu = dr.abs(wi.z)
+        lost = self.loss.at(mu) if self.kind == "metal" else dr.select(wi.z > 0, self.losses[0].at(mu), self.losses[1].at(mu))
+        return 0.01 + 0.98 * dr.clip(lost, 0, 1)
+
+    def _separable_pdf(self, wi, wo):
+        """Density per solid angle of a direction drawn for the separable lobes."""
+        mu = dr.abs(wo.z)
+        if self.kind == "glass":
+            own = dr.select(wo.z > 0, self.losses[0].pdf(mu), self.losses[1].pdf(mu))
+            passes = dr.select(wi.z > 0, self.passes[0], self.passes[1])
+            return own * dr.select(wi.z * wo.z > 0, 1 - passes, passes)
+        return dr.select(wo.z > 0, mu * dr.inv_pi if self.kind == "matte" else self.loss.pdf(mu), 0)
+
     def eval_pdf(self, ctx, si, wo, active=True):
         f, pdf = self.nested.eval_pdf(ctx, si, wo, active)
         f = f * self._ratio(si.wi, wo) + self._multiple(si, wo, active)
-        cosine = dr.abs(wo.z) * dr.inv_pi * (0.5 if self.kind == "glass" else 1.0)
         if self.kind != "glass":
-            cosine = dr.select(wo.z > 0, cosine, 0)
             active = active & (si.wi.z > 0)
-        pdf = (1 - self.share) * pdf + self.share * cosine
+        share = self._share(si.wi)
+        pdf = (1 - share) * pdf + share * self._separable_pdf(si.wi, wo)
         return dr.select(active, f, 0), dr.select(active, pdf, 0)
 
     def eval(self, ctx, si, wo, active=True):
@@ -181,13 +213,20 @@ class Corrected(mi.BSDF):
         return self.eval_pdf(ctx, si, wo, active)[1]
 
     def sample(self, ctx, si, sample1, sample2, active=True):
-        separable = sample1 < self.share
-        nested, weight = self.nested.sample(ctx, si, (sample1 - self.share) / (1 - self.share), sample2, active & ~separable)
-        cosine = mi.warp.square_to_cosine_hemisphere(sample2)
+        share = self._share(si.wi)
+        separable = sample1 < share
+        nested, weight = self.nested.sample(ctx, si, (sample1 - share) / (1 - share), sample2, active & ~separable)
         if self.kind == "glass":
-            cosine.z = dr.select(sample1 < 0.5 * self.share, -cosine.z, cosine.z)
+            passes = sample1 < share * dr.select(si.wi.z > 0, self.passes[0], self.passes[1])
+            above = (si.wi.z > 0) ^ passes
+            other = dr.select(above, self.losses[0].draw(sample2), self.losses[1].draw(sample2))
+            other.z = dr.select(above, other.z, -other.z)
+        elif self.kind == "metal":
+            other = self.loss.draw(sample2)
+        else:
+            other = mi.warp.square_to_cosine_hemisphere(sample2)
         drawn = mi.BSDFSample3f()
-        drawn.wo = dr.select(separable, cosine, nested.wo)
+        drawn.wo = dr.select(separable, other, nested.wo)
         value, drawn.pdf = self.eval_pdf(ctx, si, drawn.wo, active)
         # Facets also send light to sides that they do not scatter to; its density is no part of the sum.
         valid = active & (separable | (dr.max(weight) > 0)) & (drawn.pdf > 0)

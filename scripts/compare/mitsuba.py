@@ -46,7 +46,8 @@ WAVE = 1 << 22
 
 def set_variant():
     """The vectorised variant where there is an LLVM, the scalar one otherwise."""
-    libraries = [Path(p) for pattern in ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so") for p in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
+    patterns = ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so")
+    libraries = [p for pattern in patterns for p in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
     if libraries and "DRJIT_LIBLLVM_PATH" not in os.environ:
         # LLVM 14 and 15 cannot compile all that Mitsuba 3.9 asks for: the newest.
         newest = max(libraries, key=lambda p: [int(n) for n in re.findall("[0-9]+", p.name)])

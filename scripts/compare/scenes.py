@@ -286,27 +286,30 @@ def metal(folder):
 def textures(folder):
     """Textures, and lights that are points."""
     g = Glb()
-    g.say(light_units="photometric", environment={"color": [0.6, 0.65, 0.75]})
+    g.say(light_units="photometric", environment={"color": [1.0, 1.05, 1.15]})
     mirrored = g.texture(pattern(seed=7), wrap=33648, scale=[3, 3])
     clamped = g.texture(pattern(seed=8), wrap=33071, scale=[1.6, 1.4], offset=[-0.3, -0.2])
     turned = g.texture(pattern(seed=9), scale=[2, 2], rotation=0.7)
-    room(g, g.matte("floor", (1, 1, 1), texture=mirrored), [g.matte("back", (0.9, 0.9, 0.9), texture=clamped),
-                                                             g.matte("left", (0.8, 0.6, 0.5)), g.material("right", (0.5, 0.7, 0.8), 0.5, specular={"specularFactor": 0.5})])
+    half = g.material("right", (0.5, 0.7, 0.8), 0.5, specular={"specularFactor": 0.5})
+    room(g, g.matte("floor", (1, 1, 1), texture=mirrored),
+         [g.matte("back", (0.9, 0.9, 0.9), texture=clamped), g.matte("left", (0.8, 0.6, 0.5)), half])
     surface = pattern(seed=11, cells=4)
-    surface[..., 1] = 0.1 + 0.15 * surface[..., 1]
+    surface[..., 1] = 0.2 + 0.12 * surface[..., 1]
     surface[..., 2] = 1.0
-    ball(g, "brushed", g.material("brushed", (0.9, 0.8, 0.6), 1.0, 1.0, surface=g.texture(surface, scale=[4, 2])), (-0.7, 0.41, 0.2), 0.4)
+    brushed = g.material("brushed", (0.9, 0.8, 0.6), 1.0, 1.0, surface=g.texture(surface, scale=[4, 2]))
+    ball(g, "brushed", brushed, (-0.7, 0.41, 0.2), 0.4)
     mixed = pattern(seed=12, cells=4, low=0.0, high=1.0)
     mixed[..., 1] = 1.0
-    ball(g, "patina", g.material("patina", (0.7, 0.5, 0.35), 0.3, 1.0, surface=g.texture(mixed, scale=[4, 2])), (0.75, 0.41, 0.1), 0.4)
+    patina = g.material("patina", (0.7, 0.5, 0.35), 0.3, 1.0, surface=g.texture(mixed, scale=[4, 2]))
+    ball(g, "patina", patina, (0.75, 0.41, 0.1), 0.4)
     g.node(name="crate", mesh=g.mesh(box((-0.3, 0, -0.3), (0.3, 0.6, 0.3)), g.material("crate", (1, 1, 1), 0.4, texture=turned)),
            translation=[0, 0.01, -0.6], rotation=[0, 0.1736481777, 0, 0.9848077530])
     ball(g, "glazed", g.material("glazed", (1, 1, 1), 0.3, texture=turned), (0.1, 0.26, 0.65), 0.25)
-    g.light("point", (-1.0, 1.7, 0.8), (0, 0, 0), color=[1, 0.9, 0.8], intensity=1200.0)
-    g.light("point", (1.0, 2.3, 1.3), (0, 0, 0), color=[0.7, 0.8, 1], intensity=900.0, radius=0.25)
-    g.light("spot", (0.2, 2.6, 1.5), (0, 0.3, 0), color=[1, 1, 1], intensity=5000.0,
-            spot={"innerConeAngle": 0.25, "outerConeAngle": 0.2501})
-    g.light("directional", (1, 3, 2.5), (0, 0, 0), color=[1, 0.95, 0.85], intensity=600.0, angle_deg=8.0)
+    g.light("point", (-1.0, 1.7, 0.8), (0, 0, 0), color=[1, 0.9, 0.8], intensity=800.0)
+    g.light("point", (1.0, 2.4, 1.3), (0, 0, 0), color=[0.7, 0.8, 1], intensity=300.0, radius=0.3)
+    g.light("spot", (0.2, 2.6, 1.5), (0.3, 1.3, -1.5), color=[1, 1, 1], intensity=5000.0,
+            spot={"innerConeAngle": 0.15, "outerConeAngle": 0.1501})
+    g.light("directional", (1, 3, 2.5), (0, 0, 0), color=[1, 0.95, 0.85], intensity=500.0, angle_deg=25.0)
     g.camera((0.1, 1.3, 4.2), (0, 0.65, 0), 0.5)
     g.write(folder / "textures.glb")
 

@@ -26,7 +26,7 @@ def build(scene, width, height, correct=False, glass="auto"):
     center, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
     for i, light in enumerate(scene.lights):
         if light.intensity.any():
-            world[f"light{i}"] = _light(light, center, radius)
+            world[f"light{i}"] = _light(light, center, radius, scene.environment)
     if scene.environment:
         world["environment"] = _environment(scene)
     # Absorption apart, both compute the same; the path integrator is faster.
@@ -63,7 +63,7 @@ def _mesh(mesh, materials, medium):
     return shape
 
 
-def _light(light, center, radius):
+def _light(light, center, radius, environment):
     position, axis = light.to_world[:3, 3], -light.to_world[:3, 2] / np.linalg.norm(light.to_world[:3, 2])
     strength = {"type": "rgb", "value": [float(x) for x in light.intensity]}
     if light.kind == "point" and light.radius > 0.0:
@@ -81,9 +81,12 @@ def _light(light, center, radius):
                 "to_world": _look(position, axis)}
     if light.angle == 0.0:
         return {"type": "directional", "direction": axis.tolist(), "irradiance": strength}
-    # A disc so far away that it is seen alike from everywhere.
+    # A disc so far away that it is seen alike from everywhere. It hides the environment, so it shines as that does, too.
+    if environment and "color" not in environment:
+        raise Unsupported("a sun of some size before an image")
     half = light.angle / 2
-    radiance = [float(x) for x in light.intensity / (np.pi * np.sin(half) ** 2)]
+    radiance = light.intensity / (np.pi * np.sin(half) ** 2) + np.array(environment["color"] if environment else [0, 0, 0])
+    radiance = [float(x) for x in radiance]
     away = _look(center - axis * FAR * radius, axis)
     return {"type": "disk", "to_world": away @ mi.ScalarTransform4f().scale(float(FAR * radius * np.tan(half))), "bsdf": BLACK,
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}}}

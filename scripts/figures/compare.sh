@@ -14,16 +14,16 @@ compare() {
     shift 2
     name=$scene
     [ $# -eq 0 ] || name=$scene-corrected
-    "$python" scripts/compare/mitsuba.py "$folder/$scene.glb" --width "${WIDTH:-192}" --seeds "${SEEDS:-8}" --spp "$spp" \
+    "$python" scripts/compare/mitsuba.py "$folder/$scene.glb" --width "${WIDTH:-160}" --seeds "${SEEDS:-8}" --spp "$spp" \
         --png "$folder/$name.png" --json "$@" >"$folder/$name.json"
     "$python" -c 'import json, sys; sys.path.append("scripts/compare"); import tiles; print(tiles.table(json.load(sys.stdin)))' \
         <"$folder/$name.json"
     "$python" scripts/figures/_store.py mitsuba <"$folder/$name.json"
 }
 
-compare glass 96
-compare frosted 96 --correct
-compare metal 64 --correct
-compare textures 128 --correct
-compare wide 64 --correct
-compare wide 64
+compare glass 144
+compare frosted 112 --correct
+compare metal 40 --correct
+compare textures 112 --correct
+compare wide 40 --correct
+compare wide 40

@@ -93,7 +93,7 @@ class Reader(unittest.TestCase):
 
     def test_lamps_are_turned_into_watts(self):
         point = self.read("textures").lights[0]
-        np.testing.assert_allclose(point.intensity, np.array([1, 0.9, 0.8]) * 1200 / 683)
+        np.testing.assert_allclose(point.intensity, np.array([1, 0.9, 0.8]) * 800 / 683)
 
     def test_what_is_unknown_is_an_error(self):
         path = Path(self.folder.name) / "unknown.gltf"
