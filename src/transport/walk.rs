@@ -118,7 +118,7 @@ pub fn walk<'a, V: Visitor<'a>>(
 ) {
     let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first } = *start;
     let mut known = first;
-    let survival_scale = 1.0 / throughput.max_element();
+    let mut survival_scale = 1.0 / throughput.max_element();
     if !survival_scale.is_finite() {
         return;
     }
@@ -177,6 +177,12 @@ pub fn walk<'a, V: Visitor<'a>>(
         visitor.scatter(&vertex, &sample);
         throughput *= sample.weight / survival;
         scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
+        if sample.transmitted && crossing.is_some() && transport == Transport::Radiance {
+            // Radiance is denser where the index is higher, by its square; a path that has only come in there has lost nothing, and gets
+            // it back on the way out. Roulette must not take it for absorption.
+            let eta = if direction.dot(surface.ng) < 0.0 { eta } else { 1.0 / eta };
+            survival_scale *= eta * eta;
+        }
         direction = sample.wi;
         origin = surface.spawn(direction);
         interior = if sample.transmitted { behind } else { here };
