@@ -2,7 +2,6 @@
 
 use super::mesh::Corner;
 use super::{Instance, Mesh, Surface};
-use crate::math::Vec3;
 
 /// The scene's geometry.
 #[derive(Clone, Debug, Default)]
@@ -20,15 +19,6 @@ impl Shapes {
     pub fn new(mut meshes: Vec<Mesh>, instances: Vec<Instance>) -> Shapes {
         let corners = meshes.iter_mut().map(Corner::pack).collect();
         Shapes { meshes, instances, corners }
-    }
-
-    /// Whether `p` is before the front of a triangle's plane. Near the plane rounding decides.
-    #[inline]
-    pub fn is_in_front(&self, instance: u32, primitive: u32, p: Vec3) -> bool {
-        let placed = &self.instances[instance as usize];
-        let mesh = placed.mesh as usize;
-        let [p0, p1, p2] = self.meshes[mesh].triangles[primitive as usize].map(|i| self.corners[mesh][i as usize].p);
-        placed.normal((p1 - p0).cross(p2 - p0)).dot(p - placed.point(p0)) > 0.0
     }
 
     /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of it at once, so that the

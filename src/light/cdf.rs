@@ -5,8 +5,6 @@
 pub struct Cdf {
     /// `cumulative[i]` = probability of an index up to and including `i`; the last is exactly 1.
     cumulative: Vec<f32>,
-    /// Probabilities.
-    pdf: Vec<f32>,
     /// `guide[b]`: the first index whose cumulative probability is above `b / guide.len()`, where a search for a number in that bucket starts.
     guide: Vec<u32>,
     total: f64,
@@ -32,13 +30,11 @@ impl Cdf {
         for c in &mut cumulative[last..] {
             *c = 1.0;
         }
-        // The probability used must be the one sampled with: the difference of the rounded sums.
-        let pdf = cumulative.iter().scan(0.0, |below, &c| Some(c - std::mem::replace(below, c))).collect();
         let buckets = cumulative.len();
         let guide = (0..buckets)
             .map(|b| cumulative.partition_point(|&c| c <= b as f32 / buckets as f32).min(last) as u32)
             .collect();
-        Some(Cdf { cumulative, pdf, guide, total })
+        Some(Cdf { cumulative, guide, total })
     }
 
     /// Sum of the weights.
@@ -46,10 +42,15 @@ impl Cdf {
         self.total
     }
 
-    /// Probability of `index`.
+    #[inline]
+    fn below(&self, index: usize) -> f32 {
+        if index == 0 { 0.0 } else { self.cumulative[index - 1] }
+    }
+
+    /// Probability of `index`: that of sampling it, the difference of the rounded sums.
     #[inline]
     pub fn pdf(&self, index: usize) -> f32 {
-        self.pdf[index]
+        self.cumulative[index] - self.below(index)
     }
 
     /// Index, its probability (above zero), and `u` (in `[0, 1)`) stretched over the chosen interval for reuse.
@@ -64,8 +65,8 @@ impl Cdf {
         while self.cumulative[index] <= u {
             index += 1;
         }
-        let below = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
-        let pdf = self.pdf[index];
+        let below = self.below(index);
+        let pdf = self.cumulative[index] - below;
         (index, pdf, ((u - below) / pdf).clamp(0.0, 1.0f32.next_down()))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Environment;
 use crate::geometry::Shapes;
-use crate::math::{Frame, Rgb, Vec3, luminance, sqr};
+use crate::math::{Frame, Rgb, Vec3, Vec4, luminance, sqr};
 use std::f32::consts::{PI, TAU};
 
 /// A light source. The set is closed: a scene's lights are one flat list.
@@ -20,6 +20,8 @@ pub enum Emitter {
         two_sided: bool,
         /// Mean emitted radiance.
         radiance: Rgb,
+        /// Unit normal of its front and the plane's distance from the origin along it: here, because light sampling asks every time.
+        plane: Vec4,
     },
     /// A mathematical point.
     Point {

@@ -5,7 +5,7 @@ use super::cdf::Cdf;
 use super::emitter::{Emitter, Sky, spot_falloff};
 use crate::geometry::{Shapes, Surface};
 use crate::material::Materials;
-use crate::math::{Frame, Rgb, Vec2, Vec3, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Share of the choices that all lights get alike; the rest goes by power.
@@ -100,9 +100,10 @@ impl Lights {
                 let area = 0.5 * (b - a).cross(c - a).length();
                 // Mean emission from a few points, enough to choose by; the radiance of a sample is looked up exactly.
                 let probes = [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2]];
-                let mut radiance = Rgb::ZERO;
+                let (mut radiance, mut plane) = (Rgb::ZERO, Vec4::ZERO);
                 for barycentric in probes {
                     if let Some(surface) = shapes.surface(i as u32, primitive, barycentric) {
+                        plane = surface.ng.extend(surface.ng.dot(surface.p));
                         radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
                     }
                 }
@@ -116,7 +117,7 @@ impl Lights {
                 }
                 relative[i].push(emitters.len() as u32 - first[i]);
                 let two_sided = material.double_sided;
-                emitters.push(Emitter::Triangle { instance: i as u32, primitive, area, two_sided, radiance });
+                emitters.push(Emitter::Triangle { instance: i as u32, primitive, area, two_sided, radiance, plane });
             }
         }
         emitters.extend(others);
@@ -163,9 +164,10 @@ impl Lights {
     ) -> Option<DirectSample> {
         let (index, probability, _) = self.choice.as_ref()?.sample(choice);
         match &self.emitters[index] {
-            Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
-                // Most lamps have a back, and most points are behind some lamp: asked before more is looked up.
-                if !*two_sided && !shapes.is_in_front(*instance, *primitive, p) {
+            Emitter::Triangle { instance, primitive, area, two_sided, plane, .. } => {
+                // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near the plane rounding
+                // decides.
+                if !*two_sided && plane.truncate().dot(p) <= plane.w {
                     return None;
                 }
                 let b = warp::triangle_uniform(u);

@@ -48,6 +48,10 @@ impl From<embree::Hit> for Hit {
 /// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs. A pure function.
 pub type AlphaTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
+/// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are faster there than
+/// through an instance's own tree, whose box overlaps its neighbours'.
+const MOST_COPIED: usize = 1 << 17;
+
 /// Geometry committed to Embree.
 pub struct Tracer {
     scene: embree::Scene,
@@ -78,33 +82,41 @@ impl Tracer {
         for (instance, &cut) in shapes.instances.iter().zip(cutout) {
             filtered[instance.mesh as usize] |= cut;
         }
-        let add_mesh = |builder: &mut embree::SceneBuilder, id: u32, mesh: u32| -> Result<()> {
-            let data = &shapes.meshes[mesh as usize];
-            let named = |e: embree::Error| convert(e).within(format_args!("mesh \"{}\"", data.name));
-            let positions: Vec<[f32; 3]> = data.positions.iter().map(Vec3::to_array).collect();
-            builder.triangles(GeometryId(id), &positions, &data.triangles).map_err(named)?;
-            if filtered[mesh as usize] {
-                let alpha = Arc::clone(alpha);
-                let filter: embree::Filter = Arc::new(move |c: &embree::Candidate| {
-                    let instance = c.instance.unwrap_or(c.geometry).0;
-                    alpha(instance, c.primitive, [c.u, c.v], c.token)
-                });
-                builder.filter(GeometryId(id), filter).map_err(named)?;
-            }
-            Ok(())
-        };
+        let mut copies = vec![0; shapes.meshes.len()];
+        for instance in &shapes.instances {
+            copies[instance.mesh as usize] += shapes.meshes[instance.mesh as usize].triangles.len();
+        }
+        let add_mesh =
+            |builder: &mut embree::SceneBuilder, id: u32, mesh: u32, place: &dyn Fn(Vec3) -> Vec3| -> Result<()> {
+                let data = &shapes.meshes[mesh as usize];
+                let named = |e: embree::Error| convert(e).within(format_args!("mesh \"{}\"", data.name));
+                let positions: Vec<[f32; 3]> = data.positions.iter().map(|&p| place(p).to_array()).collect();
+                builder.triangles(GeometryId(id), &positions, &data.triangles).map_err(named)?;
+                if filtered[mesh as usize] {
+                    let alpha = Arc::clone(alpha);
+                    let filter: embree::Filter = Arc::new(move |c: &embree::Candidate| {
+                        let instance = c.instance.unwrap_or(c.geometry).0;
+                        alpha(instance, c.primitive, [c.u, c.v], c.token)
+                    });
+                    builder.filter(GeometryId(id), filter).map_err(named)?;
+                }
+                Ok(())
+            };
         let mut shared: Vec<Option<embree::Scene>> = vec![None; shapes.meshes.len()];
         let mut root = embree::SceneBuilder::new(&device).map_err(convert)?;
         for (i, instance) in shapes.instances.iter().enumerate() {
             let id = i as u32;
             match &instance.to_world {
-                None => add_mesh(&mut root, id, instance.mesh)?,
+                _ if copies[instance.mesh as usize] <= MOST_COPIED => {
+                    add_mesh(&mut root, id, instance.mesh, &|p| instance.point(p))?;
+                }
+                None => add_mesh(&mut root, id, instance.mesh, &|p| p)?,
                 Some(placement) => {
                     let child = match &shared[instance.mesh as usize] {
                         Some(child) => child.clone(),
                         None => {
                             let mut builder = embree::SceneBuilder::new(&device).map_err(convert)?;
-                            add_mesh(&mut builder, 0, instance.mesh)?;
+                            add_mesh(&mut builder, 0, instance.mesh, &|p| p)?;
                             let child = builder.commit().map_err(convert)?;
                             shared[instance.mesh as usize] = Some(child.clone());
                             child
@@ -135,10 +147,11 @@ impl Tracer {
         self.scene.intersect(&Self::ray(ray)).map(Hit::from)
     }
 
-    /// The nearest hits of rays that go much the same way. Which rays are given together may decide between triangles that share an edge.
+    /// Calls `each` with the nearest hits of up to eight rays that go much the same way. Which rays are given together may decide between
+    /// triangles that share an edge.
     #[inline]
-    pub fn intersect8(&self, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
-        self.scene.intersect8(&rays.each_ref().map(|ray| ray.as_ref().map(Self::ray))).map(|hit| hit.map(Hit::from))
+    pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
+        self.scene.intersect8(|k| ray(k).as_ref().map(Self::ray), |k, hit| each(k, hit.into()));
     }
 
     /// Whether anything lies on the segment.

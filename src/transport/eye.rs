@@ -267,27 +267,30 @@ impl Eye<'_> {
 
     /// The starts of the eye paths of neighbouring pixels, first rays traced together.
     pub fn starts(&self, places: &[Option<Place>; GROUP], streams: Streams) -> [Option<(PathStart, Stream)>; GROUP] {
-        let mut starts = places.each_ref().map(|place| {
-            place.as_ref().map(|place| {
+        let mut starts = [const { None }; GROUP];
+        for (start, place) in starts.iter_mut().zip(places) {
+            if let Some(place) = place {
                 let stream = streams.path(place.index);
-                (self.start(place.pixel, stream), stream)
-            })
-        });
-        let rays = starts.each_ref().map(|start| {
-            start.as_ref().map(|(start, stream)| Ray {
+                let first = Known::Nothing;
+                *start = Some((PathStart { first, ..self.start(place.pixel, stream) }, stream));
+            }
+        }
+        let mut hits = [const { None }; GROUP];
+        let ray = |k: usize| {
+            starts[k].as_ref().map(|(start, stream): &(PathStart, Stream)| Ray {
                 origin: start.origin,
                 direction: start.direction,
                 tmax: f32::INFINITY,
                 token: stream.vertex(0).token(Purpose::Alpha),
             })
-        });
-        let hits = self.scene.tracer.intersect8(&rays);
+        };
+        self.scene.tracer.intersect8(ray, |k, hit| hits[k] = Some(hit));
         // Looked at together here, their memory is there when one path after the other asks for it.
         let triangles = hits.iter().flatten().map(|hit| (hit.instance, hit.primitive));
         std::hint::black_box(self.scene.shapes.touch(triangles));
         for (start, hit) in starts.iter_mut().zip(hits) {
-            if let Some((start, _)) = start {
-                start.first = hit.map_or(Known::Nothing, Known::Hit);
+            if let (Some((start, _)), Some(hit)) = (start, hit) {
+                start.first = Known::Hit(hit);
             }
         }
         starts

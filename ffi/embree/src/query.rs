@@ -54,18 +54,6 @@ pub struct Bounds {
 }
 
 impl RawRay {
-    /// In place of a ray that is not traced.
-    const NONE: RawRay = RawRay {
-        origin: [0.0; 3],
-        tnear: 0.0,
-        direction: [0.0, 0.0, 1.0],
-        time: 0.0,
-        tfar: -1.0,
-        mask: 0,
-        id: 0,
-        flags: 0,
-    };
-
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> RawRay {
         RawRay {
@@ -123,26 +111,32 @@ impl Scene {
         })
     }
 
-    /// The nearest hits of up to eight rays that go much the same way, as those of neighbouring pixels do: faster than one by one.
+    /// Calls `each` with the nearest hits of up to eight rays that go much the same way, as those of neighbouring pixels do: faster than
+    /// one by one. `ray(k)` is ray k of 8, if there is one.
     ///
     /// Ties and rays through edges may be decided otherwise than by [`Scene::intersect`]; which rays are traced together decides,
     /// nothing else.
-    pub fn intersect8(&self, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
+    #[inline]
+    pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
         if !self.packets {
-            return std::array::from_fn(|k| rays[k].as_ref().and_then(|ray| self.intersect(ray)));
+            for k in 0..8 {
+                if let Some(hit) = ray(k).and_then(|ray| self.intersect(&ray)) {
+                    each(k, hit);
+                }
+            }
+            return;
         }
-        let raw = rays.map(|ray| ray.map(|ray| RawRay::new(&ray)).filter(|ray| ray.is_valid(self.reach)));
-        let valid = Valid8(raw.map(|ray| if ray.is_some() { -1 } else { 0 }));
-        let raw = raw.map(|ray| ray.unwrap_or(RawRay::NONE));
         let missed = [INVALID_GEOMETRY_ID; 8];
+        let mut valid = Valid8([0; 8]);
         let mut all = RawRayHit8 {
-            origin: std::array::from_fn(|a| raw.map(|ray| ray.origin[a])),
-            tnear: raw.map(|ray| ray.tnear),
-            direction: std::array::from_fn(|a| raw.map(|ray| ray.direction[a])),
+            origin: [[0.0; 8]; 3],
+            tnear: [0.0; 8],
+            // Rays that are not traced are given a direction and no length.
+            direction: [[0.0; 8], [0.0; 8], [1.0; 8]],
             time: [0.0; 8],
-            tfar: raw.map(|ray| ray.tfar),
+            tfar: [-1.0; 8],
             mask: [u32::MAX; 8],
-            id: raw.map(|ray| ray.id),
+            id: [0; 8],
             flags: [0; 8],
             ng: [[0.0; 8]; 3],
             u: [0.0; 8],
@@ -152,11 +146,25 @@ impl Scene {
             instance: missed,
             instance_primitive: missed,
         };
+        for k in 0..8 {
+            let Some(raw) = ray(k).map(|ray| RawRay::new(&ray)).filter(|ray| ray.is_valid(self.reach)) else {
+                continue;
+            };
+            valid.0[k] = -1;
+            for a in 0..3 {
+                all.origin[a][k] = raw.origin[a];
+                all.direction[a][k] = raw.direction[a];
+            }
+            (all.tnear[k], all.tfar[k], all.id[k]) = (raw.tnear, raw.tfar, raw.id);
+        }
         // SAFETY: the scene is committed and alive; the structure is initialised and as large as any version's; `packets` says
         // that the device supports them.
         unsafe { self.trace.intersect8(&valid, self.raw, &mut all) };
-        std::array::from_fn(|k| {
-            (all.geometry[k] != INVALID_GEOMETRY_ID).then(|| Hit {
+        for k in 0..8 {
+            if all.geometry[k] == INVALID_GEOMETRY_ID {
+                continue;
+            }
+            let hit = Hit {
                 t: all.tfar[k],
                 u: all.u[k],
                 v: all.v[k],
@@ -164,8 +172,9 @@ impl Scene {
                 primitive: all.primitive[k],
                 geometry: GeometryId(all.geometry[k]),
                 instance: (all.instance[k] != INVALID_GEOMETRY_ID).then_some(GeometryId(all.instance[k])),
-            })
-        })
+            };
+            each(k, hit);
+        }
     }
 
     /// Whether anything lies on the segment.

@@ -4,7 +4,7 @@ mod support;
 
 use std::sync::Arc;
 
-use caustique_embree::{Candidate, Error, GeometryId, Library, MAX_GEOMETRY_ID, Ray, Scene, SceneBuilder};
+use caustique_embree::{Candidate, Error, GeometryId, Hit, Library, MAX_GEOMETRY_ID, Ray, Scene, SceneBuilder};
 use support::*;
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
@@ -19,6 +19,12 @@ fn one_triangle() -> Scene {
 /// A ray straight down onto (x, y) from z = 5.
 fn down(x: f32, y: f32) -> Ray {
     ray([x, y, 5.0], [0.0, 0.0, -1.0])
+}
+
+fn together(scene: &Scene, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
+    let mut hits = [None; 8];
+    scene.intersect8(|k| rays[k], |k, hit| hits[k] = Some(hit));
+    hits
 }
 
 #[test]
@@ -165,7 +171,7 @@ fn packets_agree_with_single_rays() {
                 _ => Some(ray(origin, direction)),
             }
         });
-        for (ray, together) in rays.iter().zip(scene.intersect8(&rays)) {
+        for (ray, together) in rays.iter().zip(together(scene, &rays)) {
             let alone = ray.as_ref().and_then(|ray| scene.intersect(ray));
             match (alone, together) {
                 (None, None) => {}
@@ -191,7 +197,7 @@ fn packets_call_filters_and_reach_into_instances() {
     let scene = sheets(|candidate| candidate.token == 0);
     let rays: [Option<Ray>; 8] =
         std::array::from_fn(|k| Some(Ray { token: k as u32 % 2, ..down(0.1 + 0.02 * k as f32, 0.2) }));
-    let hits = scene.intersect8(&rays);
+    let hits = together(&scene, &rays);
     for (ray, hit) in rays.iter().zip(hits) {
         assert_eq!(hit, ray.as_ref().and_then(|ray| scene.intersect(ray)));
     }
@@ -200,7 +206,7 @@ fn packets_call_filters_and_reach_into_instances() {
     root.instance(GeometryId(4), &one_triangle(), &shift).unwrap();
     let root = root.commit().unwrap();
     let rays: [Option<Ray>; 8] = std::array::from_fn(|k| Some(down(2.1 + 0.02 * k as f32, 0.2)));
-    for hit in root.intersect8(&rays) {
+    for hit in together(&root, &rays) {
         assert_eq!(hit.and_then(|hit| hit.instance), Some(GeometryId(4)));
     }
 }
