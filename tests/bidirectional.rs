@@ -31,6 +31,8 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
 fn settings(iterations: u64, radius: f32, seed: u64) -> Settings {
     Settings {
         seed,
+        // Of sppm; the others send one for a pixel.
+        photons: 10_000,
         initial: InitialBandwidth::Fixed(radius),
         levels: Levels::new(1),
         alpha: 0.75,
@@ -291,7 +293,7 @@ fn glossy_room() {
     add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
     add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
     let scene = build(description);
-    let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm].map(|m| (m, 48));
+    let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 48));
     agree("glossy room", &scene, &methods, 0.04, 0.02, 0.15);
 }
 
@@ -305,7 +307,7 @@ fn glass_room() {
     description.cameras[0].aperture_radius = 0.05;
     description.cameras[0].focus_distance = 2.5;
     let scene = build(description);
-    let methods = [Method::Path, Method::Bdpt, Method::Bpm, Method::Vcm].map(|m| (m, 64));
+    let methods = [Method::Path, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 64));
     agree("glass room", &scene, &methods, 0.04, 0.02, 0.2);
 }
 
@@ -331,7 +333,14 @@ fn under_the_sky() {
     description.lights.push(PunctualLight { kind: PunctualKind::Sun { angle: 0.2 }, ..sun(2.0) });
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
     let scene = build(description);
-    let methods = [(Method::Path, 64), (Method::Light, 768), (Method::Bdpt, 64), (Method::Bpm, 512), (Method::Vcm, 64)];
+    let methods = [
+        (Method::Path, 64),
+        (Method::Light, 768),
+        (Method::Bdpt, 64),
+        (Method::Bpm, 512),
+        (Method::Vcm, 64),
+        (Method::Sppm, 512),
+    ];
     agree("under the sky", &scene, &methods, 0.05, 0.03, 0.2);
 }
 
@@ -343,7 +352,7 @@ fn short_paths_seen_in_parallel() {
     description.cameras[0].projection = Projection::Orthographic { xmag: 0.9, ymag: 0.9 };
     let scene = build(description);
     let reference = by(&scene, (Method::Path, 48), 0.04, 4);
-    let methods = [Method::Bdpt, Method::Bpm, Method::Vcm].map(|m| (m, 48));
+    let methods = [Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 48));
     agree_with("parallel", &scene, &reference, &methods, (0.04, 4), 0.02, 0.15);
 }
 
@@ -371,6 +380,29 @@ fn caustics_behind_glass() {
     println!("behind glass: sppm {:.5}", average(&reference));
     let methods = [(Method::Vcm, 160), (Method::Bpm, 160)];
     agree_with("behind glass", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.3);
+}
+
+/// All of the floor lies under water, so that nothing is lit but through it and seen but through it; the lamp is so large that a path tracer, which
+/// must run into it, is the judge.
+#[test]
+fn under_water() {
+    let mut description = Description::default();
+    let walls = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0), true);
+    add(&mut description, "walls", walls, matte(0.0, 0.0));
+    let bottom = quad(Vec3::new(-0.9, 0.05, -0.9), Vec3::Z * 1.8, Vec3::X * 1.8);
+    add(&mut description, "bottom", bottom, matte(0.7, 0.0));
+    add(&mut description, "stone", sphere(Vec3::new(0.2, 0.2, 0.1), 0.2, 64), matte(0.5, 0.0));
+    let water = cuboid(Vec3::new(-0.95, 0.02, -0.95), Vec3::new(0.95, 0.6, 0.95), false);
+    add(&mut description, "water", water, glass(1.33));
+    let lamp = quad(Vec3::new(-0.9, 1.9, -0.9), Vec3::X * 1.8, Vec3::Z * 1.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 2.0));
+    description.cameras.push(look_at(DVec3::new(0.3, 1.6, 0.8), DVec3::new(0.05, 0.1, 0.0), 40.0));
+    let scene = build(description);
+    let radius = 0.04;
+    let reference = by(&scene, (Method::Path, 160), radius, u32::MAX);
+    println!("under water: path {:.5}", average(&reference));
+    let methods = [(Method::Vcm, 64), (Method::Bpm, 96), (Method::Sppm, 64)];
+    agree_with("under water", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.2);
 }
 
 /// Classical photon mapping, too, with a map so large that its bandwidths are small.

@@ -356,7 +356,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
         let meets = Meets { vertices: &vertices, photons: Some(&map), levels: &levels };
-        shared.eye_path(&arena, pixel, stream, &meets, &mut by_eye);
+        shared.eye_path(&arena, &(shared.eye.start(pixel, stream), stream), &meets, &mut by_eye);
 
         let start = eye.start(pixel, stream);
         let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);

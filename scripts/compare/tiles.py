@@ -1,9 +1,7 @@
 """Statistics of two sets of renders, by tiles of 16x16 pixels, and a picture of the difference."""
 
-import struct
-import zlib
-
 import numpy as np
+from PIL import Image
 
 TILE = 16
 #: A tile counts if the standard error of its ratio is below this; it agrees if the ratio is this near to 1.
@@ -102,15 +100,5 @@ def picture(ours, theirs, path):
     by_tile[:blocks.shape[0], :blocks.shape[1]] = np.where(hatched[..., None], 0.3, _diverging(blocks))
     above, below = (_display(a, scale), _display(b, scale)), (_diverging(by_pixel), by_tile)
     whole = np.concatenate([np.concatenate(row, axis=1) for row in (above, below)])
-    path.write_bytes(png((whole * 255 + 0.5).astype(np.uint8)))
+    Image.fromarray((whole * 255 + 0.5).astype(np.uint8)).save(path)
 
-
-def png(pixels):
-    """An array of bytes (height, width, 3) as a PNG file's bytes."""
-    def chunk(kind, data):
-        body = kind + data
-        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
-    height, width, _ = pixels.shape
-    rows = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1)], axis=1).tobytes()
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b""))

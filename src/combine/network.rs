@@ -5,7 +5,7 @@ use ort::session::builder::GraphOptimizationLevel;
 use ort::value::{Outlet, TensorRef, ValueType};
 
 use super::model::{Contract, Facts, Model};
-use super::runtime::Runtime;
+use super::runtime::{Quiet, Runtime};
 use super::tensor;
 use super::tile::Rect;
 use crate::error::{Error, Kind, Result};
@@ -100,6 +100,7 @@ fn open(model: &Model, runtime: &Runtime, threads: usize) -> ort::Result<Session
         .with_intra_threads(threads)?
         // Idle inference threads must not spin while equation (6) needs the cores.
         .with_intra_op_spinning(false)?;
+    let _quiet = Quiet::new();
     builder.commit_from_memory(&model.bytes)
 }
 

@@ -115,13 +115,10 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     let mut refusals = Vec::new();
     for candidate in candidates {
         // `init_from` reports failures; the route through ORT_DYLIB_PATH panics.
-        let quiet = Quiet::new();
-        let loaded = ort::init_from(candidate);
-        match loaded {
+        match ort::init_from(candidate) {
             Ok(builder) => {
                 let path = located(candidate);
                 let environment = builder.with_name("caustique").with_telemetry(false).build();
-                drop(quiet);
                 let environment = environment.map_err(|cause| Error::new(Kind::Library, path.display(), cause))?;
                 return Ok(Runtime { environment, path });
             }
@@ -138,11 +135,11 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
 }
 
 /// While it lives, what is written to stderr is lost. Debian 13's ONNX Runtime is linked to a libonnx that has registered all operators already,
-/// and complains of each of them, past its own logger, some 500 lines each time it is loaded. Errors come back as values all the same.
-struct Quiet(Option<OwnedFd>);
+/// and complains of each of them, past its own logger, some 500 lines with the first session. Errors come back as values all the same.
+pub(super) struct Quiet(Option<OwnedFd>);
 
 impl Quiet {
-    fn new() -> Quiet {
+    pub fn new() -> Quiet {
         let nowhere = std::fs::OpenOptions::new().write(true).open("/dev/null");
         let saved = rustix::io::fcntl_dupfd_cloexec(rustix::stdio::stderr(), 3);
         let (Ok(nowhere), Ok(saved)) = (nowhere, saved) else { return Quiet(None) };

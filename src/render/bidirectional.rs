@@ -19,7 +19,7 @@ use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::PhotonMap;
-use crate::random::{Domain, Stream};
+use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
@@ -111,10 +111,10 @@ impl<'a> Passes<'a> {
             let pass = self.light_pass(i, pair);
             let walk = |tile| {
                 let (mut left, mut arena) = (Left::default(), Bump::new());
-                for (_, (x, y)) in tiles.pixels(tile) {
+                for place in tiles.pixels(tile) {
                     arena.reset();
                     let mut vertices = LightVertices::new_in(&arena);
-                    shared.light_path(&pass, tiles.index(x, y), true, &mut vertices, &mut left, &mut ());
+                    shared.light_path(&pass, place.index as u32, true, &mut vertices, &mut left, &mut ());
                 }
                 left.photons
             };
@@ -158,22 +158,25 @@ impl<'a> Passes<'a> {
         let passes: Vec<LightPass> = self.pairs.iter().map(|pair| self.light_pass(i, pair)).collect();
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
+            let streams = Streams::new(seed, i, pair.eye);
             let left: Vec<(Vec<Splat>, Vec<MergePhoton>)> = measures
                 .par_chunks_mut(TILE_PIXELS)
                 .zip(watches.par_iter_mut())
                 .enumerate()
                 .map(|(tile, (measures, watch))| {
                     let (mut left, mut arena) = (Left::default(), Bump::new());
-                    for (slot, (x, y)) in tiles.pixels(tile) {
-                        let index = tiles.index(x, y);
-                        arena.reset();
-                        let mut vertices = LightVertices::new_in(&arena);
-                        shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());
-                        let levels = levels(bandwidths[index as usize].bandwidth, pair);
-                        let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
-                        let stream = Stream::new(seed, i, pair.eye, u64::from(index));
-                        watch.begin(slot, own);
-                        measures[slot] = shared.eye_path(&arena, (x, y), stream, &meets, watch);
+                    for places in tiles.groups(tile) {
+                        let starts = shared.eye.starts(&places, streams);
+                        for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                            let index = place.index as u32;
+                            arena.reset();
+                            let mut vertices = LightVertices::new_in(&arena);
+                            shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());
+                            let levels = levels(bandwidths[index as usize].bandwidth, pair);
+                            let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
+                            watch.begin(place.at, own);
+                            measures[place.at] = shared.eye_path(&arena, start, &meets, watch);
+                        }
                     }
                     (left.splats, left.photons)
                 })
@@ -199,15 +202,17 @@ impl<'a> Passes<'a> {
     /// Path tracing.
     fn paths<W: Watch>(&mut self, i: u64, watches: &mut [W]) {
         let (eye, tiles, seed) = (self.eye(), self.tiles, self.settings.seed);
-        let domain = self.pairs[0].eye;
+        let streams = Streams::new(seed, i, self.pairs[0].eye);
         let parts = self.measures[0].par_chunks_mut(TILE_PIXELS).zip(watches);
         parts.enumerate().for_each(|(tile, (measures, watch))| {
             let mut arena = Bump::new();
-            for (slot, (x, y)) in tiles.pixels(tile) {
-                arena.reset();
-                let stream = Stream::new(seed, i, domain, u64::from(tiles.index(x, y)));
-                watch.begin(slot, Some(0));
-                measures[slot] = path_measure(&eye, &arena, (x, y), stream, watch);
+            for places in tiles.groups(tile) {
+                let starts = eye.starts(&places, streams);
+                for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                    arena.reset();
+                    watch.begin(place.at, Some(0));
+                    measures[place.at] = path_measure(&eye, &arena, start, watch);
+                }
             }
         });
     }

@@ -146,9 +146,9 @@ pub(super) fn collect(
         for (tile, part) in parts.iter_mut().enumerate() {
             // Taken and freed, so that the pictures are not in memory twice.
             let Some(sums) = part.pictures[index].take() else { continue };
-            for (slot, (x, y)) in tiles.pixels(tile) {
-                let at = tiles.index(x, y) as usize;
-                let [weighted, unweighted] = sums[slot];
+            for place in tiles.pixels(tile) {
+                let at = place.index as usize;
+                let [weighted, unweighted] = sums[place.at];
                 picture.weighted[at] = (weighted * scale).to_array();
                 picture.unweighted[at] = (unweighted * scale).to_array();
             }

@@ -1,6 +1,6 @@
 //! Tiles of constant size: the unit of work of the methods that add to a film.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, GROUP, Place};
 
 /// Width and height of a tile in pixels.
 const TILE: u32 = 16;
@@ -45,11 +45,29 @@ impl Tiles {
         tile * TILE_PIXELS + slot
     }
 
-    /// Pixels of a tile: slot in the tile and place on the film.
-    pub fn pixels(self, tile: usize) -> impl Iterator<Item = (usize, (u32, u32))> {
+    /// Pixels of a tile, neighbours together: a group is a block of two rows. [`Place::at`] is the slot in the tile.
+    pub fn groups(self, tile: usize) -> impl Iterator<Item = [Option<Place>; GROUP]> {
         let (x0, y0) = (tile as u32 % self.across * TILE, tile as u32 / self.across * TILE);
-        (0..TILE * TILE)
-            .map(move |i| (i as usize, (x0 + i % TILE, y0 + i / TILE)))
-            .filter(move |(_, (x, y))| *x < self.width && *y < self.height)
+        let columns = GROUP as u32 / 2;
+        let per_row = TILE / columns;
+        (0..TILE * TILE / GROUP as u32)
+            .map(move |group| {
+                let (dx, dy) = (group % per_row * columns, group / per_row * 2);
+                std::array::from_fn(|k| {
+                    let (dx, dy) = (dx + k as u32 % columns, dy + k as u32 / columns);
+                    let (x, y) = (x0 + dx, y0 + dy);
+                    (x < self.width && y < self.height).then_some(Place {
+                        pixel: (x, y),
+                        index: u64::from(self.index(x, y)),
+                        at: (dy * TILE + dx) as usize,
+                    })
+                })
+            })
+            .filter(|places: &[Option<Place>; GROUP]| places.iter().any(Option::is_some))
+    }
+
+    /// Pixels of a tile, in the order of [`Tiles::groups`].
+    pub fn pixels(self, tile: usize) -> impl Iterator<Item = Place> {
+        self.groups(tile).flat_map(|places| places.into_iter().flatten())
     }
 }

@@ -6,7 +6,7 @@ use super::eye::{EyeMeasure, Features, FirstHit};
 use super::mis::{self, End, MisState, Ratios};
 use super::photon_merge::{MergePhoton, merge_photons};
 use super::segment::transmittance;
-use super::walk::{Next, Scattered, Vertex, Visitor, walk};
+use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3, is_lit};
@@ -223,18 +223,16 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
 }
 
 impl Bidirectional<'_> {
-    /// Walks the eye path of `pixel` and measures all levels.
+    /// Walks an eye path and measures all levels.
     #[inline]
     pub fn eye_path<R: Record>(
         &self,
         arena: &Bump,
-        pixel: (u32, u32),
-        stream: Stream,
+        (start, stream): &(PathStart, Stream),
         meets: &Meets<'_>,
         record: &mut R,
     ) -> EyeMeasure {
         let eye = &self.eye;
-        let start = eye.start(pixel, stream);
         let pdf_w = eye.camera.pdf_w(start.direction) * self.pixels();
         let mut visitor = EyeWalk {
             shared: self,
@@ -246,7 +244,7 @@ impl Bidirectional<'_> {
             measure: EyeMeasure::default(),
             record,
         };
-        walk(eye.scene, arena, &start, stream, Transport::Radiance, eye.max_depth, &mut visitor);
+        walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut visitor);
         visitor.measure
     }
 }

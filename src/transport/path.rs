@@ -7,7 +7,7 @@ use super::bidirectional::{Part, Record, Technique, Trail};
 use super::bidirectional_eye::look;
 use super::eye::{Eye, EyeMeasure};
 use super::segment::transmittance;
-use super::walk::{Next, Scattered, Vertex, Visitor, walk};
+use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::random::{Purpose, Stream};
@@ -107,23 +107,21 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     }
 }
 
-/// What one path through a uniform point of pixel `(x, y)` measures, on one level.
+/// What one path measures, on one level.
 pub fn path_measure(
     eye: &Eye<'_>,
     arena: &Bump,
-    pixel: (u32, u32),
-    stream: Stream,
+    (start, stream): &(PathStart, Stream),
     record: &mut impl Record,
 ) -> EyeMeasure {
-    let start = eye.start(pixel, stream);
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
     let (scene, max_depth, last) = (eye.scene, eye.max_depth, start.origin);
     let mut tracer = PathTracer { scene, max_depth, measure, trail, last, depth: 0, record };
-    walk(eye.scene, arena, &start, stream, Transport::Radiance, eye.max_depth, &mut tracer);
+    walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    path_measure(eye, &Bump::new(), pixel, stream, &mut ()).radiance(0)
+    path_measure(eye, &Bump::new(), &(eye.start(pixel, stream), stream), &mut ()).radiance(0)
 }

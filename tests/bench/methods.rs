@@ -1,17 +1,19 @@
-//! What methods cost: VCM's processor seconds for an iteration at 512 x 512 in a Cornell box with a mirror sphere, and for a million light and eye
-//! paths, beside the other methods on the same scene.
+//! What methods cost: processor seconds of an iteration at 512 x 512 and of a million light and eye paths, in a Cornell box with a mirror
+//! sphere, and of path tracing in one where all is diffuse. The last line is JSON for `scripts/figures`.
 
 #[path = "../support/mod.rs"]
 mod support;
 
 use caustique::estimator::InitialBandwidth;
+use caustique::geometry::Mesh;
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
-use caustique::scene::{Description, View};
-use support::scenes::{add, build, look_at, matte, mirror, quad, sphere};
+use caustique::scene::{Description, Scene, View};
+use support::scenes::{add, build, cuboid, look_at, matte, mirror, quad, sphere};
 
-fn cornell() -> Description {
+/// The classical box; what stands in it decides how it scatters.
+fn cornell(ball: Option<Material>) -> Description {
     let mut description = Description::default();
     let color = |r, g, b| Material { base_color: [r, g, b, 1.0], ..matte(0.0, 0.0) };
     let white = || color(0.7, 0.7, 0.7);
@@ -23,37 +25,96 @@ fn cornell() -> Description {
     add(&mut description, "right", quad(Vec3::new(1.0, 0.0, -1.0), z, y), color(0.05, 0.5, 0.05));
     let lamp = quad(Vec3::new(-0.25, 1.99, -0.25), Vec3::X * 0.5, Vec3::Z * 0.5);
     add(&mut description, "lamp", lamp, matte(0.0, 15.0));
-    add(&mut description, "ball", sphere(Vec3::new(0.3, 0.45, 0.1), 0.45, 128), mirror());
+    match ball {
+        Some(material) => add(&mut description, "ball", sphere(Vec3::new(0.3, 0.45, 0.1), 0.45, 128), material),
+        None => {
+            add(
+                &mut description,
+                "low block",
+                block(Vec3::new(0.33, 0.3, 0.37), Vec3::new(0.3, 0.3, 0.3), -0.29),
+                white(),
+            );
+            add(
+                &mut description,
+                "high block",
+                block(Vec3::new(-0.33, 0.6, -0.28), Vec3::new(0.3, 0.6, 0.3), 0.29),
+                white(),
+            );
+        }
+    }
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 4.2), DVec3::new(0.0, 1.0, 0.0), 36.0));
     description
 }
 
-fn main() {
-    let scene = build(cornell());
-    let camera = scene.camera(&View { camera: None, width: Some(512), height: Some(512) }).expect("a camera");
-    println!("512 x 512, Cornell box with a mirror sphere");
-    println!("{:<18}{:>12}{:>22}{:>12}", "method", "core-s/pass", "core-s/million pairs", "photons");
-    for (method, levels) in
-        [(Method::Path, 1), (Method::Light, 1), (Method::Bdpt, 1), (Method::Bpm, 1), (Method::Vcm, 1), (Method::Vcm, 5)]
-    {
-        let settings = Settings {
-            method,
-            initial: InitialBandwidth::Footprint,
-            levels: Levels::new(levels),
-            alpha: 0.75,
-            iterations: Some(4),
-            ..Settings::default()
-        };
-        let mut photons = 0;
-        let rendered = render(&scene, &camera, &settings, |progress, _| {
-            photons = progress.photons;
-            Control::Continue
-        });
-        // From the end of the first pass, which merges nothing.
-        let (first, last) = (&rendered.history[0], &rendered.history[rendered.history.len() - 1]);
-        let seconds = (last.cpu_seconds - first.cpu_seconds) / (last.iterations - first.iterations) as f64;
-        let pairs = (512.0 * 512.0) * if levels > 1 { 2.0 } else { 1.0 } / 1e6;
-        let name = format!("{method:?}, {levels} level(s)");
-        println!("{name:<18}{seconds:>12.2}{:>22.2}{photons:>12}", seconds / pairs);
+/// A box turned about the vertical.
+fn block(center: Vec3, half: Vec3, angle: f32) -> Mesh {
+    let mut mesh = cuboid(-half, half, false);
+    for p in &mut mesh.positions {
+        let (sin, cos) = angle.sin_cos();
+        *p = center + Vec3::new(cos * p.x + sin * p.z, p.y, cos * p.z - sin * p.x);
     }
+    mesh
+}
+
+struct Cost {
+    seconds: f64,
+    light_paths: f64,
+}
+
+/// Processor seconds of an iteration, the first left out (it merges nothing, and it is cold); least of some runs.
+fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
+    let camera = scene.camera(&View { camera: None, width: Some(512), height: Some(512) }).expect("a camera");
+    let settings = Settings {
+        method,
+        initial: InitialBandwidth::Footprint,
+        levels: Levels::new(levels),
+        alpha: 0.75,
+        iterations: Some(4),
+        ..Settings::default()
+    };
+    let (mut seconds, mut light_paths) = (f64::INFINITY, 0.0);
+    for _ in 0..3 {
+        let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
+        let (first, last) = (&rendered.history[0], &rendered.history[rendered.history.len() - 1]);
+        let iterations = (last.iterations - first.iterations) as f64;
+        seconds = f64::min(seconds, (last.cpu_seconds - first.cpu_seconds) / iterations);
+        light_paths = rendered.light_paths as f64 / rendered.iterations as f64;
+    }
+    Cost { seconds, light_paths }
+}
+
+fn main() {
+    let pixels = 512.0 * 512.0;
+    let diffuse = build(cornell(None));
+    let path = cost(&diffuse, Method::Path, 1);
+    println!("512 x 512, Cornell box, all diffuse");
+    println!("path: {:.2} million paths per core-second", pixels * 1e-6 / path.seconds);
+    println!("\n512 x 512, Cornell box with a mirror sphere: processor seconds");
+    println!(
+        "{:<8}{:>8}{:>12}{:>24}{:>24}",
+        "method", "levels", "iteration", "million light paths", "million eye paths"
+    );
+    let ball = build(cornell(Some(mirror())));
+    let mut vcm = 0.0;
+    let methods = [
+        (Method::Path, 1),
+        (Method::Light, 1),
+        (Method::Bdpt, 1),
+        (Method::Bpm, 1),
+        (Method::Sppm, 1),
+        (Method::Sppm, 5),
+        (Method::Vcm, 1),
+        (Method::Vcm, 5),
+    ];
+    for (method, levels) in methods {
+        let Cost { seconds, light_paths } = cost(&ball, method, levels);
+        let eye_paths = pixels * if levels > 1 { 2.0 } else { 1.0 };
+        let per_million = |paths: f64| if paths > 0.0 { format!("{:.2}", seconds / paths * 1e6) } else { "-".into() };
+        let (light, eye) = (per_million(light_paths), per_million(eye_paths));
+        println!("{:<8}{levels:>8}{seconds:>12.2}{light:>24}{eye:>24}", format!("{method:?}").to_lowercase());
+        if (method, levels) == (Method::Vcm, 1) {
+            vcm = seconds;
+        }
+    }
+    println!("{{\"path_diffuse_million_per_core_s\": {:.3}, \"vcm_512\": {vcm:.3}}}", pixels * 1e-6 / path.seconds);
 }

@@ -1,0 +1,99 @@
+"""Every method on the same scenes for the same time: relMSE against a reference, and what paths cost.
+
+The reference of a scene is the mean of two long renders by vertex connection and merging. Their difference tells the reference's own error, which is
+taken off every figure; a figure that is not well above it is marked. Seconds are wall clock, on all cores, the renderer's own start left out.
+
+Environment: SECONDS per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged).
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from record import ROOT, record
+
+SECONDS = float(os.environ.get("SECONDS_EACH", 15))
+REFERENCE = float(os.environ.get("REFERENCE", 240))
+WIDTH = int(os.environ.get("WIDTH", 160))
+ROUNDS = int(os.environ.get("ROUNDS", 2))
+CAUSTIQUE = os.environ["CAUSTIQUE_BIN"]
+OUT = ROOT / "out" / "equal_time"
+
+#: Name, options, and the layer to judge ("" is the combined picture).
+METHODS = [
+    ("path", ["--method", "path"], "Noisy"),
+    ("light", ["--method", "light"], "Noisy"),
+    ("bdpt", ["--method", "bdpt"], "Noisy"),
+    ("pm", ["--method", "pm"], "Noisy"),
+    ("sppm, one level", ["--method", "sppm", "--levels", "1"], "Noisy"),
+    ("sppm, combined", ["--method", "sppm"], ""),
+    ("bpm", ["--method", "bpm"], "Noisy"),
+    ("vcm", ["--method", "vcm", "--levels", "1"], "Noisy"),
+    ("vcm, combined", ["--method", "vcm", "--levels", "5"], ""),
+]
+
+
+def render(scene, out, seconds, seed, options):
+    """Renders for a time and returns what `info` says."""
+    command = [CAUSTIQUE, "render", scene, "-o", out, "--width", str(WIDTH), "--time", str(seconds), "--seed", str(seed)]
+    subprocess.run([*map(str, command), *options, "--progress", "plain"], check=True, stderr=subprocess.DEVNULL)
+    return json.loads(subprocess.run([CAUSTIQUE, "info", out, "--json"], check=True, capture_output=True).stdout)
+
+
+def picture(path, layer):
+    """A layer's colours as float64, (height, width, 3)."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = file.channels()
+        names = [f"{layer}.{c}" if layer else c for c in "RGB"]
+        return np.stack([channels[name].pixels.astype(np.float64) for name in names], axis=-1)
+
+
+def relmse(image, reference):
+    """As `caustique compare`: mean of squared difference over squared reference plus 0.01; and without the worst 0.1 % of pixels."""
+    pixels = ((image - reference) ** 2 / (reference**2 + 0.01)).mean(axis=-1).ravel()
+    keep = np.sort(pixels)[: len(pixels) - int(np.ceil(0.001 * len(pixels)))]
+    return np.array([pixels.mean(), keep.mean()])
+
+
+def main():
+    OUT.mkdir(parents=True, exist_ok=True)
+    for scene in sys.argv[1:] or ["cornell", "interior"]:
+        file = ROOT / "scenes" / f"{scene}.glb"
+        halves = []
+        for seed in (1001, 1002):
+            half = OUT / f"{scene}-reference-{seed}.exr"
+            render(file, half, REFERENCE, seed, ["--method", "vcm", "--levels", "1", "--no-combine"])
+            halves.append(picture(half, "Noisy"))
+        reference = (halves[0] + halves[1]) / 2
+        # Of the mean: half the variance of one half, which is half of that of the difference.
+        own = relmse(halves[0], halves[1]) / 4
+        print(f"{scene}, {reference.shape[1]} x {reference.shape[0]}, {SECONDS:g} s each; the reference's own relMSE is {own[0]:.2g}")
+        print(f"{'':<18}{'iterations':>11}{'relMSE':>11}{'trimmed':>11}{'core-s per million light paths':>33}{'eye paths':>11}")
+        rows = []
+        for name, options, layer in METHODS:
+            errors, infos = [], []
+            for seed in range(ROUNDS):
+                out = OUT / f"{scene}-{name.replace(', ', '-').replace(' ', '-')}.exr"
+                infos.append(render(file, out, SECONDS, seed, options if not layer == "Noisy" else [*options, "--no-combine"]))
+                errors.append(relmse(picture(out, layer), reference))
+            error = np.mean(errors, axis=0) - own
+            last = infos[-1]["history"][-1]
+            pairs = 2 if infos[-1]["arguments"]["levels"] != 1 and name.split(",")[0] in ("sppm", "vcm") else 1
+            eye_paths = reference.shape[0] * reference.shape[1] * last["iterations"] * pairs
+            costs = [last["cpu_seconds"] / n * 1e6 if n else None for n in (last["light_paths"], eye_paths)]
+            marks = ["" if e > 3 * o else "*" for e, o in zip(error, own)]
+            shown = "".join(f"{f'{e:.3g}{mark}':>11}" for e, mark in zip(error, marks))
+            light, eye = ("-" if c is None else f"{c:.2f}" for c in costs)
+            print(f"{name:<18}{last['iterations']:>11}{shown}{light:>33}{eye:>11}", flush=True)
+            rows.append({"method": name, "iterations": last["iterations"], "relmse": error[0], "trimmed": error[1],
+                         "core_s_per_million_light_paths": costs[0], "core_s_per_million_eye_paths": costs[1]})
+        print("* not well above the reference's own error\n")
+        record("equal-time", {"scene": scene, "seconds": SECONDS, "width": WIDTH, "reference_relmse": own[0], "methods": rows})
+
+
+main()

@@ -1,0 +1,124 @@
+//! What merging is and is not, as the third talk of the 2013 course has it: one more way to sample a path, as noisy as the plain one until its
+//! photons are used again; and no help where the surface that gathers is glossy.
+//!
+//! Variances are compared by their ratio. With hits as rare as here the relative error of a variance is 1 / sqrt(hits), stated with each test; limits are five
+//! of those away, so that a test fails by chance less than once in a million runs.
+
+mod support;
+
+use caustique::estimator::{InitialBandwidth, Pixel};
+use caustique::material::Material;
+use caustique::math::{DVec3, Vec3};
+use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+
+/// Variance of one iteration.
+fn variance(pixel: &Pixel) -> f64 {
+    let n = f64::from(pixel.iterations);
+    pixel.levels[0].variance_of_mean(n).x * n
+}
+
+/// Mean and variance of one iteration at one pixel.
+fn moments(scene: &Scene, settings: &Settings) -> (f64, f64) {
+    let camera = scene.camera(&square(1)).expect("a camera");
+    // Passes this small are faster alone.
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let rendered = one.install(|| render(scene, &camera, settings, |_, _| Control::Continue));
+    let pixel = &rendered.pixels[0];
+    (pixel.levels[0].mean.x, variance(pixel))
+}
+
+const LAMP: f32 = 0.2;
+const ITERATIONS: u64 = 120_000;
+
+/// A lamp that shines up into a mirror, and below them a matte floor on which the mirror throws its light: next-event estimation sees the lamp's black
+/// back. A path finds the light by scattering into it, a photon by landing near the point seen.
+fn lamp_in_a_mirror() -> Scene {
+    let mut description = Description::default();
+    let (x, z) = (Vec3::X, Vec3::Z);
+    add(&mut description, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), z * 4.0, x * 4.0), matte(1.0, 0.0));
+    add(&mut description, "mirror", quad(Vec3::new(-2.0, 0.8, -2.0), x * 4.0, z * 4.0), mirror());
+    let corner = Vec3::new(-LAMP / 2.0, 0.5, -LAMP / 2.0);
+    add(&mut description, "lamp", quad(corner, z * LAMP, x * LAMP), matte(0.0, 1.0));
+    description.cameras.push(look_at(DVec3::new(0.9, 0.4, 0.0), DVec3::new(0.4, 0.0, 0.0), 0.01));
+    build(description)
+}
+
+/// With the kernel's disc as large as the lamp, a photon of one light path for one eye path lands in the disc as often as the eye path runs into the
+/// lamp, and brings as much (the floor is white, so that no roulette interferes): the same mean, the same variance. A hundred light paths cut the variance to a hundredth (a little more: they
+/// are stratified) and cost less than a hundred
+/// eye paths.
+#[test]
+fn merging_without_reuse_is_as_noisy_as_path_tracing() {
+    let scene = lamp_in_a_mirror();
+    let radius = LAMP / std::f32::consts::PI.sqrt();
+    let settings = |method, photons, iterations| Settings {
+        method,
+        photons,
+        seed: 3,
+        initial: InitialBandwidth::Fixed(radius),
+        levels: Levels::new(1),
+        alpha: 1.0,
+        iterations: Some(iterations),
+        max_depth: 3,
+        ..Settings::default()
+    };
+    let paths = moments(&scene, &settings(Method::Path, 1, ITERATIONS));
+    let merged = moments(&scene, &settings(Method::Sppm, 1, ITERATIONS));
+    let reused = moments(&scene, &settings(Method::Sppm, 100, ITERATIONS / 20));
+    println!("mean and variance: paths {paths:?}, one photon {merged:?}, a hundred {reused:?}");
+    // Each hit brings the lamp's radiance.
+    let hits = paths.0 * ITERATIONS as f64;
+    assert!(hits > 900.0, "{hits} hits");
+    // The disc is large: light varies by a few percent over it.
+    let error = 5.0 * (2.0 / hits).sqrt() + 0.03;
+    for (what, ratio) in
+        [("means", merged.0 / paths.0), ("variances", merged.1 / paths.1), ("reused means", reused.0 / paths.0)]
+    {
+        assert!((ratio - 1.0).abs() < error, "{what}: {ratio}, not 1 to within {error}");
+    }
+    let gain = merged.1 / reused.1;
+    assert!(gain > 100.0 * (1.0 - error), "a hundred photons cut the variance {gain} times");
+    // The bug that this test is for: a photon counted twice.
+    assert!((2.0 * merged.0 / paths.0 - 1.0).abs() > error);
+}
+
+/// The light of a point lamp focused by a glass ball on to a floor.
+fn caustic_on(floor: Material) -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), floor);
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.6, 0.0), 0.3, 128), glass(1.5));
+    description.lights.push(point_light(DVec3::new(0.0, 1.8, 0.0), 5.0));
+    // Beside the mirror direction of the caustic, where a glossy floor shows its light dimly.
+    description.cameras.push(look_at(DVec3::new(0.0, 0.7, 1.6), DVec3::new(0.0, 0.0, 0.0), 9.0));
+    build(description)
+}
+
+/// The stated limit of vertex connection and merging: at a glossy surface few photons come from where the lobe looks, and no other technique has them.
+#[test]
+fn caustics_on_glossy_surfaces_stay_noisy() {
+    let relative_variance = |roughness: f32| {
+        let floor = Material { base_color: [0.8, 0.8, 0.8, 1.0], metallic: 1.0, roughness, ..Material::default() };
+        let scene = caustic_on(floor);
+        let camera = scene.camera(&square(32)).expect("a camera");
+        let settings = Settings {
+            method: Method::Vcm,
+            levels: Levels::new(1),
+            initial: InitialBandwidth::Fixed(0.02),
+            alpha: 0.75,
+            iterations: Some(48),
+            ..Settings::default()
+        };
+        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+        let (mut sum, mut mean2) = (0.0, 0.0);
+        for pixel in &rendered.pixels {
+            sum += variance(pixel);
+            mean2 += pixel.levels[0].mean.x.powi(2);
+        }
+        sum / mean2
+    };
+    let [rough, glossy] = [0.8, 0.2].map(relative_variance);
+    println!("relative variance of an iteration: roughness 0.8 {rough:.3}, roughness 0.2 {glossy:.3}");
+    assert!(glossy > 4.0 * rough, "rough {rough}, glossy {glossy}");
+}
