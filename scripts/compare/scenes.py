@@ -98,7 +98,7 @@ class Glb:
 
     def texture(self, pixels, wrap=10497, scale=None, offset=None, rotation=None):
         """A use of an image of display values in [0, 1], top row first."""
-        encoded = tiles.png((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
+        encoded = tiles.png(pixels)
         image = self.add("images", {"bufferView": self.view(encoded), "mimeType": "image/png"})
         sampler = self.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": wrap, "wrapT": wrap})
         info = {"index": self.add("textures", {"source": image, "sampler": sampler})}

@@ -1,5 +1,7 @@
 """Statistics of two sets of renders, by tiles of 16x16 pixels, and a picture of the difference."""
 
+import io
+
 import numpy as np
 from PIL import Image
 
@@ -100,5 +102,12 @@ def picture(ours, theirs, path):
     by_tile[:blocks.shape[0], :blocks.shape[1]] = np.where(hatched[..., None], 0.3, _diverging(blocks))
     above, below = (_display(a, scale), _display(b, scale)), (_diverging(by_pixel), by_tile)
     whole = np.concatenate([np.concatenate(row, axis=1) for row in (above, below)])
-    Image.fromarray((whole * 255 + 0.5).astype(np.uint8)).save(path)
+    path.write_bytes(png(whole))
+
+
+def png(colours):
+    """An array (height, width, 3) of [0, 1] as a PNG file's bytes."""
+    file = io.BytesIO()
+    Image.fromarray((np.clip(colours, 0, 1) * 255 + 0.5).astype(np.uint8)).save(file, "PNG")
+    return file.getvalue()
 
