@@ -203,6 +203,22 @@ fn lamp_seen_through_absorbing_glass() {
 
 // ---------------------------------------------------------------- agreement
 
+/// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. With either side's factor of eta^2 wrong, light inside
+/// is off by 2.25.
+#[test]
+fn white_sphere_in_glass_under_a_uniform_sky() {
+    let mut description = Description::default();
+    add(&mut description, "glass", sphere(Vec3::ZERO, 1.0, 128), glass(1.5));
+    add(&mut description, "core", sphere(Vec3::ZERO, 0.5, 128), matte(1.0, 0.0));
+    let source = EnvironmentSource::Color(Rgb::ONE);
+    description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+    description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 12.0));
+    let scene = build(description);
+    let check = Check { expected: 1.0, bias: 5e-3, detects: 0.1 };
+    check.run("path and bdpt, sphere in glass", &scene, &[Method::Path, Method::Bdpt], 64, 0.05);
+    check.run("merging, sphere in glass", &scene, &[Method::Bpm, Method::Vcm], 1536, 0.05);
+}
+
 const SIZE: u32 = 32;
 const TILE: u32 = 8;
 const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;

@@ -6,4 +6,4 @@ mod surface;
 
 pub use mesh::{Instance, Mesh, Placement};
 pub use shapes::Shapes;
-pub use surface::Surface;
+pub use surface::{Surface, spawn};

@@ -87,7 +87,13 @@ impl Surface {
     /// error bound of the position, so that the ray does not hit the surface it leaves.
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Vec3 {
-        let error = POSITION_ERROR * self.p.abs().max_element().max(1e-3);
-        self.p + self.ng * error.copysign(direction.dot(self.ng))
+        spawn(self.p, self.ng, direction)
     }
+}
+
+/// [`Surface::spawn`] for a point of a triangle with unit normal `ng`.
+#[inline]
+pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3) -> Vec3 {
+    let error = POSITION_ERROR * p.abs().max_element().max(1e-3);
+    p + ng * error.copysign(direction.dot(ng))
 }

@@ -20,8 +20,13 @@ pub enum Emitter {
         two_sided: bool,
         /// Mean emitted radiance.
         radiance: Rgb,
-        /// Unit normal of its front and the plane's distance from the origin along it: here, because light sampling asks every time.
+        /// Unit normal of its front and the plane's distance from the origin along it. This and the next are here so that light sampling, which
+        /// asks every time, finds all it needs in one place.
         plane: Vec4,
+        /// A corner, and the edges to the others (m).
+        corners: [Vec3; 3],
+        /// It looks the same all over: what it emits everywhere is `radiance`.
+        plain: bool,
     },
     /// A mathematical point.
     Point {

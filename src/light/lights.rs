@@ -3,8 +3,8 @@
 use super::aim::Targets;
 use super::cdf::Cdf;
 use super::emitter::{Emitter, Sky, spot_falloff};
-use crate::geometry::{Shapes, Surface};
-use crate::material::Materials;
+use crate::geometry::{Shapes, Surface, spawn};
+use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -107,7 +107,12 @@ impl Lights {
                         radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
                     }
                 }
-                if material.unlit || material.emission_texture.is_some() || !mesh.colors.is_empty() {
+                let textured = material.unlit || material.emission_texture.is_some();
+                let plain = !textured && matches!(material.alpha, Alpha::Opaque);
+                if plain {
+                    radiance = material.emission;
+                }
+                if textured || !mesh.colors.is_empty() {
                     // No texel may be impossible to choose: keep a tenth of the brightest.
                     radiance = radiance.max(material.brightest_emission() * 0.1);
                 }
@@ -117,7 +122,18 @@ impl Lights {
                 }
                 relative[i].push(emitters.len() as u32 - first[i]);
                 let two_sided = material.double_sided;
-                emitters.push(Emitter::Triangle { instance: i as u32, primitive, area, two_sided, radiance, plane });
+                let corners = [a, b - a, c - a];
+                let instance = i as u32;
+                emitters.push(Emitter::Triangle {
+                    instance,
+                    primitive,
+                    area,
+                    two_sided,
+                    radiance,
+                    plane,
+                    corners,
+                    plain,
+                });
             }
         }
         emitters.extend(others);
@@ -164,28 +180,33 @@ impl Lights {
     ) -> Option<DirectSample> {
         let (index, probability, _) = self.choice.as_ref()?.sample(choice);
         match &self.emitters[index] {
-            Emitter::Triangle { instance, primitive, area, two_sided, plane, .. } => {
+            Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
                 // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near the plane rounding
                 // decides.
-                if !*two_sided && plane.truncate().dot(p) <= plane.w {
+                let ng = plane.truncate();
+                if !*two_sided && ng.dot(p) <= plane.w {
                     return None;
                 }
                 let b = warp::triangle_uniform(u);
-                let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
-                let to = light.p - p;
+                let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
+                let to = at - p;
                 let distance2 = to.length_squared();
                 let wi = to.try_normalize()?;
-                let cos = -light.ng.dot(wi);
+                let cos = -ng.dot(wi);
                 if cos == 0.0 || (cos < 0.0 && !two_sided) {
                     return None;
                 }
-                let material = &materials.list[light.material as usize];
-                // A cut-out part gives no light: rays pass it, so samples must, too.
-                let radiance =
-                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
+                let radiance = if *plain {
+                    *radiance
+                } else {
+                    let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
+                    let material = &materials.list[light.material as usize];
+                    // A cut-out part gives no light: rays pass it, so samples must, too.
+                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures)
+                };
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 let arrival_pdf_a = Self::lambertian(cos.abs(), *two_sided) / distance2;
-                let target = Some(light.spawn(-wi));
+                let target = Some(spawn(at, ng, -wi));
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
             Emitter::Point { p: at, intensity } => {

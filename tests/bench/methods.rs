@@ -10,6 +10,7 @@ use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{Description, Scene, View};
+use caustique::transport::{LightVertex, MergePhoton};
 use support::scenes::{add, build, cuboid, look_at, matte, mirror, quad, sphere};
 
 /// The classical box; what stands in it decides how it scatters.
@@ -59,6 +60,7 @@ fn block(center: Vec3, half: Vec3, angle: f32) -> Mesh {
 struct Cost {
     seconds: f64,
     light_paths: f64,
+    photons: u64,
 }
 
 /// Processor seconds of an iteration, the first left out (it merges nothing, and it is cold); least of some runs.
@@ -72,15 +74,16 @@ fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
         iterations: Some(4),
         ..Settings::default()
     };
-    let (mut seconds, mut light_paths) = (f64::INFINITY, 0.0);
+    let (mut seconds, mut light_paths, mut photons) = (f64::INFINITY, 0.0, 0);
     for _ in 0..3 {
         let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
         let (first, last) = (&rendered.history[0], &rendered.history[rendered.history.len() - 1]);
         let iterations = (last.iterations - first.iterations) as f64;
         seconds = f64::min(seconds, (last.cpu_seconds - first.cpu_seconds) / iterations);
         light_paths = rendered.light_paths as f64 / rendered.iterations as f64;
+        photons = rendered.photons;
     }
-    Cost { seconds, light_paths }
+    Cost { seconds, light_paths, photons }
 }
 
 fn main() {
@@ -95,7 +98,7 @@ fn main() {
         "method", "levels", "iteration", "million light paths", "million eye paths"
     );
     let ball = build(cornell(Some(mirror())));
-    let mut vcm = 0.0;
+    let (mut vcm, mut photons) = (0.0, [0; 2]);
     let methods = [
         (Method::Path, 1),
         (Method::Light, 1),
@@ -107,14 +110,25 @@ fn main() {
         (Method::Vcm, 5),
     ];
     for (method, levels) in methods {
-        let Cost { seconds, light_paths } = cost(&ball, method, levels);
+        let Cost { seconds, light_paths, photons: left } = cost(&ball, method, levels);
         let eye_paths = pixels * if levels > 1 { 2.0 } else { 1.0 };
         let per_million = |paths: f64| if paths > 0.0 { format!("{:.2}", seconds / paths * 1e6) } else { "-".into() };
         let (light, eye) = (per_million(light_paths), per_million(eye_paths));
         println!("{:<8}{levels:>8}{seconds:>12.2}{light:>24}{eye:>24}", format!("{method:?}").to_lowercase());
-        if (method, levels) == (Method::Vcm, 1) {
-            vcm = seconds;
+        match (method, levels) {
+            // Merges every vertex that is not a mirror's.
+            (Method::Bpm, _) => photons[0] = left,
+            (Method::Vcm, 1) => (vcm, photons[1]) = (seconds, left),
+            _ => {}
         }
     }
-    println!("{{\"path_diffuse_million_per_core_s\": {:.3}, \"vcm_512\": {vcm:.3}}}", pixels * 1e-6 / path.seconds);
+    // What keeping a pass's light vertices until its eye paths merge them would take, beside the photons that wait for the next pass.
+    let mib = |count: u64, size: usize| count as f64 * size as f64 / f64::from(1 << 20);
+    let (kept, whole) = (mib(photons[1], size_of::<MergePhoton>()), mib(photons[0], size_of::<LightVertex>()));
+    println!("\nmemory of vcm: {} photons of {} bytes, {kept:.0} MiB;", photons[1], size_of::<MergePhoton>());
+    println!("as light vertices kept whole: {} of {} bytes, {whole:.0} MiB", photons[0], size_of::<LightVertex>());
+    println!(
+        "{{\"vcm_photons_mib\": {kept:.1}, \"vcm_vertices_mib\": {whole:.1}, \"path_diffuse_million_per_core_s\": {:.3}, \"vcm_512\": {vcm:.3}}}",
+        pixels * 1e-6 / path.seconds
+    );
 }
