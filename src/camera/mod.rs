@@ -2,7 +2,7 @@
 
 mod tiles;
 
-pub use tiles::{GROUP, Place, par_pixels};
+pub use tiles::{GROUP, Place, band, par_pixels};
 
 use crate::math::{DVec3, Mat3, Vec2, Vec3, warp};
 

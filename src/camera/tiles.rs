@@ -15,23 +15,28 @@ pub struct Place {
     pub pixel: (u32, u32),
     /// Index, row by row.
     pub index: u64,
-    /// Where it is in the slice that comes with it.
+    /// Where it is in the band that comes with it.
     pub at: usize,
 }
 
-/// Calls `f(scratch, pixels, places)` for all pixels of a picture stored row by row, [`GROUP`] of them at a time (fewer at edges), in tiles and
-/// within them along a Z-order curve: neighbours in time are neighbours in the picture, in both directions. Groups depend on the
-/// picture's size alone. `scratch` is made once per unit of work or less often, so nothing may depend on what is in it.
-pub fn par_pixels<T: Send, S>(
-    pixels: &mut [T],
-    width: u32,
+/// Pixels of a band, the unit of work of [`par_pixels`], in a picture so wide.
+pub fn band(width: u32) -> usize {
+    width as usize * TILE
+}
+
+/// Calls `f(scratch, band, places)` for all pixels of a picture stored row by row and cut into `bands` of [`band`] pixels, [`GROUP`] of them at a time
+/// (fewer at edges), in tiles and within them along a Z-order curve: neighbours in time are neighbours in the picture, in both directions. Groups depend
+/// on the picture's size alone. `scratch` is made once per unit of work or less often, so nothing may depend on what is in it.
+pub fn par_pixels<B: Send, S>(
+    bands: impl IndexedParallelIterator<Item = B>,
+    (width, height): (u32, u32),
     scratch: impl Fn() -> S + Send + Sync,
-    f: impl Fn(&mut S, &mut [T], &[Option<Place>; GROUP]) + Send + Sync,
+    f: impl Fn(&mut S, &mut B, &[Option<Place>; GROUP]) + Send + Sync,
 ) {
-    let width = width as usize;
+    let (width, height) = (width as usize, height as usize);
     let even_bits = |i: usize| (i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i >> 3 & 8);
-    pixels.par_chunks_mut(width * TILE).enumerate().for_each_init(scratch, |scratch, (band, pixels)| {
-        let height = pixels.len() / width;
+    bands.enumerate().for_each_init(scratch, |scratch, (band, mut pixels)| {
+        let height = (height - band * TILE).min(TILE);
         for x0 in (0..width).step_by(TILE) {
             for first in (0..TILE * TILE).step_by(GROUP) {
                 let places = std::array::from_fn(|k| {
@@ -42,7 +47,7 @@ pub fn par_pixels<T: Send, S>(
                     (x < width && dy < height).then_some(place)
                 });
                 if places.iter().any(Option::is_some) {
-                    f(scratch, pixels, &places);
+                    f(scratch, &mut pixels, &places);
                 }
             }
         }
@@ -58,8 +63,8 @@ mod tests {
         for (width, height) in [(1, 1), (16, 16), (37, 5), (100, 33), (3, 70)] {
             let mut pixels = vec![0u32; (width * height) as usize];
             par_pixels(
-                &mut pixels,
-                width,
+                pixels.par_chunks_mut(band(width)),
+                (width, height),
                 || (),
                 |(), pixels, places| {
                     for place in places.iter().flatten() {

@@ -5,11 +5,12 @@
 //! picture's width there. With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
 //! gets the median of the others (or, with no others, the cap at the scene's size).
 
-use crate::camera::{Camera, par_pixels};
+use crate::camera::{Camera, band, par_pixels};
 use crate::photon::{Nearest, PhotonMap};
 use crate::random::{Domain, Streams};
 use crate::transport::{Eye, GatherPoint};
 use bumpalo::Bump;
+use rayon::prelude::*;
 
 /// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the picture says
 /// nothing about a place.
@@ -58,13 +59,18 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
     };
     let mut found: Vec<Option<f32>> = vec![None; pixels];
     let streams = Streams::new(seed, 0, Domain::PilotEye);
-    par_pixels(&mut found, width, <(Bump, Nearest)>::default, |(arena, nearest), found, places| {
-        let starts = eye.starts(places, streams);
-        for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-            found[place.at] = eye.gather_point(arena, start).map(|point| of_point(nearest, &point));
-            arena.reset();
-        }
-    });
+    par_pixels(
+        found.par_chunks_mut(band(width)),
+        (width, height),
+        <(Bump, Nearest)>::default,
+        |(arena, nearest), found, places| {
+            let starts = eye.starts(places, streams);
+            for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                found[place.at] = eye.gather_point(arena, start).map(|point| of_point(nearest, &point));
+                arena.reset();
+            }
+        },
+    );
     let mut known: Vec<f32> = found.iter().flatten().copied().collect();
     let fallback = if known.is_empty() {
         (SCREEN_CAP * span(camera, scene.lights.sky().radius)).max(least)

@@ -24,6 +24,8 @@ const BLOCK: usize = 2048;
 pub struct Shape {
     /// Bandwidth levels.
     pub levels: usize,
+    /// Levels from which the bias of that one can be told ([`SquaredError::of`]).
+    pub compared: usize,
     /// The level (from 0) that is the method's own image.
     pub own: usize,
     /// Whether there are bandwidths.
@@ -69,7 +71,7 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, own, bandwidths, radius2_factor, environment } = *shape;
+    let Shape { levels, compared, own, bandwidths, radius2_factor, environment } = *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
@@ -97,7 +99,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
         Column::rgb("Indirect", |p| mean(p.parts.indirect, p.iterations)),
         Column::rgb("Caustic", |p| mean(p.parts.caustic, p.iterations)),
         Column::rgb("Emission", |p| mean(p.parts.emission, p.iterations)),
-        Column::rgb("Error", move |p| match SquaredError::of(p, own, levels) {
+        Column::rgb("Error", move |p| match SquaredError::of(p, own, compared) {
             Some(error) => error.root(),
             None => p.levels[own].mean.abs(),
         }),
@@ -177,7 +179,8 @@ mod tests {
     use crate::math::Rgb;
     use crate::transport::{EyeMeasure, Features, FirstHit};
 
-    const SHAPE: Shape = Shape { levels: 5, own: 3, bandwidths: true, radius2_factor: 0.25, environment: false };
+    const SHAPE: Shape =
+        Shape { levels: 5, compared: 5, own: 3, bandwidths: true, radius2_factor: 0.25, environment: false };
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
     fn measure(x: f32, hit: bool) -> EyeMeasure {

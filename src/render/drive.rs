@@ -2,6 +2,7 @@
 
 use super::bidirectional::Passes;
 use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
+use super::cppm::Cppm;
 use super::method::Method;
 use super::pm::Pm;
 use super::result::{Phases, Rendered, relative_error};
@@ -27,6 +28,10 @@ pub(super) trait Iterate {
     fn pixels(&mut self) -> Vec<Pixel>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
+    /// Bandwidths of every pixel and level after the last iteration, of methods where they do not follow from the iteration.
+    fn radii(&mut self) -> Vec<f32> {
+        Vec::new()
+    }
     /// Pictures per technique after so many iterations, of methods that have them.
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
         let _ = iterations;
@@ -51,6 +56,10 @@ pub fn render(
     let surroundings = Surroundings::new(scene, camera.position());
     match settings.method {
         Method::Sppm => drive(Sppm::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
+        Method::Cppm => {
+            let sppm = Sppm::new(scene, camera, &settings, &surroundings);
+            drive(Cppm::new(sppm, &settings), camera, &settings, observe)
+        }
         Method::Pm => drive(Pm::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
         _ => drive(Passes::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
     }
@@ -86,7 +95,7 @@ fn drive(
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = done >= next_record || Some(done) == total;
         let wanted = record || settings.target_error.is_some();
-        let error = if wanted { relative_error(&pixels, settings.levels) } else { None };
+        let error = if wanted { relative_error(&pixels, settings) } else { None };
         if record {
             next_record = (done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
             let cpu_seconds = cpu_seconds() - cpu_start;
@@ -113,7 +122,7 @@ fn drive(
     }
     let seconds = clock.seconds();
     if history.last().is_none_or(|h| h.iterations != done) && done > 0 {
-        let error = relative_error(&pixels, settings.levels);
+        let error = relative_error(&pixels, settings);
         history.push(History { seconds, cpu_seconds: cpu_seconds() - cpu_start, iterations: done, light_paths, error });
     }
     Rendered {
@@ -121,6 +130,7 @@ fn drive(
         height,
         pixels,
         techniques: passes.techniques(done),
+        radii: passes.radii(),
         settings: settings.clone(),
         iterations: done,
         light_paths,

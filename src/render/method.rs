@@ -21,6 +21,8 @@ pub enum Method {
     /// Stochastic progressive photon mapping.
     #[default]
     Sppm,
+    /// Chi-squared progressive photon mapping: bandwidths shrink where photons do not look uniform.
+    Cppm,
     /// Bidirectional photon mapping: merging at all vertices, nothing else.
     Bpm,
     /// Vertex connection and merging.
@@ -36,6 +38,7 @@ impl Method {
             Method::Bdpt => "bdpt",
             Method::Pm => "pm",
             Method::Sppm => "sppm",
+            Method::Cppm => "cppm",
             Method::Bpm => "bpm",
             Method::Vcm => "vcm",
         }
@@ -44,7 +47,7 @@ impl Method {
     /// The strategies of a bidirectional method.
     pub(super) fn strategies(self, camera: &Camera) -> Option<Strategies> {
         match self {
-            Method::Path | Method::Pm | Method::Sppm => None,
+            Method::Path | Method::Pm | Method::Sppm | Method::Cppm => None,
             Method::Light => Some(Strategies::LIGHT),
             Method::Bdpt => Some(Strategies::BDPT),
             Method::Bpm => Some(Strategies::BPM),
@@ -54,23 +57,28 @@ impl Method {
 
     /// Whether it weighs sampling techniques against each other path by path, or has but one.
     pub fn has_techniques(self) -> bool {
-        !matches!(self, Method::Pm | Method::Sppm)
+        !matches!(self, Method::Pm | Method::Sppm | Method::Cppm)
     }
 
     /// Whether its bandwidths are several levels.
     pub fn has_levels(self) -> bool {
-        matches!(self, Method::Sppm | Method::Vcm)
+        matches!(self, Method::Sppm | Method::Cppm | Method::Vcm)
     }
 
     /// Whether it has bandwidths.
     pub fn has_bandwidths(self) -> bool {
-        matches!(self, Method::Sppm | Method::Bpm | Method::Vcm)
+        matches!(self, Method::Sppm | Method::Cppm | Method::Bpm | Method::Vcm)
+    }
+
+    /// Whether the bandwidths of all levels shrink alike, by the iteration's number alone. Where they do not, an iteration depends on those before it.
+    pub fn shrinks_together(self) -> bool {
+        self != Method::Cppm
     }
 
     /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have one for every eye path,
     /// or none.
     pub fn counts_photons(self) -> bool {
-        matches!(self, Method::Pm | Method::Sppm)
+        matches!(self, Method::Pm | Method::Sppm | Method::Cppm)
     }
 
     /// Light paths where no number is asked for, of methods that count them.

@@ -2,6 +2,7 @@
 
 mod bidirectional;
 mod control;
+mod cppm;
 mod drive;
 mod method;
 pub mod output;

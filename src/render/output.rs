@@ -15,6 +15,7 @@ pub fn shape(settings: &Settings, iterations: u64, environment: bool) -> output:
     let last = settings.shard.index + iterations.saturating_sub(1) * settings.shard.count + 1;
     output::Shape {
         levels: settings.levels.count,
+        compared: settings.compared_levels(),
         own: settings.levels.own(),
         bandwidths: settings.method.has_bandwidths(),
         radius2_factor: radius2_factor(last, settings.alpha),
@@ -29,7 +30,17 @@ impl Rendered {
     /// None for a render of ours: its pixels are as many as its size says.
     pub fn layers(&self, environment: bool, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
         let shape = shape(&self.settings, self.iterations, environment);
-        output::layers((self.width, self.height), &self.pixels, &shape, wanted)
+        let mut layers = output::layers((self.width, self.height), &self.pixels, &shape, wanted)?;
+        let count = self.settings.levels.count;
+        for level in (0..count).filter(|_| !self.radii.is_empty()) {
+            let name = format!("Radius{}", level + 1);
+            let planes =
+                layers.layers.iter_mut().filter(|layer| layer.name == name).flat_map(|layer| &mut layer.planes);
+            for plane in planes {
+                plane.values = self.radii.iter().skip(level).step_by(count).copied().collect();
+            }
+        }
+        Ok(layers)
     }
 
     /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know: arguments,

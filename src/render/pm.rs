@@ -13,7 +13,7 @@ use super::drive::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::{keep_first_hit, trace_some};
-use crate::camera::{Camera, par_pixels};
+use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::Vec3;
@@ -22,6 +22,7 @@ use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
+use rayon::prelude::*;
 
 /// Light paths traced between two looks at the memory.
 const BATCH: u32 = 1 << 16;
@@ -125,16 +126,21 @@ impl Iterate for Pm<'_> {
         let least = LEAST * eye.scene.lights.sky().radius;
         let streams = Streams::new(self.settings.seed, i, Domain::EyeIndependent);
         let scratch = <(Scratch, Nearest)>::default;
-        par_pixels(pixels, camera.size().0, scratch, |(scratch, nearest), pixels, places| {
-            let starts = eye.starts(places, streams);
-            for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                let pixel = &mut pixels[place.at];
-                let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                let measure = eye.measure(scratch, start, &map, neighbours);
-                keep_first_hit(eye, pixel, &measure);
-                pixel.add(&measure, None, 1, 0);
-            }
-        });
+        par_pixels(
+            pixels.par_chunks_mut(band(camera.size().0)),
+            camera.size(),
+            scratch,
+            |(scratch, nearest), pixels, places| {
+                let starts = eye.starts(places, streams);
+                for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                    let pixel = &mut pixels[place.at];
+                    let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
+                    let measure = eye.measure(scratch, start, &map, neighbours);
+                    keep_first_hit(eye, pixel, &measure);
+                    pixel.add(&measure, None, 1, 0);
+                }
+            },
+        );
         phases.eye += cpu_seconds() - start;
         let photons = map.photons().len();
         self.map = Some(map);

@@ -2,7 +2,7 @@
 
 use super::control::{History, StopReason};
 use super::method::Method;
-use super::settings::{Levels, Settings};
+use super::settings::Settings;
 use super::techniques::TechniquePicture;
 use crate::estimator::{Pixel, SquaredError};
 use serde::Serialize;
@@ -30,6 +30,8 @@ pub struct Rendered {
     pub pixels: Vec<Pixel>,
     /// A picture per technique, if [`Settings::techniques`] and the method has several.
     pub techniques: Vec<TechniquePicture>,
+    /// Bandwidths of every pixel and level after the last iteration; empty where they follow from the iteration ([`Pixel::bandwidth`]).
+    pub radii: Vec<f32>,
     /// The settings it was made with.
     pub settings: Settings,
     /// Iterations done.
@@ -64,7 +66,7 @@ impl Rendered {
     /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance is
     /// large: where such pixels rule the error, the estimate is too small until they have been seen several times.
     pub fn relative_error(&self) -> Option<f64> {
-        relative_error(&self.pixels, self.settings.levels)
+        relative_error(&self.pixels, &self.settings)
     }
 
     /// Samples rejected as not finite.
@@ -74,15 +76,16 @@ impl Rendered {
 }
 
 /// See [`Rendered::relative_error`].
-pub(super) fn relative_error(pixels: &[Pixel], levels: Levels) -> Option<f64> {
+pub(super) fn relative_error(pixels: &[Pixel], settings: &Settings) -> Option<f64> {
+    let (own, compared) = (settings.levels.own(), settings.compared_levels());
     let (mut variance, mut squared_bias) = (0.0, 0.0);
     let (mut known, mut unknown) = (0u64, 0u64);
     for pixel in pixels {
-        let Some(error) = SquaredError::of(pixel, levels.own(), levels.count) else {
+        let Some(error) = SquaredError::of(pixel, own, compared) else {
             unknown += 1;
             continue;
         };
-        let mean = pixel.levels[levels.own()].mean.element_sum() / 3.0;
+        let mean = pixel.levels[own].mean.element_sum() / 3.0;
         let scale = 1.0 / (3.0 * (mean * mean + 0.01));
         variance += error.variance.element_sum() * scale;
         squared_bias += error.squared_bias.element_sum() * scale;
@@ -96,25 +99,26 @@ pub(super) fn relative_error(pixels: &[Pixel], levels: Levels) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::math::Rgb;
+    use crate::render::Levels;
 
     /// Two finite samples, equal ones: no error at all.
     fn certain() -> Pixel {
         let mut pixel = Pixel::new(1.0);
         for n in 1..=2 {
             pixel.iterations = n;
-            pixel.levels[0].add(Rgb::ONE, f64::from(n));
+            pixel.levels[0].add(Rgb::ONE, 1.0 / f64::from(n));
         }
         pixel
     }
 
     #[test]
     fn pixels_without_finite_samples_are_errors() {
-        let levels = Levels::new(1);
+        let levels = Settings { levels: Levels::new(1), ..Settings::default() };
         let rejected = Pixel { rejected: 2, ..Pixel::new(1.0) };
         let once = Pixel { rejected: 1, iterations: 1, ..Pixel::new(1.0) };
-        assert_eq!(relative_error(&[certain(), certain()], levels), Some(0.0));
-        assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], levels), Some(0.5));
-        assert_eq!(relative_error(&[certain(), once, certain(), certain()], levels), Some(0.5));
-        assert_eq!(relative_error(&[rejected, once], levels), None);
+        assert_eq!(relative_error(&[certain(), certain()], &levels), Some(0.0));
+        assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], &levels), Some(0.5));
+        assert_eq!(relative_error(&[certain(), once, certain(), certain()], &levels), Some(0.5));
+        assert_eq!(relative_error(&[rejected, once], &levels), None);
     }
 }

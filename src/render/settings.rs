@@ -2,6 +2,7 @@
 
 use super::method::Method;
 use crate::estimator::InitialBandwidth;
+use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::memoryless;
 use crate::transport::MAX_LEVELS;
 
@@ -68,6 +69,8 @@ pub struct Settings {
     pub initial: InitialBandwidth,
     /// Reduction rate of the memoryless rule, in (0, 1].
     pub alpha: f64,
+    /// Parameters of [`Method::Cppm`]'s rule.
+    pub chi_squared: ChiSquaredSettings,
     /// Longest path in segments.
     pub max_depth: u32,
     /// Stop after this many iterations (of the whole render, not of the shard).
@@ -91,11 +94,20 @@ impl Default for Settings {
             techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             alpha: memoryless::ALPHA,
+            chi_squared: ChiSquaredSettings::default(),
             max_depth: u32::MAX,
             iterations: Some(DEFAULT_ITERATIONS),
             time: None,
             target_error: None,
             shard: Shard { index: 0, count: 1 },
         }
+    }
+}
+
+impl Settings {
+    /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on its own, those up to the
+    /// method's own image, which leaves none to compare it with.
+    pub fn compared_levels(&self) -> usize {
+        if self.method.shrinks_together() { self.levels.count } else { self.levels.own() + 1 }
     }
 }

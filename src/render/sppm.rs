@@ -7,7 +7,7 @@ use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
-use crate::camera::{Camera, par_pixels};
+use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -52,12 +52,12 @@ pub(super) fn trace_some(
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
 fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
-    let (width, _) = eye.camera.size();
+    let size = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
     let [independent, correlated] =
         [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::new(settings.seed, i, domain));
-    par_pixels(pixels, width, Scratch::default, |scratch, pixels, places| {
+    par_pixels(pixels.par_chunks_mut(band(size.0)), size, Scratch::default, |scratch, pixels, places| {
         let waiting = places.iter().flatten().map(|place| pixels[place.at].touch()).sum::<f64>();
         std::hint::black_box(waiting);
         let independent = eye.starts(places, independent);
@@ -113,6 +113,23 @@ impl<'a> Sppm<'a> {
         Sppm { eye, settings, surroundings }
     }
 
+    /// Eye paths.
+    pub fn eye(&self) -> Eye<'a> {
+        self.eye
+    }
+
+    /// The photons of an iteration.
+    pub fn map(&self, i: u64, phases: &mut Phases) -> (PhotonMap, Work) {
+        let t0 = cpu_seconds();
+        let photons = trace_photons(self.eye.scene, self.surroundings, &self.light_pass(i, Domain::Light));
+        let t1 = cpu_seconds();
+        let map = PhotonMap::build(photons);
+        phases.light += t1 - t0;
+        phases.map += cpu_seconds() - t1;
+        let photons = map.photons().len();
+        (map, Work { light_paths: u64::from(self.settings.photons), photons })
+    }
+
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass {
         let Settings { seed, photons, max_depth, .. } = *self.settings;
         LightPass::new(seed, i, domain, photons, max_depth)
@@ -132,15 +149,10 @@ impl Iterate for Sppm<'_> {
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let t0 = cpu_seconds();
-        let photons = trace_photons(self.eye.scene, self.surroundings, &self.light_pass(i, Domain::Light));
-        let t1 = cpu_seconds();
-        let map = PhotonMap::build(photons);
-        let t2 = cpu_seconds();
+        let (map, work) = self.map(i, phases);
+        let start = cpu_seconds();
         eye_pass(&self.eye, self.settings, i, &map, pixels);
-        phases.light += t1 - t0;
-        phases.map += t2 - t1;
-        phases.eye += cpu_seconds() - t2;
-        Work { light_paths: u64::from(self.settings.photons), photons: map.photons().len() }
+        phases.eye += cpu_seconds() - start;
+        work
     }
 }

@@ -56,6 +56,13 @@ impl LevelRadii {
 
 /// Bandwidths where an eye path gathers.
 pub trait Bandwidths {
+    /// Whether [`Bandwidths::count`] is to be called.
+    const COUNTS: bool = false;
+    /// A photon that brings light lies at `offset` from the vertex of the last call of [`Bandwidths::at`], within the largest bandwidth.
+    #[inline]
+    fn count(&mut self, offset: Vec3, distance2: f32) {
+        let _ = (offset, distance2);
+    }
     /// Those at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
     fn at(&mut self, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
 }
@@ -170,12 +177,13 @@ impl<B: Bandwidths> Gather<'_, B> {
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
         let mut batch = Batch::new(radii, vertex.shading, broad, broad | sharp);
-        self.photons.gather(self.near, vertex.surface.p, vertex.surface.ng, largest, |photon, distance2| {
+        let (p, bandwidths) = (vertex.surface.p, &mut self.bandwidths);
+        self.photons.gather(self.near, p, vertex.surface.ng, largest, |photon, distance2| {
             if u32::from(photon.depth) <= longest {
-                batch.push(photon, distance2);
+                batch.push(photon, p, distance2, bandwidths);
             }
         });
-        let bins = batch.finish();
+        let bins = batch.finish(&mut self.bandwidths);
         let mut sums = [Rgb::ZERO; 2];
         for (level, radius2) in radii.iter().enumerate() {
             let kernel = vertex.throughput * (FRAC_1_PI / radius2);

@@ -1,8 +1,8 @@
 //! Photons gathered at a vertex, eight at a time.
 
-use super::eye::MAX_LEVELS;
+use super::eye::{Bandwidths, MAX_LEVELS};
 use crate::bsdf::{Gathering, LobeSet, Shading};
-use crate::math::{Rgb, Vec3A};
+use crate::math::{Rgb, Vec3, Vec3A};
 use crate::photon::{Near, Photon, PhotonFlags};
 use bumpalo::Bump;
 use wide::f32x8;
@@ -27,6 +27,8 @@ pub(super) struct Batch<'a> {
     wi: [[f32; 8]; 3],
     flux: [[f32; 8]; 3],
     bin: [u8; 8],
+    /// For those who count: where they are from the gathering point, and their distance squared.
+    place: [(Vec3, f32); 8],
     bins: [[Vec3A; MAX_LEVELS]; 2],
 }
 
@@ -42,20 +44,25 @@ impl<'a> Batch<'a> {
             wi: [[0.0; 8]; 3],
             flux: [[0.0; 8]; 3],
             bin: [0; 8],
+            place: [(Vec3::ZERO, 0.0); 8],
             bins: [[Vec3A::ZERO; MAX_LEVELS]; 2],
         }
     }
 
-    /// Adds a photon at a distance squared below the largest radius squared.
+    /// Adds a photon at a distance squared below the largest radius squared from `p`.
     #[inline]
-    pub fn push(&mut self, photon: &Photon, distance2: f32) {
+    pub fn push<B: Bandwidths>(&mut self, photon: &Photon, p: Vec3, distance2: f32, counter: &mut B) {
         let mut level = 0;
         for &radius2 in &self.radii[..self.radii.len() - 1] {
             level += usize::from(distance2 >= radius2);
         }
         let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
         if let (Some(gathering), true) = (&self.unreachable, photon.flags.has(PhotonFlags::UNREACHABLE)) {
-            self.bins[caustic][level] += Vec3A::from(gathering.photon(photon.wi) * photon.flux);
+            let light = gathering.photon(photon.wi) * photon.flux;
+            self.bins[caustic][level] += Vec3A::from(light);
+            if B::COUNTS && light != Rgb::ZERO {
+                counter.count(photon.p - p, distance2);
+            }
             return;
         }
         let at = self.count;
@@ -64,28 +71,36 @@ impl<'a> Batch<'a> {
             self.flux[axis][at] = photon.flux[axis];
         }
         self.bin[at] = (caustic * MAX_LEVELS + level) as u8;
+        if B::COUNTS {
+            self.place[at] = (photon.p - p, distance2);
+        }
         self.count += 1;
         if self.count == 8 {
-            self.flush();
+            self.flush(counter);
         }
     }
 
     #[inline(never)]
-    fn flush(&mut self) {
+    fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
         let f = self.gathering.eight(self.wi.map(f32x8::from));
         let light: [[f32; 8]; 3] = std::array::from_fn(|c| (f[c] * f32x8::from(self.flux[c])).to_array());
         for (k, &bin) in self.bin[..self.count].iter().enumerate() {
             let bin = usize::from(bin);
-            self.bins[bin / MAX_LEVELS][bin % MAX_LEVELS] += Vec3A::new(light[0][k], light[1][k], light[2][k]);
+            let light = Vec3A::new(light[0][k], light[1][k], light[2][k]);
+            self.bins[bin / MAX_LEVELS][bin % MAX_LEVELS] += light;
+            // Photons that bring nothing are not there [CPPM 2020, 7.2].
+            if B::COUNTS && light != Vec3A::ZERO {
+                counter.count(self.place[k].0, self.place[k].1);
+            }
         }
         self.count = 0;
     }
 
     /// The sums.
     #[inline]
-    pub fn finish(mut self) -> [[Rgb; MAX_LEVELS]; 2] {
+    pub fn finish<B: Bandwidths>(mut self, counter: &mut B) -> [[Rgb; MAX_LEVELS]; 2] {
         if self.count > 0 {
-            self.flush();
+            self.flush(counter);
         }
         self.bins.map(|levels| levels.map(Rgb::from))
     }

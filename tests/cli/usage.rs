@@ -8,7 +8,7 @@ fn errors_word_for_word() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --no-combine";
     let help = "'--help' explains every option";
-    let cases: [(&str, i32, &str, &str); 26] = [
+    let cases: [(&str, i32, &str, &str); 29] = [
         ("", 2, "command line: a command is missing", "'caustique --help' lists the commands"),
         ("rendr", 2, "command line: unrecognized subcommand 'rendr'", "a similar subcommand exists: 'render'"),
         (
@@ -75,7 +75,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --method teapot"),
             2,
-            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, sppm, bpm, vcm]",
+            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, sppm, cppm, bpm, vcm]",
             help,
         ),
         (
@@ -95,6 +95,24 @@ fn errors_word_for_word() {
             2,
             "command line: --knn has no effect with this --initial-bandwidth",
             "leave one of the two out",
+        ),
+        (
+            &format!("{render} --cppm-k 0.7"),
+            2,
+            "command line: --cppm-k has no effect with --method sppm",
+            "leave --cppm-k out, or choose --method cppm",
+        ),
+        (
+            &format!("{render} --method cppm --cppm-grid 9,9"),
+            2,
+            "command line: invalid value '9,9' for '--cppm-grid <NA,NS>': there must be 2 to 64 cells",
+            help,
+        ),
+        (
+            &format!("{render} --method cppm --shard 0/2"),
+            2,
+            "command line: --shard cannot divide --method cppm: its bandwidths depend on all iterations before",
+            "choose --method sppm, or render on one machine",
         ),
         (
             &format!("{render} --env 1,2"),
@@ -164,7 +182,7 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     for option in ["--photons", "--exr-naming", "--target-error", "--strict", "--reproducible"] {
         assert!(help.stdout.contains(option), "{option}");
     }
-    for absent in ["--cppm", "--effects", "--checkpoint", "--kernel", "appm"] {
+    for absent in ["--cppm-plus", "--effects", "--checkpoint", "--kernel", "appm"] {
         assert!(!help.stdout.contains(absent), "{absent}");
     }
     let commands = folder.run("--help").stdout;

@@ -6,6 +6,7 @@ use crate::cli::progress::Form;
 use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
+use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, Levels, PHOTON_BYTES, Settings, Shard,
 };
@@ -33,7 +34,7 @@ pub struct RenderArgs {
     /// How light is found
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
-    /// Light paths sent from the lights, by sppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
+    /// Light paths sent from the lights, by sppm and cppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
     /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
@@ -41,7 +42,7 @@ pub struct RenderArgs {
     /// so [default: 1024]
     #[arg(long, value_name = "MIB", value_parser = value_parser!(u32).range(1..), help_heading = "Method")]
     pub photon_memory: Option<u32>,
-    /// Bandwidth levels of sppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
+    /// Bandwidth levels of sppm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
     /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
     #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
     pub levels: Option<usize>,
@@ -56,6 +57,18 @@ pub struct RenderArgs {
     /// shrinks [default: 2/3; bpm and vcm: 0.75]
     #[arg(long, value_name = "A", value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Method")]
     pub alpha: Option<f64>,
+    /// With cppm the cells in which photons are counted: annuli and sectors of each, at most 64 in all [default: 2,6]
+    #[arg(long, value_name = "NA,NS", help_heading = "Method")]
+    pub cppm_grid: Option<GridChoice>,
+    /// With cppm the factor of the squared bandwidth where nothing within it looks uniform, in (0, 1) [default: 0.8]
+    #[arg(long, value_name = "K", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
+    pub cppm_k: Option<f64>,
+    /// With cppm the growth, with every reduction, of the number of photons it takes for a test: 1 to 1000 [default: 1.2]
+    #[arg(long, value_name = "BETA", value_parser = between(Included(1.0), Included(1000.0)), help_heading = "Method")]
+    pub cppm_beta: Option<f64>,
+    /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
+    #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
+    pub cppm_significance: Option<f64>,
     /// How bandwidths shrink: 'memoryless' by the iteration's number alone
     #[arg(long, value_enum, default_value_t = RadiusRule::Memoryless, help_heading = "Method")]
     pub radius_rule: RadiusRule,
@@ -145,6 +158,8 @@ pub enum Method {
     Pm,
     /// Stochastic progressive photon mapping
     Sppm,
+    /// Chi-squared progressive photon mapping: sppm whose bandwidths shrink only where the photons do not look uniform
+    Cppm,
     /// Bidirectional photon mapping: merging alone
     Bpm,
     /// Vertex connection and merging
@@ -160,6 +175,7 @@ impl Method {
             Method::Light => render::Method::Light,
             Method::Bdpt => render::Method::Bdpt,
             Method::Pm => render::Method::Pm,
+            Method::Cppm => render::Method::Cppm,
             Method::Bpm => render::Method::Bpm,
             Method::Vcm => render::Method::Vcm,
         }
@@ -198,6 +214,29 @@ impl FromStr for BandwidthChoice {
                 Ok(_) => Err("a length must be from 1e-9 to 1e9".into()),
                 Err(_) => Err("it is neither 'knn' nor 'footprint' nor a length".into()),
             },
+        }
+    }
+}
+
+/// `--cppm-grid NA,NS`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct GridChoice {
+    /// Annuli.
+    pub annuli: usize,
+    /// Sectors of each.
+    pub sectors: usize,
+}
+
+impl FromStr for GridChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once(',').and_then(|(a, s)| Some((a.parse().ok()?, s.parse().ok()?)));
+        let cells =
+            |annuli: usize, sectors: usize| annuli.checked_mul(sectors).filter(|cells| (2..=64).contains(cells));
+        match parts {
+            Some((annuli, sectors)) if cells(annuli, sectors).is_some() => Ok(GridChoice { annuli, sectors }),
+            Some(_) => Err("there must be 2 to 64 cells".into()),
+            None => Err("it must be NA,NS, such as 2,6".into()),
         }
     }
 }
@@ -251,7 +290,11 @@ impl RenderArgs {
                 self.initial_bandwidth == Some(BandwidthChoice::Knn) && !method.counts_photons(),
                 "--initial-bandwidth knn",
             ),
-            (self.alpha.is_some() && !method.has_bandwidths(), "--alpha"),
+            (self.alpha.is_some() && !(method.has_bandwidths() && method.shrinks_together()), "--alpha"),
+            (self.cppm_grid.is_some() && method != render::Method::Cppm, "--cppm-grid"),
+            (self.cppm_k.is_some() && method != render::Method::Cppm, "--cppm-k"),
+            (self.cppm_beta.is_some() && method != render::Method::Cppm, "--cppm-beta"),
+            (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
@@ -259,6 +302,7 @@ impl RenderArgs {
         let other = match *option {
             "--photon-memory" => "pm",
             "--debug-techniques" => "vcm",
+            option if option.starts_with("--cppm") => "cppm",
             _ => "sppm",
         };
         Err(Error::new(Kind::Usage, "command line", cause)
@@ -277,6 +321,23 @@ impl RenderArgs {
             let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
             return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
         }
+        if !method.shrinks_together() && self.shard.is_some() {
+            let cause = format!(
+                "--shard cannot divide --method {}: its bandwidths depend on all iterations before",
+                method.name()
+            );
+            return Err(
+                Error::new(Kind::Usage, "command line", cause).hint("choose --method sppm, or render on one machine")
+            );
+        }
+        let chi_squared = ChiSquaredSettings::default();
+        let chi_squared = ChiSquaredSettings {
+            annuli: self.cppm_grid.map_or(chi_squared.annuli, |grid| grid.annuli),
+            sectors: self.cppm_grid.map_or(chi_squared.sectors, |grid| grid.sectors),
+            k: self.cppm_k.unwrap_or(chi_squared.k),
+            beta: self.cppm_beta.unwrap_or(chi_squared.beta),
+            significance: self.cppm_significance.unwrap_or(chi_squared.significance),
+        };
         let levels = Levels::new(self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 }));
         let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
         let initial = match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
@@ -307,6 +368,7 @@ impl RenderArgs {
             techniques: self.debug_techniques.is_some(),
             initial,
             alpha: self.alpha.unwrap_or(method.alpha()),
+            chi_squared,
             max_depth: self.max_depth.unwrap_or(u32::MAX),
             iterations,
             time: self.time,

@@ -1,0 +1,268 @@
+//! The chi-squared rule \[CPPM 2020\]: a bandwidth is kept as long as the photons within it look uniform, and shrinks only when a test says they do not.
+//!
+//! The disc of the bandwidth is cut into annuli of equal area and these into equal sectors (section 5.3). Photons of all iterations since the
+//! last reduction are counted where they fall, turned into the frame of their gathering point and laid flat \[(27)\].
+
+use crate::math::{Frame, Vec3};
+use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
+
+/// Parameters, with the paper's defaults (section 9.1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChiSquaredSettings {
+    /// Annuli, n_a.
+    pub annuli: usize,
+    /// Sectors of an annulus, n_s.
+    pub sectors: usize,
+    /// Bandwidth squared after a reduction over that before, where no smaller disc looks uniform, k.
+    pub k: f64,
+    /// Growth of the least count for a test with every reduction, beta.
+    pub beta: f64,
+    /// Probability of rejecting what is uniform, alpha_chi.
+    pub significance: f64,
+}
+
+impl Default for ChiSquaredSettings {
+    fn default() -> Self {
+        ChiSquaredSettings { annuli: 2, sectors: 6, k: 0.8, beta: 1.2, significance: 0.05 }
+    }
+}
+
+/// Least count for the first test, B_1, however few neighbours set the bandwidth: below it the statistic does not follow its distribution.
+pub const LEAST_BOUND: f32 = 10.0;
+
+/// The rule.
+#[derive(Clone, Debug)]
+pub struct ChiSquared {
+    annuli: usize,
+    sectors: usize,
+    k: f32,
+    beta: f32,
+    /// Quantile for the disc of the `j + 1` innermost annuli; infinite where there is but one cell.
+    critical: Vec<f64>,
+    /// Directions of the borders between sectors, from the first axis, on one half of the disc if their number is even.
+    borders: Vec<(f32, f32)>,
+}
+
+/// The bandwidth of one level of one pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bandwidth {
+    /// Radius squared (m2).
+    pub radius2: f32,
+    /// Photons it takes for a test, B.
+    pub bound: f32,
+}
+
+impl ChiSquared {
+    /// The rule with its critical values. Annuli and sectors at least 1, `significance` in (0, 1).
+    pub fn new(settings: &ChiSquaredSettings) -> ChiSquared {
+        let ChiSquaredSettings { annuli, sectors, k, beta, significance } = *settings;
+        let quantile = |cells: usize| match Distribution::new((cells - 1) as f64) {
+            Ok(distribution) => distribution.inverse_cdf(1.0 - significance),
+            Err(_) => f64::INFINITY,
+        };
+        let half = if sectors.is_multiple_of(2) { sectors / 2 } else { sectors };
+        let borders = (1..half)
+            .map(|s| (std::f64::consts::TAU * s as f64 / sectors as f64).sin_cos())
+            .map(|(sin, cos)| (cos as f32, sin as f32))
+            .collect();
+        ChiSquared {
+            annuli,
+            sectors,
+            k: k as f32,
+            beta: beta as f32,
+            critical: (1..=annuli).map(|annuli| quantile(annuli * sectors)).collect(),
+            borders,
+        }
+    }
+
+    /// Counters per bandwidth.
+    pub fn cells(&self) -> usize {
+        self.annuli * self.sectors
+    }
+
+    /// Sector of a photon at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
+    /// the normal through the point has none and counts in the first sector.
+    #[inline]
+    pub fn sector(&self, frame: &Frame, offset: Vec3) -> usize {
+        let (mut u, mut v) = (offset.dot(frame.t), offset.dot(frame.b));
+        if self.sectors.is_multiple_of(2) {
+            // The lower half is the upper, turned by half the sectors.
+            let lower = v < 0.0 || (v == 0.0 && u < 0.0);
+            if lower {
+                (u, v) = (-u, -v);
+            }
+            let passed: usize =
+                self.borders.iter().map(|(c, s)| usize::from(c * v - s * u >= 0.0 && (u, v) != (0.0, 0.0))).sum();
+            passed + if lower { self.sectors / 2 } else { 0 }
+        } else {
+            let turn = v.atan2(u) / std::f32::consts::TAU;
+            let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+            ((turn * self.sectors as f32) as usize).min(self.sectors - 1)
+        }
+    }
+
+    /// Cell of a photon at a squared distance below `radius2`: its distance is kept when it is laid flat \[(27)\].
+    #[inline]
+    pub fn cell(&self, sector: usize, distance2: f32, radius2: f32) -> usize {
+        let annulus = ((self.annuli as f32 * (distance2 / radius2)) as usize).min(self.annuli - 1);
+        annulus * self.sectors + sector
+    }
+
+    /// Statistic of counts that should be equal \[(12)\]; 0 without any.
+    pub fn statistic(counts: &[u32]) -> f64 {
+        let total: f64 = counts.iter().map(|&c| f64::from(c)).sum();
+        if total == 0.0 {
+            return 0.0;
+        }
+        let squares: f64 = counts.iter().map(|&c| f64::from(c) * f64::from(c)).sum();
+        squares * counts.len() as f64 / total - total
+    }
+
+    /// After an iteration: tests if there are photons enough, and shrinks the bandwidth to the largest inner disc that looks uniform, or by k
+    /// where none does \[6.1, (13), (14)\]; then all counts are dropped. Returns whether it shrank.
+    pub fn update(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
+        let total: u64 = counts.iter().map(|&c| u64::from(c)).sum();
+        if (total as f64) < f64::from(bandwidth.bound) || Self::statistic(counts) <= self.critical[self.annuli - 1] {
+            return false;
+        }
+        let passes = |annuli: usize| {
+            let inner = &counts[..annuli * self.sectors];
+            // A disc without photons says nothing.
+            inner.iter().any(|&c| c > 0) && Self::statistic(inner) <= self.critical[annuli - 1]
+        };
+        let factor = match (1..self.annuli).rev().find(|&annuli| passes(annuli)) {
+            Some(annuli) => annuli as f32 / self.annuli as f32,
+            None => self.k,
+        };
+        // A radius that is no longer a number above zero is none.
+        bandwidth.radius2 = (bandwidth.radius2 * factor).max(f32::MIN_POSITIVE);
+        bandwidth.bound *= self.beta;
+        counts.fill(0);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Domain, Purpose, Stream};
+
+    fn rule() -> ChiSquared {
+        ChiSquared::new(&ChiSquaredSettings::default())
+    }
+
+    /// A uniform point of the unit disc.
+    fn uniform(trial: u64, i: u64) -> (f32, f32) {
+        let u = Stream::new(7, trial, Domain::Test, i).vertex(0).two(Purpose::Pixel);
+        let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();
+        (u.x.sqrt() * cos, u.x.sqrt() * sin)
+    }
+
+    fn count(rule: &ChiSquared, counts: &mut [u32], (x, y): (f32, f32)) {
+        let frame = Frame::from_normal(Vec3::Z);
+        let offset = frame.t * x + frame.b * y;
+        counts[rule.cell(rule.sector(&frame, offset), x * x + y * y, 1.0)] += 1;
+    }
+
+    #[test]
+    fn cells_are_what_the_angle_says() {
+        for sectors in [1, 2, 3, 4, 5, 6, 8, 12] {
+            let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
+            let frame = Frame::from_normal(Vec3::new(0.3, -0.5, 0.8).normalize());
+            for i in 0..2000 {
+                let (x, y) = uniform(0, i);
+                let turn = y.atan2(x).rem_euclid(std::f32::consts::TAU) / std::f32::consts::TAU * sectors as f32;
+                if (turn - turn.round()).abs() > 1e-4 {
+                    assert_eq!(
+                        rule.sector(&frame, frame.t * x + frame.b * y + frame.n * 0.3),
+                        turn as usize,
+                        "{x} {y}"
+                    );
+                }
+            }
+            assert_eq!(rule.sector(&frame, Vec3::ZERO), 0);
+            assert_eq!(rule.sector(&Frame::from_normal(Vec3::Z), Vec3::Z), 0);
+        }
+    }
+
+    #[test]
+    fn both_forms_of_the_statistic_are_one() {
+        let counts = [3u32, 0, 7, 2, 9, 1];
+        let (total, p) = (22.0, 1.0 / 6.0);
+        let direct: f64 = counts.iter().map(|&o| (f64::from(o) - total * p).powi(2) / (total * p)).sum();
+        assert!((ChiSquared::statistic(&counts) - direct).abs() < 1e-12);
+    }
+
+    /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials and the error of the chi-squared
+    /// approximation, which 120 photons in 12 cells keep below half a percent. Photons of a slope are told.
+    #[test]
+    fn the_size_of_the_test_is_its_significance() {
+        let rule = rule();
+        for photons in [120, 1000] {
+            let trials = if photons == 120 { 100_000 } else { 20_000 };
+            let (mut rejected, mut told) = (0, 0);
+            for trial in 0..trials {
+                let (mut counts, mut sloped) = ([0; 12], [0; 12]);
+                for i in 0..photons {
+                    let (x, y) = uniform(trial, i);
+                    count(&rule, &mut counts, (x, y));
+                    // Density 1 + 0.8 x by rejection: what is rejected is mirrored.
+                    let keep = Stream::new(8, trial, Domain::Test, i).vertex(0).one(Purpose::Lobe) < 0.5 + 0.4 * x;
+                    count(&rule, &mut sloped, (if keep { x } else { -x }, y));
+                }
+                rejected += i32::from(ChiSquared::statistic(&counts) > rule.critical[1]);
+                told += i32::from(ChiSquared::statistic(&sloped) > rule.critical[1]);
+            }
+            let size = f64::from(rejected) / trials as f64;
+            let allowed = 5.0 * (0.05 * 0.95 / trials as f64).sqrt() + 0.005;
+            println!("{photons} photons: size {size}, power {}", f64::from(told) / trials as f64);
+            assert!((size - 0.05).abs() < allowed, "{photons} photons: {size}");
+            assert!(f64::from(told) > 4.0 * 0.05 * trials as f64, "{photons} photons: a slope goes unnoticed");
+        }
+    }
+
+    #[test]
+    fn bandwidths_stay_positive_never_grow_and_start_anew() {
+        let rule = rule();
+        let mut bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
+        let mut counts = [0u32; 12];
+        let mut reductions = 0;
+        for step in 0..2000u64 {
+            let before = bandwidth;
+            let u = Stream::new(9, step, Domain::Test, 0).vertex(0).one(Purpose::Lobe);
+            // Now all in one cell, now everywhere.
+            let counted = counts;
+            for (cell, c) in counts.iter_mut().enumerate() {
+                *c += if u < 0.5 && cell != (step / 40 % 12) as usize { 0 } else { 5 };
+            }
+            assert!(counts.iter().zip(&counted).all(|(now, then)| now >= then));
+            let reduced = rule.update(&mut bandwidth, &mut counts);
+            assert!(bandwidth.radius2 > 0.0 && bandwidth.radius2 <= before.radius2);
+            assert_eq!(reduced, bandwidth.bound > before.bound);
+            assert!(!reduced || counts.iter().all(|&c| c == 0));
+            reductions += usize::from(reduced);
+        }
+        assert!(reductions > 10);
+    }
+
+    /// The largest inner disc that looks uniform is taken, k where none does.
+    #[test]
+    fn reductions_are_the_papers() {
+        let rule = rule();
+        let shrink = |counts: [u32; 12]| {
+            let (mut bandwidth, mut counts) = (Bandwidth { radius2: 1.0, bound: 10.0 }, counts);
+            assert!(rule.update(&mut bandwidth, &mut counts));
+            (bandwidth.radius2, bandwidth.bound)
+        };
+        // Uniform within, empty without.
+        assert_eq!(shrink([9, 10, 11, 10, 9, 11, 0, 0, 0, 0, 0, 0]), (0.5, 12.0));
+        // An edge through the middle.
+        assert_eq!(shrink([20, 20, 20, 0, 0, 0, 20, 20, 20, 0, 0, 0]), (0.8, 12.0));
+        // All of it in the outer annulus: the inner disc says nothing.
+        assert_eq!(shrink([0, 0, 0, 0, 0, 0, 9, 10, 11, 10, 9, 11]), (0.8, 12.0));
+        // Too few for a test.
+        let (mut bandwidth, mut counts) =
+            (Bandwidth { radius2: 1.0, bound: 10.0 }, [9u32, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        assert!(!rule.update(&mut bandwidth, &mut counts));
+    }
+}
