@@ -3,7 +3,7 @@
 The reference of a scene is the mean of two long renders by vertex connection and merging. Their difference tells the reference's own error, which is
 taken off every figure; a figure that is not well above it is marked. Seconds are wall clock, on all cores, the renderer's own start left out.
 
-Environment: SECONDS per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged).
+Environment: SECONDS_EACH per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged).
 """
 
 import json
@@ -31,6 +31,7 @@ METHODS = [
     ("bdpt", ["--method", "bdpt"], "Noisy"),
     ("pm", ["--method", "pm"], "Noisy"),
     ("sppm, one level", ["--method", "sppm", "--levels", "1"], "Noisy"),
+    ("cppm, one level", ["--method", "cppm", "--levels", "1"], "Noisy"),
     ("sppm, combined", ["--method", "sppm"], ""),
     ("bpm", ["--method", "bpm"], "Noisy"),
     ("vcm", ["--method", "vcm", "--levels", "1"], "Noisy"),
