@@ -31,8 +31,6 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
 fn settings(iterations: u64, radius: f32, seed: u64) -> Settings {
     Settings {
         seed,
-        // Of sppm; the others send one for a pixel.
-        photons: 10_000,
         initial: InitialBandwidth::Fixed(radius),
         levels: Levels::new(1),
         alpha: 0.75,
@@ -250,7 +248,9 @@ fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], tests: usize, bias: f64) -> Vec<S
 }
 
 fn by(scene: &Scene, (method, iterations): (Method, u64), radius: f32, max_depth: u32) -> Vec<Vec<f64>> {
-    let settings = |seed| Settings { max_depth, ..settings(iterations, radius, seed) };
+    // One map of pm must be large for its bandwidths to be small.
+    let photons = if method == Method::Pm { 400_000 } else { 10_000 };
+    let settings = |seed| Settings { photons, max_depth, ..settings(iterations, radius, seed) };
     (0..SEEDS).map(|seed| tiles(&render(scene, method, SIZE, &settings(seed)), 0)).collect()
 }
 
@@ -278,7 +278,7 @@ fn agree_with(
     for &method in methods {
         let images = by(scene, method, radius, max_depth);
         println!("{what}: {:?} {:.5}", method.0, average(&images));
-        let bias = if method.0.has_bandwidths() { bias } else { 0.0 };
+        let bias = if method.0.has_bandwidths() || method.0 == Method::Pm { bias } else { 0.0 };
         let found = disagreeing(&images, reference, tests, bias);
         assert!(found.is_empty(), "{what}, {:?}: {found:#?}", method.0);
         let mut wrong = images;
@@ -310,7 +310,8 @@ fn glossy_room() {
     add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
     let scene = build(description);
     let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm, Method::Cppm];
-    let methods = methods.map(|m| (m, 48));
+    let mut methods = methods.map(|m| (m, 48)).to_vec();
+    methods.push((Method::Pm, 16));
     agree("glossy room", &scene, &methods, 0.04, 0.02, 0.15);
 }
 
@@ -324,7 +325,8 @@ fn glass_room() {
     description.cameras[0].aperture_radius = 0.05;
     description.cameras[0].focus_distance = 2.5;
     let scene = build(description);
-    let methods = [Method::Path, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 64));
+    let mut methods = [Method::Path, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 64)).to_vec();
+    methods.push((Method::Pm, 16));
     agree("glass room", &scene, &methods, 0.04, 0.02, 0.2);
 }
 
@@ -357,6 +359,7 @@ fn under_the_sky() {
         (Method::Bpm, 512),
         (Method::Vcm, 64),
         (Method::Sppm, 512),
+        (Method::Pm, 64),
     ];
     agree("under the sky", &scene, &methods, 0.05, 0.03, 0.2);
 }
@@ -369,7 +372,8 @@ fn short_paths_seen_in_parallel() {
     description.cameras[0].projection = Projection::Orthographic { xmag: 0.9, ymag: 0.9 };
     let scene = build(description);
     let reference = by(&scene, (Method::Path, 48), 0.04, 4);
-    let methods = [Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 48));
+    let mut methods = [Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 48)).to_vec();
+    methods.push((Method::Pm, 16));
     agree_with("parallel", &scene, &reference, &methods, (0.04, 4), 0.02, 0.15);
 }
 

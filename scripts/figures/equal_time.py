@@ -1,15 +1,14 @@
 """Every method on the same scenes for the same time: relMSE against a reference, and what paths cost.
 
-The reference of a scene is the mean of two long renders by vertex connection and merging. Their difference tells the reference's own error, which is
+The reference of a scene is the mean of two long renders by the method in REFERENCES that finds all its light soonest. Their difference tells the reference's own error, which is
 taken off every figure; a figure that is not well above it is marked. Seconds are wall clock, on all cores, the renderer's own start left out.
 
-Environment: SECONDS_EACH per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged).
+Environment: SECONDS_EACH per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged), SCENES.
 """
 
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,9 @@ WIDTH = int(os.environ.get("WIDTH", 160))
 ROUNDS = int(os.environ.get("ROUNDS", 2))
 CAUSTIQUE = os.environ["CAUSTIQUE_BIN"]
 OUT = ROOT / "out" / "equal_time"
+
+#: By scene; the others' are by vertex connection and merging.
+REFERENCES = {"interior": ["--method", "bdpt"]}
 
 #: Name, options, and the layer to judge ("" is the combined picture).
 METHODS = [
@@ -63,12 +65,13 @@ def relmse(image, reference):
 
 def main():
     OUT.mkdir(parents=True, exist_ok=True)
-    for scene in sys.argv[1:] or ["cornell", "interior"]:
+    for scene in os.environ.get("SCENES", "").split() or ["cornell", "interior"]:
         file = ROOT / "scenes" / f"{scene}.glb"
         halves = []
         for seed in (1001, 1002):
             half = OUT / f"{scene}-reference-{seed}.exr"
-            render(file, half, REFERENCE, seed, ["--method", "vcm", "--levels", "1", "--no-combine"])
+            options = REFERENCES.get(scene, ["--method", "vcm", "--levels", "1"])
+            render(file, half, REFERENCE, seed, [*options, "--no-combine"])
             halves.append(picture(half, "Noisy"))
         reference = (halves[0] + halves[1]) / 2
         # Of the mean: half the variance of one half, which is half of that of the difference.

@@ -57,6 +57,20 @@ fn block(center: Vec3, half: Vec3, angle: f32) -> Mesh {
     mesh
 }
 
+/// A lamp of many triangles.
+fn many(description: &mut Description, cells: u32) {
+    let mut mesh = Mesh::default();
+    let side = 0.5 / cells as f32;
+    for i in 0..cells * cells {
+        let corner = Vec3::new(-0.25 + side * (i % cells) as f32, 1.98, -0.25 + side * (i / cells) as f32);
+        let part = quad(corner, Vec3::X * side, Vec3::Z * side);
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(part.positions);
+        mesh.triangles.extend(part.triangles.iter().map(|t| t.map(|i| first + i)));
+    }
+    add(description, "many lamps", mesh, matte(0.0, 15.0));
+}
+
 struct Cost {
     seconds: f64,
     light_paths: f64,
@@ -92,6 +106,10 @@ fn main() {
     let path = cost(&diffuse, Method::Path, 1);
     println!("512 x 512, Cornell box, all diffuse");
     println!("path: {:.2} million paths per core-second", pixels * 1e-6 / path.seconds);
+    let mut crowded = cornell(None);
+    many(&mut crowded, 224);
+    let crowded = cost(&build(crowded), Method::Path, 1).seconds / path.seconds;
+    println!("with a lamp of {} triangles in place of 2: {crowded:.2} times the time", 2 * 224 * 224);
     println!("\n512 x 512, Cornell box with a mirror sphere: processor seconds");
     println!(
         "{:<8}{:>8}{:>12}{:>24}{:>24}",
