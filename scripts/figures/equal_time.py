@@ -3,7 +3,8 @@
 The reference of a scene is the mean of two long renders by the method in REFERENCES that finds all its light soonest. Their difference tells the reference's own error, which is
 taken off every figure; a figure that is not well above it is marked. Seconds are wall clock, on all cores, the renderer's own start left out.
 
-Environment: SECONDS_EACH per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged), SCENES.
+Environment: SECONDS_EACH per render (15), REFERENCE seconds per half of a reference (240), WIDTH (160), ROUNDS (2: seeds, averaged), SCENES, KEEP (references
+that are there already).
 """
 
 import json
@@ -71,7 +72,8 @@ def main():
         for seed in (1001, 1002):
             half = OUT / f"{scene}-reference-{seed}.exr"
             options = REFERENCES.get(scene, ["--method", "vcm", "--levels", "1"])
-            render(file, half, REFERENCE, seed, [*options, "--no-combine"])
+            if not (os.environ.get("KEEP") and half.exists()):
+                render(file, half, REFERENCE, seed, [*options, "--no-combine"])
             halves.append(picture(half, "Noisy"))
         reference = (halves[0] + halves[1]) / 2
         # Of the mean: half the variance of one half, which is half of that of the difference.

@@ -4,9 +4,8 @@
 //! (`direct_light` splits them), so that the two check each other.
 
 use super::bidirectional::{Part, Record, Technique, Trail};
-use super::bidirectional_eye::look;
+use super::bidirectional_eye::{look, visible};
 use super::eye::{Eye, EyeMeasure};
-use super::segment::transmittance;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
@@ -48,15 +47,8 @@ impl<R: Record> PathTracer<'_, R> {
         if arriving.max_element() <= 0.0 {
             return (Rgb::ZERO, 1.0);
         }
-        let origin = surface.spawn(light.wi);
-        let (direction, tmax) = light.target.map_or((light.wi, f32::INFINITY), |target| {
-            let to = target - origin;
-            (to.normalize(), to.length())
-        });
-        let crosses = light.wi.dot(surface.ng) * vertex.wo.dot(surface.ng) < 0.0;
-        let interior = if crosses { vertex.interior_behind } else { vertex.interior };
         let token = draws.token(Purpose::ShadowAlpha);
-        (arriving * transmittance(scene, origin, direction, tmax, interior, token), weight)
+        (arriving * visible(scene, vertex, light.wi, light.target, token), weight)
     }
 
     /// Adds weighted light.

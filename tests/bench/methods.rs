@@ -85,11 +85,11 @@ fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
         initial: InitialBandwidth::Footprint,
         levels: Levels::new(levels),
         alpha: 0.75,
-        iterations: Some(4),
+        iterations: Some(12),
         ..Settings::default()
     };
     let (mut seconds, mut light_paths, mut photons) = (f64::INFINITY, 0.0, 0);
-    for _ in 0..3 {
+    for _ in 0..2 {
         let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
         let (first, last) = (&rendered.history[0], &rendered.history[rendered.history.len() - 1]);
         let iterations = (last.iterations - first.iterations) as f64;
