@@ -146,7 +146,7 @@ fn main() {
     println!("\nmemory of vcm: {} photons of {} bytes, {kept:.0} MiB;", photons[1], size_of::<MergePhoton>());
     println!("as light vertices kept whole: {} of {} bytes, {whole:.0} MiB", photons[0], size_of::<LightVertex>());
     println!(
-        "{{\"vcm_photons_mib\": {kept:.1}, \"vcm_vertices_mib\": {whole:.1}, \"path_diffuse_million_per_core_s\": {:.3}, \"vcm_512\": {vcm:.3}}}",
+        "{{\"time_with_100352_emitters\": {crowded:.3}, \"vcm_photons_mib\": {kept:.1}, \"vcm_vertices_mib\": {whole:.1}, \"path_diffuse_million_per_core_s\": {:.3}, \"vcm_512\": {vcm:.3}}}",
         pixels * 1e-6 / path.seconds
     );
 }
