@@ -1,9 +1,11 @@
-//! The photon map: photons in Morton order under an implicit 8-wide tree of boxes.
+//! The photon map: photons in Morton order under an implicit 8-wide tree of boxes, and the kernels that weigh them.
 
+pub mod kernel;
 mod map;
 mod near;
 mod nearest;
 
+pub use kernel::Kernel;
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
 pub use near::{Near, same_surface};
 pub use nearest::{MAX_NEIGHBOURS, Nearest};

@@ -2,15 +2,19 @@
 
 use super::bidirectional::Passes;
 use super::control::{Clock, Control, History, Progress, StopReason, cpu_seconds};
-use super::cppm::Cppm;
+use super::counting::Counting;
 use super::method::Method;
 use super::pm::Pm;
 use super::result::{Phases, Rendered, relative_error};
-use super::settings::{Levels, Settings};
+use super::settings::{KernelChoice, Levels, RadiusRule, Settings};
 use super::sppm::Sppm;
 use super::techniques::TechniquePicture;
 use crate::camera::Camera;
 use crate::estimator::Pixel;
+use crate::estimator::rule::adaptive::Adaptive;
+use crate::estimator::rule::chi_squared::ChiSquared;
+use crate::estimator::rule::local::LocalStatistics;
+use crate::photon::kernel;
 use crate::scene::Scene;
 use crate::transport::Surroundings;
 
@@ -55,13 +59,39 @@ pub fn render(
     }
     let surroundings = Surroundings::new(scene, camera.position());
     match settings.method {
-        Method::Sppm => drive(Sppm::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
-        Method::Cppm => {
-            let sppm = Sppm::new(scene, camera, &settings, &surroundings);
-            drive(Cppm::new(sppm, &settings), camera, &settings, observe)
+        Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
+            gathering(Sppm::new(scene, camera, &settings, &surroundings), camera, &settings, observe)
         }
         Method::Pm => drive(Pm::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
         _ => drive(Passes::new(scene, camera, &settings, &surroundings), camera, &settings, observe),
+    }
+}
+
+/// Progressive photon mapping by the rule that the settings say.
+fn gathering(
+    sppm: Sppm<'_>,
+    camera: &Camera,
+    settings: &Settings,
+    observe: impl FnMut(&Progress, &[Pixel]) -> Control,
+) -> Rendered {
+    macro_rules! counting {
+        ($rule:expr, $kernel:expr) => {
+            drive(Counting::new(sppm, settings, $rule, $kernel), camera, settings, observe)
+        };
+    }
+    match (settings.method, settings.radius_rule, settings.kernel) {
+        (Method::Cppm, ..) => counting!(ChiSquared::new(&settings.chi_squared), kernel::Box),
+        (Method::Appm, _, KernelChoice::Box) => counting!(Adaptive::<kernel::Box>::default(), kernel::Box),
+        (Method::Appm, _, KernelChoice::Epanechnikov) => {
+            counting!(Adaptive::<kernel::Epanechnikov>::default(), kernel::Epanechnikov)
+        }
+        (Method::Appm, _, KernelChoice::Gaussian) => {
+            counting!(Adaptive::<kernel::Gaussian>::default(), kernel::Gaussian)
+        }
+        (Method::Ppm, ..) | (_, RadiusRule::Local, _) => {
+            counting!(LocalStatistics { alpha: settings.alpha }, kernel::Box)
+        }
+        (_, RadiusRule::Memoryless, _) => drive(sppm, camera, settings, observe),
     }
 }
 

@@ -18,9 +18,13 @@ pub enum Method {
     Bdpt,
     /// Classical photon mapping: one map, nearest neighbours.
     Pm,
+    /// Progressive photon mapping: measurement points stay where they are, bandwidths follow local statistics.
+    Ppm,
     /// Stochastic progressive photon mapping.
     #[default]
     Sppm,
+    /// Adaptive progressive photon mapping: the bandwidths of least estimated error.
+    Appm,
     /// Chi-squared progressive photon mapping: bandwidths shrink where photons do not look uniform.
     Cppm,
     /// Bidirectional photon mapping: merging at all vertices, nothing else.
@@ -37,7 +41,9 @@ impl Method {
             Method::Light => "light",
             Method::Bdpt => "bdpt",
             Method::Pm => "pm",
+            Method::Ppm => "ppm",
             Method::Sppm => "sppm",
+            Method::Appm => "appm",
             Method::Cppm => "cppm",
             Method::Bpm => "bpm",
             Method::Vcm => "vcm",
@@ -47,7 +53,8 @@ impl Method {
     /// The strategies of a bidirectional method.
     pub(super) fn strategies(self, camera: &Camera) -> Option<Strategies> {
         match self {
-            Method::Path | Method::Pm | Method::Sppm | Method::Cppm => None,
+            Method::Path | Method::Pm => None,
+            Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => None,
             Method::Light => Some(Strategies::LIGHT),
             Method::Bdpt => Some(Strategies::BDPT),
             Method::Bpm => Some(Strategies::BPM),
@@ -57,28 +64,28 @@ impl Method {
 
     /// Whether it weighs sampling techniques against each other path by path, or has but one.
     pub fn has_techniques(self) -> bool {
-        !matches!(self, Method::Pm | Method::Sppm | Method::Cppm)
+        !self.counts_photons()
     }
 
     /// Whether its bandwidths are several levels.
     pub fn has_levels(self) -> bool {
-        matches!(self, Method::Sppm | Method::Cppm | Method::Vcm)
+        self.gathers() || self == Method::Vcm
     }
 
     /// Whether it has bandwidths.
     pub fn has_bandwidths(self) -> bool {
-        matches!(self, Method::Sppm | Method::Cppm | Method::Bpm | Method::Vcm)
+        self.gathers() || matches!(self, Method::Bpm | Method::Vcm)
     }
 
-    /// Whether the bandwidths of all levels shrink alike, by the iteration's number alone. Where they do not, an iteration depends on those before it.
-    pub fn shrinks_together(self) -> bool {
-        self != Method::Cppm
+    /// Whether every iteration gathers the photons of a map of its own: progressive photon mapping, of whatever rule.
+    pub fn gathers(self) -> bool {
+        matches!(self, Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm)
     }
 
     /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have one for every eye path,
     /// or none.
     pub fn counts_photons(self) -> bool {
-        matches!(self, Method::Pm | Method::Sppm | Method::Cppm)
+        self.gathers() || self == Method::Pm
     }
 
     /// Light paths where no number is asked for, of methods that count them.

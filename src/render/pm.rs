@@ -17,7 +17,7 @@ use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::Vec3;
-use crate::photon::{MAX_NEIGHBOURS, Nearest, Photon, PhotonMap};
+use crate::photon::{kernel, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Scratch, Surroundings, light_path};
@@ -135,7 +135,7 @@ impl Iterate for Pm<'_> {
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let pixel = &mut pixels[place.at];
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    let measure = eye.measure(scratch, start, &map, neighbours);
+                    let measure = eye.measure(scratch, start, &map, neighbours, kernel::Box);
                     keep_first_hit(eye, pixel, &measure);
                     pixel.add(&measure, None, 1, 0);
                 }

@@ -4,6 +4,8 @@ use super::method::Method;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::memoryless;
+#[cfg(doc)]
+use crate::photon::kernel;
 use crate::transport::MAX_LEVELS;
 
 /// Iterations when no stop condition is given.
@@ -50,6 +52,28 @@ impl Levels {
     }
 }
 
+/// Kernel of density estimation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KernelChoice {
+    /// [`kernel::Box`].
+    #[default]
+    Box,
+    /// [`kernel::Epanechnikov`].
+    Epanechnikov,
+    /// [`kernel::Gaussian`].
+    Gaussian,
+}
+
+/// What [`Method::Sppm`]'s bandwidths follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RadiusRule {
+    /// The iteration's number ([`memoryless`]).
+    #[default]
+    Memoryless,
+    /// The photons found ([`local`](crate::estimator::rule::local)).
+    Local,
+}
+
 /// Settings of a render.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -67,8 +91,12 @@ pub struct Settings {
     pub techniques: bool,
     /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is its bandwidth.
     pub initial: InitialBandwidth,
-    /// Reduction rate of the memoryless rule, in (0, 1].
+    /// Reduction rate of the memoryless rule and that of local statistics, in (0, 1].
     pub alpha: f64,
+    /// Rule of [`Method::Sppm`].
+    pub radius_rule: RadiusRule,
+    /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]; the other methods have the box kernel.
+    pub kernel: KernelChoice,
     /// Parameters of [`Method::Cppm`]'s rule.
     pub chi_squared: ChiSquaredSettings,
     /// Longest path in segments.
@@ -94,6 +122,8 @@ impl Default for Settings {
             techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             alpha: memoryless::ALPHA,
+            radius_rule: RadiusRule::Memoryless,
+            kernel: KernelChoice::Box,
             chi_squared: ChiSquaredSettings::default(),
             max_depth: u32::MAX,
             iterations: Some(DEFAULT_ITERATIONS),
@@ -105,9 +135,18 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any order.
+    pub fn is_memoryless(&self) -> bool {
+        match self.method {
+            Method::Ppm | Method::Cppm | Method::Appm => false,
+            Method::Sppm => self.radius_rule == RadiusRule::Memoryless,
+            _ => true,
+        }
+    }
+
     /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on its own, those up to the
     /// method's own image, which leaves none to compare it with.
     pub fn compared_levels(&self) -> usize {
-        if self.method.shrinks_together() { self.levels.count } else { self.levels.own() + 1 }
+        if self.is_memoryless() || self.method == Method::Appm { self.levels.count } else { self.levels.own() + 1 }
     }
 }

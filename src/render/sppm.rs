@@ -6,12 +6,12 @@
 use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::result::Phases;
-use super::settings::Settings;
+use super::settings::{KernelChoice, Settings};
 use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::photon::{Photon, PhotonMap};
+use crate::photon::{Kernel, Photon, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
@@ -51,7 +51,14 @@ pub(super) fn trace_some(
 }
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
-fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
+fn eye_pass(
+    eye: &Eye<'_>,
+    settings: &Settings,
+    i: u64,
+    photons: &PhotonMap,
+    pixels: &mut [Pixel],
+    kernel: impl Kernel,
+) {
     let size = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
@@ -71,14 +78,14 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
             let all = LevelRadii::new((0..levels.count).map(radius2));
             match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                 Some(correlated) => {
-                    let independent = eye.measure(scratch, start, photons, &all.part(0..1));
+                    let independent = eye.measure(scratch, start, photons, &all.part(0..1), kernel);
                     let others = if levels.count > 1 { all.part(1..levels.count) } else { all };
-                    let correlated = eye.measure(scratch, correlated, photons, &others);
+                    let correlated = eye.measure(scratch, correlated, photons, &others, kernel);
                     keep_first_hit(eye, pixel, &independent);
                     pixel.add(&independent, Some(&correlated), levels.count, levels.own());
                 }
                 None => {
-                    let all = eye.measure(scratch, start, photons, &all);
+                    let all = eye.measure(scratch, start, photons, &all, kernel);
                     keep_first_hit(eye, pixel, &all);
                     pixel.add(&all, None, levels.count, levels.own());
                 }
@@ -151,7 +158,11 @@ impl Iterate for Sppm<'_> {
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let (map, work) = self.map(i, phases);
         let start = cpu_seconds();
-        eye_pass(&self.eye, self.settings, i, &map, pixels);
+        match self.settings.kernel {
+            KernelChoice::Box => eye_pass(&self.eye, self.settings, i, &map, pixels, kernel::Box),
+            KernelChoice::Epanechnikov => eye_pass(&self.eye, self.settings, i, &map, pixels, kernel::Epanechnikov),
+            KernelChoice::Gaussian => eye_pass(&self.eye, self.settings, i, &map, pixels, kernel::Gaussian),
+        }
         phases.eye += cpu_seconds() - start;
         work
     }

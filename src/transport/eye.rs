@@ -13,7 +13,7 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::math::{Rgb, Vec2, Vec3};
-use crate::photon::{Near, Photon, PhotonMap};
+use crate::photon::{Kernel, Near, Photon, PhotonMap};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::trace::Ray;
@@ -54,14 +54,30 @@ impl LevelRadii {
     }
 }
 
+/// A photon that brings light to a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Found {
+    /// Where it is from the vertex.
+    pub offset: Vec3,
+    /// Its distance squared.
+    pub distance2: f32,
+    /// What it adds to the path's measure, mean of RGB, before it is divided by an area.
+    pub light: f32,
+}
+
 /// Bandwidths where an eye path gathers.
 pub trait Bandwidths {
     /// Whether [`Bandwidths::count`] is to be called.
     const COUNTS: bool = false;
-    /// A photon that brings light lies at `offset` from the vertex of the last call of [`Bandwidths::at`], within the largest bandwidth.
+    /// A photon within reach of the vertex of the last call of [`Bandwidths::at`].
     #[inline]
-    fn count(&mut self, offset: Vec3, distance2: f32) {
-        let _ = (offset, distance2);
+    fn count(&mut self, photon: &Found) {
+        let _ = photon;
+    }
+    /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
+    #[inline]
+    fn reach2(&self, largest2: f32) -> f32 {
+        largest2
     }
     /// Those at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
     fn at(&mut self, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
@@ -133,7 +149,8 @@ enum Stage {
     Later,
 }
 
-struct Gather<'a, B> {
+struct Gather<'a, B, K> {
+    kernel: K,
     scene: &'a Scene,
     photons: &'a PhotonMap,
     near: &'a mut Near<Photon>,
@@ -147,7 +164,7 @@ struct Gather<'a, B> {
     last: Vec3,
 }
 
-impl<B: Bandwidths> Gather<'_, B> {
+impl<B: Bandwidths, K: Kernel> Gather<'_, B, K> {
     /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with
     /// which next-event estimation at the last vertex would have found it.
     #[inline]
@@ -168,34 +185,31 @@ impl<B: Bandwidths> Gather<'_, B> {
         }
     }
 
-    /// Photons around the vertex: kernel density estimation with the box kernel, all levels from one query [post-reconstruction
-    /// 2021, (2) and (3)].
+    /// Photons around the vertex: kernel density estimation, all levels from one query [post-reconstruction 2021, (2) and (3)].
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
         let radii = self.bandwidths.at(self.photons, vertex.surface.p, vertex.surface.ng, self.length);
         let radii = &radii.radius2[..radii.count];
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
-        let mut batch = Batch::new(radii, vertex.shading, broad, broad | sharp);
+        let reach2 = self.bandwidths.reach2(largest);
+        let mut batch = Batch::new(self.kernel, radii, vertex, broad, broad | sharp);
         let (p, bandwidths) = (vertex.surface.p, &mut self.bandwidths);
-        self.photons.gather(self.near, p, vertex.surface.ng, largest, |photon, distance2| {
+        self.photons.gather(self.near, p, vertex.surface.ng, reach2, |photon, distance2| {
             if u32::from(photon.depth) <= longest {
-                batch.push(photon, p, distance2, bandwidths);
+                batch.push(photon, distance2, bandwidths);
             }
         });
-        let bins = batch.finish(&mut self.bandwidths);
-        let mut sums = [Rgb::ZERO; 2];
+        let sums = batch.finish(&mut self.bandwidths);
         for (level, radius2) in radii.iter().enumerate() {
             let kernel = vertex.throughput * (FRAC_1_PI / radius2);
-            sums[0] += bins[0][level];
-            sums[1] += bins[1][level];
-            self.measure.indirect_photons[level] += kernel * sums[0];
-            self.measure.caustic_photons[level] += kernel * sums[1];
+            self.measure.indirect_photons[level] += kernel * sums[0][level];
+            self.measure.caustic_photons[level] += kernel * sums[1][level];
         }
     }
 }
 
-impl<'a, B: Bandwidths> Visitor<'a> for Gather<'_, B> {
+impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let (surface, shading) = (vertex.surface, vertex.shading);
@@ -304,7 +318,7 @@ impl Eye<'_> {
         starts
     }
 
-    /// Traces one eye path and measures all levels of `bandwidths`. `scratch` has served no other photons.
+    /// Traces one eye path and measures all levels of `bandwidths` with `kernel`. `scratch` has served no other photons.
     #[inline]
     pub fn measure(
         &self,
@@ -312,8 +326,10 @@ impl Eye<'_> {
         (start, stream): &(PathStart, Stream),
         photons: &PhotonMap,
         bandwidths: impl Bandwidths,
+        kernel: impl Kernel,
     ) -> EyeMeasure {
         let mut gather = Gather {
+            kernel,
             scene: self.scene,
             photons,
             near: &mut scratch.near,

@@ -1,9 +1,10 @@
 //! Photons gathered at a vertex, eight at a time.
 
-use super::eye::{Bandwidths, MAX_LEVELS};
-use crate::bsdf::{Gathering, LobeSet, Shading};
+use super::eye::{Bandwidths, Found, MAX_LEVELS};
+use super::walk::Vertex;
+use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3, Vec3A};
-use crate::photon::{Near, Photon, PhotonFlags};
+use crate::photon::{Kernel, Near, Photon, PhotonFlags};
 use bumpalo::Bump;
 use wide::f32x8;
 
@@ -16,10 +17,16 @@ pub struct Scratch {
     pub(super) near: Near<Photon>,
 }
 
-/// Photons waiting for their BSDF, and the sums of those that have had it: by kind (other, caustic) and by the smallest level that holds
-/// them.
-pub(super) struct Batch<'a> {
+/// Bins of a kind of photon: one per level, and one for those beyond the largest bandwidth, which are only counted.
+const BINS: usize = MAX_LEVELS + 1;
+
+/// Photons waiting for their BSDF, and the sums of those that have had it, by kind (other, caustic). With the box kernel a photon is in the bin of
+/// the smallest level that holds it, and levels are sums of bins; with others it has its weight in every level.
+pub(super) struct Batch<'a, K> {
+    kernel: std::marker::PhantomData<K>,
     radii: &'a [f32],
+    p: Vec3,
+    throughput: Rgb,
     gathering: Gathering<'a>,
     /// For photons that no eye path that goes on could find; `None` where it is the same.
     unreachable: Option<Gathering<'a>>,
@@ -27,17 +34,21 @@ pub(super) struct Batch<'a> {
     wi: [[f32; 8]; 3],
     flux: [[f32; 8]; 3],
     bin: [u8; 8],
-    /// For those who count: where they are from the gathering point, and their distance squared.
+    /// For kernels and for those who count: where they are from the gathering point, and their distance squared.
     place: [(Vec3, f32); 8],
-    bins: [[Vec3A; MAX_LEVELS]; 2],
+    bins: [[Vec3A; BINS]; 2],
 }
 
-impl<'a> Batch<'a> {
+impl<'a, K: Kernel> Batch<'a, K> {
     /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else finds.
     #[inline]
-    pub fn new(radii: &'a [f32], shading: &'a Shading<'a>, set: LobeSet, all: LobeSet) -> Batch<'a> {
+    pub fn new(_: K, radii: &'a [f32], vertex: &Vertex<'a, '_>, set: LobeSet, all: LobeSet) -> Batch<'a, K> {
+        let shading = vertex.shading;
         Batch {
+            kernel: std::marker::PhantomData,
             radii,
+            p: vertex.surface.p,
+            throughput: vertex.throughput,
             gathering: shading.gathering(set),
             unreachable: (set != all).then(|| shading.gathering(all)),
             count: 0,
@@ -45,24 +56,23 @@ impl<'a> Batch<'a> {
             flux: [[0.0; 8]; 3],
             bin: [0; 8],
             place: [(Vec3::ZERO, 0.0); 8],
-            bins: [[Vec3A::ZERO; MAX_LEVELS]; 2],
+            bins: [[Vec3A::ZERO; BINS]; 2],
         }
     }
 
-    /// Adds a photon at a distance squared below the largest radius squared from `p`.
+    /// Adds a photon at a distance squared within reach.
     #[inline]
-    pub fn push<B: Bandwidths>(&mut self, photon: &Photon, p: Vec3, distance2: f32, counter: &mut B) {
+    pub fn push<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
         let mut level = 0;
-        for &radius2 in &self.radii[..self.radii.len() - 1] {
+        // Without a counter nothing is beyond the largest bandwidth.
+        let last = self.radii.len() - usize::from(!B::COUNTS);
+        for &radius2 in &self.radii[..last] {
             level += usize::from(distance2 >= radius2);
         }
         let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
         if let (Some(gathering), true) = (&self.unreachable, photon.flags.has(PhotonFlags::UNREACHABLE)) {
             let light = gathering.photon(photon.wi) * photon.flux;
-            self.bins[caustic][level] += Vec3A::from(light);
-            if B::COUNTS && light != Rgb::ZERO {
-                counter.count(photon.p - p, distance2);
-            }
+            self.add(caustic, level, light.into(), (photon.p - self.p, distance2), counter);
             return;
         }
         let at = self.count;
@@ -70,9 +80,9 @@ impl<'a> Batch<'a> {
             self.wi[axis][at] = photon.wi[axis];
             self.flux[axis][at] = photon.flux[axis];
         }
-        self.bin[at] = (caustic * MAX_LEVELS + level) as u8;
-        if B::COUNTS {
-            self.place[at] = (photon.p - p, distance2);
+        self.bin[at] = (caustic * BINS + level) as u8;
+        if B::COUNTS || !K::BOX {
+            self.place[at] = (photon.p - self.p, distance2);
         }
         self.count += 1;
         if self.count == 8 {
@@ -84,23 +94,51 @@ impl<'a> Batch<'a> {
     fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
         let f = self.gathering.eight(self.wi.map(f32x8::from));
         let light: [[f32; 8]; 3] = std::array::from_fn(|c| (f[c] * f32x8::from(self.flux[c])).to_array());
-        for (k, &bin) in self.bin[..self.count].iter().enumerate() {
-            let bin = usize::from(bin);
+        for k in 0..self.count {
+            let bin = usize::from(self.bin[k]);
             let light = Vec3A::new(light[0][k], light[1][k], light[2][k]);
-            self.bins[bin / MAX_LEVELS][bin % MAX_LEVELS] += light;
-            // Photons that bring nothing are not there [CPPM 2020, 7.2].
-            if B::COUNTS && light != Vec3A::ZERO {
-                counter.count(self.place[k].0, self.place[k].1);
-            }
+            self.add(bin / BINS, bin % BINS, light, self.place[k], counter);
         }
         self.count = 0;
     }
 
-    /// The sums.
+    /// Adds what a photon brings to the levels that hold it.
+    #[inline(always)]
+    fn add<B: Bandwidths>(
+        &mut self,
+        kind: usize,
+        level: usize,
+        light: Vec3A,
+        (offset, distance2): (Vec3, f32),
+        counter: &mut B,
+    ) {
+        if K::BOX {
+            self.bins[kind][level] += light;
+        } else {
+            for (bin, radius2) in self.bins[kind].iter_mut().zip(self.radii).skip(level) {
+                *bin += light * K::weight(distance2 / radius2);
+            }
+        }
+        // Photons that bring nothing are not there [CPPM 2020, 7.2].
+        if B::COUNTS && light != Vec3A::ZERO {
+            let light = (Rgb::from(light) * self.throughput).element_sum() / 3.0;
+            counter.count(&Found { offset, distance2, light });
+        }
+    }
+
+    /// The sums by kind and level.
     #[inline]
-    pub fn finish<B: Bandwidths>(mut self, counter: &mut B) -> [[Rgb; MAX_LEVELS]; 2] {
+    pub fn finish<B: Bandwidths>(mut self, counter: &mut B) -> [[Rgb; BINS]; 2] {
         if self.count > 0 {
             self.flush(counter);
+        }
+        if K::BOX {
+            for bins in &mut self.bins {
+                for level in 1..self.radii.len() {
+                    let within = bins[level - 1];
+                    bins[level] += within;
+                }
+            }
         }
         self.bins.map(|levels| levels.map(Rgb::from))
     }

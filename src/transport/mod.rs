@@ -18,7 +18,7 @@ pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, S
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Left, LightVertices, Splat};
 pub use direct::{balance, direct_light};
-pub use eye::{Bandwidths, Eye, EyeMeasure, Features, FirstHit, GatherPoint, LevelRadii, MAX_LEVELS};
+pub use eye::{Bandwidths, Eye, EyeMeasure, Features, FirstHit, Found, GatherPoint, LevelRadii, MAX_LEVELS};
 pub use gather::Scratch;
 pub use interior::{Crossing, Interior, Surroundings};
 pub use light::{Emitted, LightPass, light_path};

@@ -2,7 +2,7 @@
 
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
-use caustique::estimator::rule::chi_squared::Bandwidth;
+use caustique::estimator::rule::{adaptive, chi_squared, local};
 use caustique::render::{MAX_TECHNIQUES, Method, Settings};
 use caustique::transport::EyeMeasure;
 use std::mem::size_of;
@@ -28,10 +28,15 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
     };
     // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
     let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
-    // Bandwidths and counts of their own.
-    let chi_squared =
-        settings.chi_squared.annuli * settings.chi_squared.sectors * size_of::<u32>() + size_of::<Bandwidth>();
-    let own = if method == Method::Cppm { settings.levels.count * chi_squared } else { 0 } as u64;
+    // Bandwidths of their own, and what is counted for them.
+    let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
+    let state = match method {
+        Method::Cppm => size_of::<chi_squared::Bandwidth>() + cells * size_of::<u32>(),
+        Method::Appm => size_of::<adaptive::Bandwidth>() + size_of::<adaptive::Tally>(),
+        _ if method.gathers() && !settings.is_memoryless() => size_of::<local::Bandwidth>() + size_of::<u32>(),
+        _ => 0,
+    };
+    let own = (settings.levels.count * state) as u64;
     let per_pixel = own + pictures + (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
     pixels * per_pixel + photons
 }

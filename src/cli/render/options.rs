@@ -8,7 +8,7 @@ use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::render::{
-    self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, Levels, PHOTON_BYTES, Settings, Shard,
+    self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
 use caustique::scene::{MAX_SIZE, View};
 use caustique::transport::MAX_LEVELS;
@@ -34,7 +34,7 @@ pub struct RenderArgs {
     /// How light is found
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
-    /// Light paths sent from the lights, by sppm and cppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
+    /// Light paths sent from the lights, by ppm, sppm, appm and cppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
     /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
@@ -42,7 +42,7 @@ pub struct RenderArgs {
     /// so [default: 1024]
     #[arg(long, value_name = "MIB", value_parser = value_parser!(u32).range(1..), help_heading = "Method")]
     pub photon_memory: Option<u32>,
-    /// Bandwidth levels of sppm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
+    /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
     /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
     #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
     pub levels: Option<usize>,
@@ -69,9 +69,13 @@ pub struct RenderArgs {
     /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
     #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
     pub cppm_significance: Option<f64>,
-    /// How bandwidths shrink: 'memoryless' by the iteration's number alone
-    #[arg(long, value_enum, default_value_t = RadiusRule::Memoryless, help_heading = "Method")]
-    pub radius_rule: RadiusRule,
+    /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found [default: memoryless; ppm: local]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub radius_rule: Option<RadiusRule>,
+    /// How sppm and appm weigh photons by their distance: 'box' alike within the bandwidth, 'epanechnikov' and 'gaussian' (cut off at three
+    /// standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and the local rule count photons and need box [default: box]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub kernel: Option<Kernel>,
     /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
     pub max_depth: Option<u32>,
@@ -156,8 +160,12 @@ pub enum Method {
     Bdpt,
     /// Classical photon mapping: one map, the nearest photons; tends to a blurred picture
     Pm,
+    /// Progressive photon mapping: one fixed point per pixel, so edges are jagged
+    Ppm,
     /// Stochastic progressive photon mapping
     Sppm,
+    /// Adaptive progressive photon mapping: sppm whose bandwidths have the least estimated error
+    Appm,
     /// Chi-squared progressive photon mapping: sppm whose bandwidths shrink only where the photons do not look uniform
     Cppm,
     /// Bidirectional photon mapping: merging alone
@@ -175,6 +183,8 @@ impl Method {
             Method::Light => render::Method::Light,
             Method::Bdpt => render::Method::Bdpt,
             Method::Pm => render::Method::Pm,
+            Method::Ppm => render::Method::Ppm,
+            Method::Appm => render::Method::Appm,
             Method::Cppm => render::Method::Cppm,
             Method::Bpm => render::Method::Bpm,
             Method::Vcm => render::Method::Vcm,
@@ -188,6 +198,20 @@ impl Method {
 pub enum RadiusRule {
     /// By the iteration's number alone
     Memoryless,
+    /// By the photons found
+    Local,
+}
+
+/// Kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// Alike within the bandwidth
+    Box,
+    /// Falling with the squared distance
+    Epanechnikov,
+    /// A normal distribution cut off at three standard deviations
+    Gaussian,
 }
 
 /// `--initial-bandwidth`.
@@ -279,7 +303,14 @@ impl RenderArgs {
     }
 
     /// Errors: options that say nothing to the method.
-    fn check_method(&self, method: render::Method) -> Result<()> {
+    fn check_method(&self, method: render::Method, rule: render::RadiusRule) -> Result<()> {
+        use render::Method as M;
+        let local = rule == render::RadiusRule::Local;
+        let idle_rule = match self.radius_rule {
+            None => false,
+            Some(RadiusRule::Local) => !matches!(method, M::Ppm | M::Sppm),
+            Some(RadiusRule::Memoryless) => !matches!(method, M::Sppm | M::Bpm | M::Vcm),
+        };
         let given = [
             (self.photons.is_some() && !method.counts_photons(), "--photons"),
             (self.photon_memory.is_some() && method != render::Method::Pm, "--photon-memory"),
@@ -290,13 +321,19 @@ impl RenderArgs {
                 self.initial_bandwidth == Some(BandwidthChoice::Knn) && !method.counts_photons(),
                 "--initial-bandwidth knn",
             ),
-            (self.alpha.is_some() && !(method.has_bandwidths() && method.shrinks_together()), "--alpha"),
+            (self.alpha.is_some() && (!method.has_bandwidths() || matches!(method, M::Appm | M::Cppm)), "--alpha"),
+            (idle_rule, "--radius-rule"),
             (self.cppm_grid.is_some() && method != render::Method::Cppm, "--cppm-grid"),
             (self.cppm_k.is_some() && method != render::Method::Cppm, "--cppm-k"),
             (self.cppm_beta.is_some() && method != render::Method::Cppm, "--cppm-beta"),
             (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
+        if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !matches!(method, M::Sppm | M::Appm)) {
+            let what = if local { "local statistics" } else { method.name() };
+            let error = Error::new(Kind::Usage, "command line", format!("{what} needs the box kernel"));
+            return Err(error.hint("leave --kernel out, or choose --method sppm with the memoryless rule, or appm"));
+        }
         let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
         let cause = format!("{option} has no effect with --method {}", method.name());
         let other = match *option {
@@ -315,20 +352,15 @@ impl RenderArgs {
     /// Options that contradict each other.
     pub fn settings(&self) -> Result<Settings> {
         let method = self.method.chosen();
-        self.check_method(method)?;
+        let radius_rule = match (self.radius_rule, method) {
+            (Some(RadiusRule::Local), _) | (None, render::Method::Ppm) => render::RadiusRule::Local,
+            _ => render::RadiusRule::Memoryless,
+        };
+        self.check_method(method, radius_rule)?;
         if method == render::Method::Pm && self.knn == Some(1) {
             // The k-th photon is on the rim: with one neighbour there would be none inside.
             let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
             return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
-        }
-        if !method.shrinks_together() && self.shard.is_some() {
-            let cause = format!(
-                "--shard cannot divide --method {}: its bandwidths depend on all iterations before",
-                method.name()
-            );
-            return Err(
-                Error::new(Kind::Usage, "command line", cause).hint("choose --method sppm, or render on one machine")
-            );
         }
         let chi_squared = ChiSquaredSettings::default();
         let chi_squared = ChiSquaredSettings {
@@ -359,7 +391,7 @@ impl RenderArgs {
             let cause = format!("shard {} of {} holds none of {n} iterations", shard.index, shard.count);
             return Err(Error::new(Kind::Usage, "command line", cause).hint("use fewer shards or more --iterations"));
         }
-        Ok(render::Settings {
+        let settings = render::Settings {
             method,
             seed: self.seed,
             photons: self.photons.unwrap_or(method.photons()),
@@ -368,12 +400,28 @@ impl RenderArgs {
             techniques: self.debug_techniques.is_some(),
             initial,
             alpha: self.alpha.unwrap_or(method.alpha()),
+            radius_rule,
+            kernel: match self.kernel {
+                None | Some(Kernel::Box) => KernelChoice::Box,
+                Some(Kernel::Epanechnikov) => KernelChoice::Epanechnikov,
+                Some(Kernel::Gaussian) => KernelChoice::Gaussian,
+            },
             chi_squared,
             max_depth: self.max_depth.unwrap_or(u32::MAX),
             iterations,
             time: self.time,
             target_error: self.target_error,
             shard,
-        })
+        };
+        if self.shard.is_some() && !settings.is_memoryless() {
+            let rule = if method == render::Method::Sppm { " with local statistics" } else { "" };
+            let cause = format!(
+                "--shard cannot divide --method {}{rule}: its bandwidths depend on all iterations before",
+                method.name()
+            );
+            return Err(Error::new(Kind::Usage, "command line", cause)
+                .hint("choose --method sppm with the memoryless rule, or render on one machine"));
+        }
+        Ok(settings)
     }
 }

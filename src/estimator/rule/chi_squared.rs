@@ -3,7 +3,9 @@
 //! The disc of the bandwidth is cut into annuli of equal area and these into equal sectors (section 5.3). Photons of all iterations since the
 //! last reduction are counted where they fall, turned into the frame of their gathering point and laid flat \[(27)\].
 
+use super::CountingRule;
 use crate::math::{Frame, Vec3};
+use crate::transport::Found;
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 
 /// Parameters, with the paper's defaults (section 9.1).
@@ -75,11 +77,6 @@ impl ChiSquared {
         }
     }
 
-    /// Counters per bandwidth.
-    pub fn cells(&self) -> usize {
-        self.annuli * self.sectors
-    }
-
     /// Sector of a photon at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
     /// the normal through the point has none and counts in the first sector.
     #[inline]
@@ -120,7 +117,7 @@ impl ChiSquared {
 
     /// After an iteration: tests if there are photons enough, and shrinks the bandwidth to the largest inner disc that looks uniform, or by k
     /// where none does \[6.1, (13), (14)\]; then all counts are dropped. Returns whether it shrank.
-    pub fn update(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
+    fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
         let total: u64 = counts.iter().map(|&c| u64::from(c)).sum();
         if (total as f64) < f64::from(bandwidth.bound) || Self::statistic(counts) <= self.critical[self.annuli - 1] {
             return false;
@@ -139,6 +136,41 @@ impl ChiSquared {
         bandwidth.bound *= self.beta;
         counts.fill(0);
         true
+    }
+}
+
+impl CountingRule for ChiSquared {
+    type Bandwidth = Bandwidth;
+    type Tally = u32;
+
+    /// One per cell.
+    fn tallies(&self) -> usize {
+        self.annuli * self.sectors
+    }
+
+    fn begin(&self, radius2: f32, photons: f32, _: i32) -> Bandwidth {
+        Bandwidth { radius2, bound: photons.max(LEAST_BOUND) }
+    }
+
+    #[inline]
+    fn radius2(bandwidth: &Bandwidth) -> f32 {
+        bandwidth.radius2
+    }
+
+    #[inline]
+    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photon: &Found) {
+        let sector = self.sector(frame, photon.offset);
+        for (bandwidth, counts) in bandwidths.iter().zip(counts.chunks_mut(self.tallies())) {
+            if photon.distance2 < bandwidth.radius2 {
+                counts[self.cell(sector, photon.distance2, bandwidth.radius2)] += 1;
+            }
+        }
+    }
+
+    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32]) {
+        for (bandwidth, counts) in bandwidths.iter_mut().zip(counts.chunks_mut(self.tallies())) {
+            self.test(bandwidth, counts);
+        }
     }
 }
 
@@ -236,7 +268,7 @@ mod tests {
                 *c += if u < 0.5 && cell != (step / 40 % 12) as usize { 0 } else { 5 };
             }
             assert!(counts.iter().zip(&counted).all(|(now, then)| now >= then));
-            let reduced = rule.update(&mut bandwidth, &mut counts);
+            let reduced = rule.test(&mut bandwidth, &mut counts);
             assert!(bandwidth.radius2 > 0.0 && bandwidth.radius2 <= before.radius2);
             assert_eq!(reduced, bandwidth.bound > before.bound);
             assert!(!reduced || counts.iter().all(|&c| c == 0));
@@ -251,7 +283,7 @@ mod tests {
         let rule = rule();
         let shrink = |counts: [u32; 12]| {
             let (mut bandwidth, mut counts) = (Bandwidth { radius2: 1.0, bound: 10.0 }, counts);
-            assert!(rule.update(&mut bandwidth, &mut counts));
+            assert!(rule.test(&mut bandwidth, &mut counts));
             (bandwidth.radius2, bandwidth.bound)
         };
         // Uniform within, empty without.
@@ -263,6 +295,6 @@ mod tests {
         // Too few for a test.
         let (mut bandwidth, mut counts) =
             (Bandwidth { radius2: 1.0, bound: 10.0 }, [9u32, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
-        assert!(!rule.update(&mut bandwidth, &mut counts));
+        assert!(!rule.test(&mut bandwidth, &mut counts));
     }
 }

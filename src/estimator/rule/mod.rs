@@ -1,4 +1,38 @@
-//! Bandwidth rules, one a file: pure functions from a pass to the next bandwidth.
+//! Bandwidth rules, one a file: from a pass, and what it found, to the next bandwidth.
 
+pub mod adaptive;
 pub mod chi_squared;
+pub mod local;
 pub mod memoryless;
+
+use crate::math::Frame;
+use crate::transport::Found;
+
+/// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one eye path are counted and updated
+/// together.
+pub trait CountingRule: Sync {
+    /// State of a level of a pixel, kept between iterations.
+    type Bandwidth: Copy + Send + Sync;
+    /// What is counted.
+    type Tally: Copy + Default + Send + Sync;
+
+    /// Tallies per bandwidth.
+    fn tallies(&self) -> usize {
+        1
+    }
+    /// The bandwidth before the first iteration: its radius squared, the photons that the pilot found within it (0: not known), and by how
+    /// many levels it is larger than the method's own image's.
+    fn begin(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
+    /// Its radius squared.
+    fn radius2(bandwidth: &Self::Bandwidth) -> f32;
+    /// Radius squared within which photons are to be counted.
+    #[inline]
+    fn reach2(&self, bandwidths: &[Self::Bandwidth], largest2: f32) -> f32 {
+        let _ = bandwidths;
+        largest2
+    }
+    /// A photon within reach of a gathering point with this frame, which is one function of the normal in all iterations.
+    fn count(&self, bandwidths: &[Self::Bandwidth], tallies: &mut [Self::Tally], frame: &Frame, photon: &Found);
+    /// After iteration `i` (from 1).
+    fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], tallies: &mut [Self::Tally]);
+}

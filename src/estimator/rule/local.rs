@@ -1,0 +1,108 @@
+//! The rule of local statistics \[Hachisuka, Ogaki, Jensen 2008; for shared statistics Hachisuka and Jensen 2009\]: of the photons that an iteration
+//! adds a share alpha is kept, and the disc shrinks as if the others had not been there.
+//!
+//! With N photons so far, M new ones and flux tau, all three are scaled with the area:
+//! `N' = N + alpha M`, `R'^2 / R^2 = N' / (N + M)`, `tau' = (tau + tau_M) R'^2 / R^2` (the course's first talk; its slide leaves `tau_M` out).
+//! The estimate `tau / (pi R^2)` over the number of iterations is therefore the mean over iterations of `tau_M / (pi R^2)` with the radius each
+//! was gathered with: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no state of its own, and its variance is known.
+
+use super::CountingRule;
+use crate::math::Frame;
+use crate::transport::Found;
+
+/// The rule.
+#[derive(Clone, Copy, Debug)]
+pub struct LocalStatistics {
+    /// Share of new photons kept, in (0, 1].
+    pub alpha: f64,
+}
+
+/// The bandwidth of one level of one pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bandwidth {
+    /// Radius squared (m2).
+    pub radius2: f32,
+    /// Photons so far, N: not whole, since only a share of each iteration's is kept.
+    pub photons: f64,
+}
+
+impl CountingRule for LocalStatistics {
+    type Bandwidth = Bandwidth;
+    type Tally = u32;
+
+    fn begin(&self, radius2: f32, _: f32, _: i32) -> Bandwidth {
+        Bandwidth { radius2, photons: 0.0 }
+    }
+
+    #[inline]
+    fn radius2(bandwidth: &Bandwidth) -> f32 {
+        bandwidth.radius2
+    }
+
+    #[inline]
+    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [u32], _: &Frame, photon: &Found) {
+        for (bandwidth, tally) in bandwidths.iter().zip(tallies) {
+            *tally += u32::from(photon.distance2 < bandwidth.radius2);
+        }
+    }
+
+    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], tallies: &mut [u32]) {
+        for (bandwidth, tally) in bandwidths.iter_mut().zip(tallies) {
+            let new = f64::from(std::mem::take(tally));
+            if new > 0.0 {
+                let kept = bandwidth.photons + self.alpha * new;
+                let factor = kept / (bandwidth.photons + new);
+                bandwidth.radius2 = (f64::from(bandwidth.radius2) * factor).max(f64::from(f32::MIN_POSITIVE)) as f32;
+                bandwidth.photons = kept;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Domain, Purpose, Stream};
+
+    /// The state of the papers, step by step, against the mean of what each iteration estimates; counts never fall, radii never grow and stay positive, and
+    /// the flux is scaled with the area.
+    #[test]
+    fn the_papers_recursion_is_a_mean_over_iterations() {
+        let rule = LocalStatistics { alpha: 2.0 / 3.0 };
+        let mut ours = rule.begin(1.0, 10.0, 0);
+        let (mut n, mut radius2, mut tau) = (0.0, 1.0f64, 0.0);
+        let mut sum = 0.0;
+        for i in 1..=3000u64 {
+            let u = Stream::new(3, i, Domain::Test, 0).vertex(0).two(Purpose::Pixel);
+            let new = (u.x * 20.0 * radius2 as f32) as u32;
+            let flux = f64::from(new) * f64::from(u.y);
+            sum += flux / radius2;
+            if new > 0 {
+                let kept = n + 2.0 / 3.0 * f64::from(new);
+                let factor = kept / (n + f64::from(new));
+                (n, radius2, tau) = (kept, radius2 * factor, (tau + flux) * factor);
+            }
+            let before = ours;
+            rule.update(i, std::slice::from_mut(&mut ours), &mut [new]);
+            assert!(ours.radius2 > 0.0 && ours.radius2 <= before.radius2 && ours.photons >= before.photons);
+            assert!((f64::from(ours.radius2) / radius2 - 1.0).abs() < 1e-4 && (ours.photons - n).abs() < 1e-9 * n);
+            assert!((tau / radius2 - sum).abs() < 1e-9 * sum, "iteration {i}");
+        }
+        assert!(radius2 < 0.1);
+    }
+
+    /// Under uniform light an iteration finds photons in proportion to the area, and the product of the factors is that of the memoryless rule
+    /// \[Knaus and Zwicker 2011, 4.2\], begun one step earlier: `prod_{k=0}^{i-1} (k + alpha) / (k + 1)`.
+    #[test]
+    fn under_uniform_light_it_shrinks_as_the_memoryless_rule() {
+        let rule = LocalStatistics { alpha: 0.7 };
+        let mut bandwidth = rule.begin(1.0, 10.0, 0);
+        for i in 1..=1000 {
+            // So many photons that rounding to whole ones is nothing.
+            let new = (1e8 * f64::from(bandwidth.radius2)).round() as u32;
+            rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [new]);
+            let expected = 0.7 * super::super::memoryless::radius2_factor(i, 0.7);
+            assert!((f64::from(bandwidth.radius2) / expected - 1.0).abs() < 1e-4, "iteration {i}");
+        }
+    }
+}

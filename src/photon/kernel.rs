@@ -1,0 +1,112 @@
+//! Kernels of density estimation: how much a photon counts by its distance.
+//!
+//! All have the bandwidth as the radius of their support, and the squared distance over the squared bandwidth, `s` in [0, 1), as their argument.
+//! What is written here is a kernel over the box kernel: times 1 / (pi r^2) it integrates to one over the disc of radius r.
+
+use std::f32::consts::PI;
+
+/// A kernel.
+pub trait Kernel: Copy + Send + Sync + 'static {
+    /// Constant over its support, so that a photon counts alike in all bandwidths that hold it.
+    const BOX: bool;
+    /// Second moment along an axis, over the squared bandwidth: it scales the bias.
+    const SECOND_MOMENT: f32;
+    /// Integral of the squared kernel, times pi r^2: it scales the variance.
+    const ROUGHNESS: f32;
+    /// The kernel over the box kernel.
+    fn weight(s: f32) -> f32;
+}
+
+/// One within the bandwidth \[post-reconstruction 2021, (3)\].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Box;
+
+/// `2 (1 - s)`: of all kernels the one of least asymptotic error \[Epanechnikov 1969\].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Epanechnikov;
+
+/// A normal distribution cut off at three standard deviations, and normalised on what is left.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Gaussian;
+
+impl Kernel for Box {
+    const BOX: bool = true;
+    const SECOND_MOMENT: f32 = 0.25;
+    const ROUGHNESS: f32 = 1.0;
+    #[inline(always)]
+    fn weight(_: f32) -> f32 {
+        1.0
+    }
+}
+
+impl Kernel for Epanechnikov {
+    const BOX: bool = false;
+    const SECOND_MOMENT: f32 = 1.0 / 6.0;
+    const ROUGHNESS: f32 = 4.0 / 3.0;
+    #[inline(always)]
+    fn weight(s: f32) -> f32 {
+        2.0 * (1.0 - s)
+    }
+}
+
+/// Half the squared bandwidth over the variance: the exponent at the rim.
+const RIM: f32 = 4.5;
+/// Share of the normal distribution within three standard deviations, in two dimensions: `1 - exp(-RIM)`.
+const KEPT: f32 = 0.988_891;
+
+impl Kernel for Gaussian {
+    const BOX: bool = false;
+    const SECOND_MOMENT: f32 = 0.5 * (1.0 - (1.0 - KEPT) * (1.0 + RIM)) / (RIM * KEPT);
+    const ROUGHNESS: f32 = 0.5 * RIM * (2.0 - KEPT) / KEPT;
+    #[inline(always)]
+    fn weight(s: f32) -> f32 {
+        (RIM / KEPT) * (-RIM * s).exp()
+    }
+}
+
+/// Second derivatives of a smooth kernel, the triweight `4 / pi (1 - s)^3`, summed over both axes: the Laplacian of what photons estimate. Per
+/// photon at `s` within the squared bandwidth `radius2`; in 1/m4.
+#[inline]
+pub fn laplacian(s: f32, radius2: f32) -> f32 {
+    (48.0 / PI) * (1.0 - s) * (3.0 * s - 1.0) / (radius2 * radius2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Midpoint sums over s of `f(s) weight`: ds stands for the area element over pi r^2.
+    fn integral(f: impl Fn(f64) -> f64) -> f64 {
+        let n = 200_000;
+        (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
+    }
+
+    fn check<K: Kernel>() {
+        let weight = |s: f64| f64::from(K::weight(s as f32));
+        assert!((integral(weight) - 1.0).abs() < 1e-5);
+        // Of a round kernel half of the mean squared distance lies along each axis.
+        assert!((integral(|s| 0.5 * s * weight(s)) - f64::from(K::SECOND_MOMENT)).abs() < 1e-5);
+        assert!((integral(|s| weight(s) * weight(s)) - f64::from(K::ROUGHNESS)).abs() < 1e-4);
+        assert_eq!(K::BOX, weight(0.0) == weight(0.9));
+    }
+
+    #[test]
+    fn kernels_are_normal_and_know_their_moments() {
+        check::<Box>();
+        check::<Epanechnikov>();
+        check::<Gaussian>();
+    }
+
+    /// It gives nothing for a constant, and 4 for x^2 + y^2, whose Laplacian is 4, at any bandwidth.
+    #[test]
+    fn the_laplacian_is_that_of_the_field() {
+        for radius2 in [0.25f32, 1.0, 9.0] {
+            let area = f64::from(PI * radius2);
+            let of = |field: &dyn Fn(f64) -> f64| {
+                area * integral(|s| f64::from(laplacian(s as f32, radius2)) * field(s * f64::from(radius2)))
+            };
+            assert!(of(&|_| 1.0).abs() < 1e-3 / f64::from(radius2));
+            assert!((of(&|d2| d2) - 4.0).abs() < 1e-3);
+        }
+    }
+}
