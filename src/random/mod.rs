@@ -71,6 +71,8 @@ pub enum Purpose {
     ShadowAlpha = 18,
     /// Alpha cut-outs along the second strategy's ray.
     SecondAlpha = 19,
+    /// Whether a photon of constant flux outlives what it lost on its way here.
+    Loss = 20,
 }
 
 impl Purpose {

@@ -15,7 +15,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::{Frame, Vec3};
 use crate::photon::{Kernel, PhotonMap};
 use crate::random::{Domain, Streams};
-use crate::transport::{Bandwidths, EyeMeasure, Found, LevelRadii, MAX_LEVELS, PathStart, Scratch};
+use crate::transport::{Bandwidths, EqualFlux, EyeMeasure, Found, LevelRadii, MAX_LEVELS, PathStart, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -70,16 +70,20 @@ pub(super) struct Counting<'a, R: CountingRule, K> {
     settings: &'a Settings,
     rule: R,
     kernel: K,
-    /// Of every pixel and level.
+    /// What photons of each channel carry, where channels are apart; then each has bandwidths of its own.
+    channels: Option<[Option<EqualFlux>; 3]>,
+    /// Of every pixel, channel and level.
     bandwidths: Vec<R::Bandwidth>,
-    /// Of every pixel and level.
+    /// Of every pixel, channel and level.
     tallies: Vec<R::Tally>,
 }
 
 impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     /// Nothing done yet.
     pub fn new(sppm: Sppm<'a>, settings: &'a Settings, rule: R, kernel: K) -> Self {
-        Counting { sppm, settings, rule, kernel, bandwidths: Vec::new(), tallies: Vec::new() }
+        let apart = settings.method == Method::Cppm && settings.chi_squared.plus;
+        let channels = apart.then(|| sppm.equal_flux());
+        Counting { sppm, settings, rule, kernel, channels, bandwidths: Vec::new(), tallies: Vec::new() }
     }
 
     /// Random numbers of the eye paths of a domain in iteration `i`.
@@ -93,32 +97,44 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         }
     }
 
-    fn eye_pass(&mut self, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
+    /// `maps` holds the photons, or those of each channel.
+    fn eye_pass(&mut self, i: u64, maps: &[PhotonMap], pixels: &mut [Pixel]) {
         let [independent, correlated] =
             [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
-        let Counting { sppm, settings, rule, kernel, bandwidths, tallies } = self;
+        let Counting { sppm, settings, rule, kernel, bandwidths, tallies, .. } = self;
         let (eye, rule, kernel, levels) = (sppm.eye(), &*rule, *kernel, settings.levels);
         let (size, count, each) = (eye.camera.size(), levels.count, rule.tallies());
+        let states = count * maps.len();
         let bands = pixels
             .par_chunks_mut(band(size.0))
-            .zip(bandwidths.par_chunks_mut(band(size.0) * count))
-            .zip(tallies.par_chunks_mut(band(size.0) * count * each));
-        par_pixels(bands, size, Scratch::default, |scratch, ((pixels, bandwidths), tallies), places| {
+            .zip(bandwidths.par_chunks_mut(band(size.0) * states))
+            .zip(tallies.par_chunks_mut(band(size.0) * states * each));
+        let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
+        par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), tallies), places| {
             let independent = eye.starts(places, independent);
             let correlated = levels.two_paths.then(|| eye.starts(places, correlated));
             for (k, place) in places.iter().enumerate() {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
-                let bandwidths = &mut bandwidths[place.at * count..][..count];
-                let tallies = &mut tallies[place.at * count * each..][..count * each];
+                let bandwidths = &mut bandwidths[place.at * states..][..states];
+                let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
                 let mut measure = |start: &(PathStart, _), levels: Range<usize>| {
-                    let tallies = &mut tallies[levels.start * each..levels.end * each];
-                    let bandwidths = &mut bandwidths[levels];
-                    let mut counter = Counter::new(rule, bandwidths, tallies);
-                    let measure = eye.measure(scratch, start, photons, &mut counter, kernel);
-                    let measure = by_level(measure, counter.ascending());
-                    rule.update(i, bandwidths, tallies);
-                    measure
+                    let mut all = None;
+                    for (channel, (photons, scratch)) in maps.iter().zip(scratches.iter_mut()).enumerate() {
+                        let levels = channel * count + levels.start..channel * count + levels.end;
+                        let tallies = &mut tallies[levels.start * each..levels.end * each];
+                        let bandwidths = &mut bandwidths[levels];
+                        let mut counter = Counter::new(rule, bandwidths, tallies);
+                        let measure = eye.measure(scratch, start, photons, &mut counter, kernel);
+                        let measure = by_level(measure, counter.ascending());
+                        rule.update(i, bandwidths, tallies);
+                        // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
+                        match &mut all {
+                            None => all = Some(measure),
+                            Some(all) => add_photons(all, &measure),
+                        }
+                    }
+                    all.unwrap_or_default()
                 };
                 let pixel = &mut pixels[place.at];
                 match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
@@ -136,6 +152,14 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 }
             }
         });
+    }
+}
+
+/// Adds what photons brought to another measure of the same path.
+fn add_photons(all: &mut EyeMeasure, measure: &EyeMeasure) {
+    let sums = all.caustic_photons.iter_mut().chain(&mut all.indirect_photons);
+    for (sum, light) in sums.zip(measure.caustic_photons.iter().chain(&measure.indirect_photons)) {
+        *sum += *light;
     }
 }
 
@@ -163,21 +187,35 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
             let above = level as i32 - levels.own() as i32;
             self.rule.begin(pixel.bandwidth * pixel.bandwidth * scale, neighbours * scale, above)
         };
-        self.bandwidths =
-            pixels.iter().flat_map(|pixel| (0..levels.count).map(move |level| begin(pixel, level))).collect();
+        let states = levels.count * self.channels.map_or(1, |channels| channels.len());
+        let bandwidths = pixels.iter().flat_map(|pixel| (0..states).map(move |k| begin(pixel, k % levels.count)));
+        self.bandwidths = bandwidths.collect();
         self.tallies = vec![R::Tally::default(); self.bandwidths.len() * self.rule.tallies()];
         pixels
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let (map, work) = self.sppm.map(i, phases);
+        let (maps, work) = match &self.channels {
+            None => {
+                let (map, work) = self.sppm.map(i, phases);
+                (vec![map], work)
+            }
+            Some(flux) => {
+                let (maps, work) = self.sppm.channel_maps(i, flux, phases);
+                (Vec::from(maps), work)
+            }
+        };
         let start = cpu_seconds();
-        self.eye_pass(i, &map, pixels);
+        self.eye_pass(i, &maps, pixels);
         phases.eye += cpu_seconds() - start;
         work
     }
 
     fn radii(&mut self) -> Vec<f32> {
-        self.bandwidths.iter().map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
+        let count = self.settings.levels.count;
+        // Of three channels the one in the middle.
+        let (all, shown) = if self.channels.is_some() { (3 * count, count..2 * count) } else { (count, 0..count) };
+        let bandwidths = self.bandwidths.chunks(all).flat_map(|bandwidths| &bandwidths[shown.clone()]);
+        bandwidths.map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
     }
 }

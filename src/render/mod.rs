@@ -19,7 +19,7 @@ pub use method::Method;
 pub use pm::PHOTON_BYTES;
 pub use result::{Phases, Rendered};
 pub use settings::{
-    DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, KernelChoice,
-    Levels, RadiusRule, Settings, Shard,
+    DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS,
+    KernelChoice, Levels, RadiusRule, Settings, Shard,
 };
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};

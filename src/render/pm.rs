@@ -17,7 +17,7 @@ use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::Vec3;
-use crate::photon::{kernel, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap};
+use crate::photon::{MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Scratch, Surroundings, light_path};

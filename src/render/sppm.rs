@@ -14,7 +14,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::{Kernel, Photon, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
+use crate::transport::{EqualFlux, Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -34,6 +34,11 @@ pub(super) fn trace_some(
     pass: &LightPass,
     paths: Range<u32>,
 ) -> Vec<Photon> {
+    trace_by(paths, |arena, index, photons| light_path(scene, arena, surroundings, pass, index, photons))
+}
+
+/// Calls `light_path` for some paths; photons are in the order of paths.
+fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Vec<Photon>) + Sync) -> Vec<Photon> {
     let parts: Vec<Vec<Photon>> = (0..paths.len() as u32)
         .into_par_iter()
         .step_by(CHUNK as usize)
@@ -41,7 +46,7 @@ pub(super) fn trace_some(
             let mut photons = Vec::with_capacity(CHUNK as usize * 2);
             let first = paths.start + first;
             for index in first..paths.end.min(first.saturating_add(CHUNK)) {
-                light_path(scene, arena, surroundings, pass, index, &mut photons);
+                light_path(arena, index, &mut photons);
                 arena.reset();
             }
             photons
@@ -123,6 +128,36 @@ impl<'a> Sppm<'a> {
     /// Eye paths.
     pub fn eye(&self) -> Eye<'a> {
         self.eye
+    }
+
+    /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
+    pub fn channel_maps(&self, i: u64, flux: &[Option<EqualFlux>; 3], phases: &mut Phases) -> ([PhotonMap; 3], Work) {
+        let mut work = Work { light_paths: 0, photons: 0 };
+        let each = (self.settings.photons / 3).max(1);
+        let Settings { seed, max_depth, .. } = *self.settings;
+        let maps = std::array::from_fn(|channel| {
+            let start = cpu_seconds();
+            // The channels share no random numbers.
+            let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
+            let photons = flux[channel].map_or(Vec::new(), |flux| {
+                trace_by(0..each, |arena, index, photons| {
+                    flux.light_path(self.eye.scene, arena, self.surroundings, &pass, index, photons);
+                })
+            });
+            let traced = cpu_seconds();
+            let map = PhotonMap::build(photons);
+            phases.light += traced - start;
+            phases.map += cpu_seconds() - traced;
+            work.light_paths += u64::from(each);
+            work.photons += map.photons().len();
+            map
+        });
+        (maps, work)
+    }
+
+    /// What photons of equal flux carry, by channel.
+    pub fn equal_flux(&self) -> [Option<EqualFlux>; 3] {
+        std::array::from_fn(|channel| EqualFlux::new(self.eye.scene, self.surroundings, channel))
     }
 
     /// The photons of an iteration.

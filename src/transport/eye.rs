@@ -284,6 +284,7 @@ impl Eye<'_> {
             throughput: Rgb::ONE,
             interior: self.interior,
             first: Known::Unknown,
+            channel: None,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags};
-use crate::random::{Domain, SobolPair, Stream, mix};
+use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
 use bumpalo::Bump;
 
@@ -54,6 +54,10 @@ impl LightPass {
         self.paths
     }
 
+    fn stream(&self, index: u64) -> Stream {
+        Stream::new(self.seed, self.pass, self.domain, index)
+    }
+
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
     pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
@@ -75,8 +79,9 @@ impl LightPass {
                 throughput: flux,
                 interior: surroundings.light(emission.light),
                 first: Known::Unknown,
+                channel: None,
             },
-            stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
+            stream: self.stream(u64::from(index)),
             delta: emission.delta,
             light: emission.light,
             density: emission.density,
@@ -130,4 +135,52 @@ pub fn light_path(
     let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
     let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
+}
+
+/// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path would lose is the probability that
+/// it ends. So photons differ in number only, and their density alone tells where light varies \[CPPM 2020, 9.4\].
+#[derive(Clone, Copy, Debug)]
+pub struct EqualFlux {
+    channel: usize,
+    /// Flux of a path (W), for passes of one path.
+    flux: f32,
+}
+
+impl EqualFlux {
+    /// Paths drawn to tell the mean flux.
+    const SAMPLES: u32 = 4096;
+
+    /// Of a channel (0 to 2): as much flux as a light path carries on average, so that paths are as many. `None` where no light has any of this channel.
+    pub fn new(scene: &Scene, surroundings: &Surroundings, channel: usize) -> Option<EqualFlux> {
+        let pass = LightPass::new(0, 0, Domain::PilotLight, Self::SAMPLES, u32::MAX);
+        let emitted = (0..Self::SAMPLES).filter_map(|index| pass.emit(scene, surroundings, index));
+        // `emit` divides by the number of paths.
+        let flux: f64 = emitted.map(|emitted| f64::from(emitted.start.throughput[channel])).sum();
+        (flux > 0.0).then_some(EqualFlux { channel, flux: flux as f32 })
+    }
+
+    /// Traces what light path `index` of the pass stands for: copies of it, as many as the common flux goes into its own on average.
+    pub fn light_path(
+        &self,
+        scene: &Scene,
+        arena: &mut Bump,
+        surroundings: &Surroundings,
+        pass: &LightPass,
+        index: u32,
+        photons: &mut Vec<Photon>,
+    ) {
+        let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
+        let flux = self.flux / pass.paths as f32;
+        let copies = emitted.start.throughput[self.channel] / flux;
+        let copies = (copies + emitted.stream.vertex(0).one(Purpose::Loss)) as u64;
+        let mut throughput = Rgb::ZERO;
+        throughput[self.channel] = flux;
+        let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
+        for copy in 0..copies {
+            let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
+            let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
+            walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
+            arena.reset();
+        }
+    }
 }

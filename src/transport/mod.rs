@@ -21,7 +21,7 @@ pub use direct::{balance, direct_light};
 pub use eye::{Bandwidths, Eye, EyeMeasure, Features, FirstHit, Found, GatherPoint, LevelRadii, MAX_LEVELS};
 pub use gather::Scratch;
 pub use interior::{Crossing, Interior, Surroundings};
-pub use light::{Emitted, LightPass, light_path};
+pub use light::{Emitted, EqualFlux, LightPass, light_path};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;
 pub use segment::{Arrival, End, next_surface, transmittance};

@@ -31,6 +31,8 @@ pub struct PathStart {
     pub interior: Interior,
     /// What the first ray meets, if it has been traced already.
     pub first: Known,
+    /// The one channel of a path that keeps its weight: what it would lose is the probability that it ends.
+    pub channel: Option<usize>,
 }
 
 /// A vertex of a path on a surface. What it refers to by `'a` outlives the walk.
@@ -116,7 +118,8 @@ pub fn walk<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first } = *start;
+    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, channel } = *start;
+    let weight = channel.map_or(1.0, |channel| throughput[channel]);
     let mut known = first;
     let mut survival_scale = 1.0 / throughput.max_element();
     if !survival_scale.is_finite() {
@@ -142,6 +145,15 @@ pub fn walk<'a, V: Visitor<'a>>(
         };
         let Arrival { ref surface, eta, ref crossing, interior: here, transmittance, distance } = arrival;
         throughput *= transmittance;
+        if let Some(channel) = channel {
+            let left = throughput[channel] / weight;
+            // Written so that NaN ends the path.
+            if left > 0.0 && stream.vertex(depth).one(Purpose::Loss) < left {
+                throughput /= left.min(1.0);
+            } else {
+                return;
+            }
+        }
         let material = &scene.materials.list[surface.material as usize];
         let frame = material.shading_frame(surface, &scene.materials.textures);
         let bsdf = scene.scattering.bsdf(&scene.materials, surface, eta, arena);
@@ -168,7 +180,17 @@ pub fn walk<'a, V: Visitor<'a>>(
         if set.is_empty() || depth == max_depth {
             return;
         }
-        let survival = vertex.survival(set);
+        let survival = match channel {
+            None => vertex.survival(set),
+            // It has its roulette on arrival; this one ends what is trapped without loss.
+            Some(_) => {
+                if depth > LATE {
+                    LATE_SURVIVAL
+                } else {
+                    1.0
+                }
+            }
+        };
         if draws.one(Purpose::Roulette) >= survival {
             return;
         }

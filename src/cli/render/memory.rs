@@ -36,7 +36,8 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
         _ if method.gathers() && !settings.is_memoryless() => size_of::<local::Bandwidth>() + size_of::<u32>(),
         _ => 0,
     };
-    let own = (settings.levels.count * state) as u64;
+    let apart = if method == Method::Cppm && settings.chi_squared.plus { 3 } else { 1 };
+    let own = (settings.levels.count * apart * state) as u64;
     let per_pixel = own + pictures + (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
     pixels * per_pixel + photons
 }

@@ -69,6 +69,10 @@ pub struct RenderArgs {
     /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
     #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
     pub cppm_significance: Option<f64>,
+    /// With cppm red, green and blue apart, with photons of equal flux: finds what differs in colour or brightness but not in the number of photons, such as
+    /// the picture of a projector; takes about three times as long
+    #[arg(long, help_heading = "Method")]
+    pub cppm_plus: bool,
     /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found [default: memoryless; ppm: local]
     #[arg(long, value_enum, help_heading = "Method")]
     pub radius_rule: Option<RadiusRule>,
@@ -327,6 +331,7 @@ impl RenderArgs {
             (self.cppm_k.is_some() && method != render::Method::Cppm, "--cppm-k"),
             (self.cppm_beta.is_some() && method != render::Method::Cppm, "--cppm-beta"),
             (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
+            (self.cppm_plus && method != render::Method::Cppm, "--cppm-plus"),
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !matches!(method, M::Sppm | M::Appm)) {
@@ -369,6 +374,7 @@ impl RenderArgs {
             k: self.cppm_k.unwrap_or(chi_squared.k),
             beta: self.cppm_beta.unwrap_or(chi_squared.beta),
             significance: self.cppm_significance.unwrap_or(chi_squared.significance),
+            plus: self.cppm_plus,
         };
         let levels = Levels::new(self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 }));
         let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };

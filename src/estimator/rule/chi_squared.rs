@@ -21,11 +21,13 @@ pub struct ChiSquaredSettings {
     pub beta: f64,
     /// Probability of rejecting what is uniform, alpha_chi.
     pub significance: f64,
+    /// Channels apart, with photons of equal flux (section 9.4): what varies in flux alone does not escape the test.
+    pub plus: bool,
 }
 
 impl Default for ChiSquaredSettings {
     fn default() -> Self {
-        ChiSquaredSettings { annuli: 2, sectors: 6, k: 0.8, beta: 1.2, significance: 0.05 }
+        ChiSquaredSettings { annuli: 2, sectors: 6, k: 0.8, beta: 1.2, significance: 0.05, plus: false }
     }
 }
 
@@ -57,7 +59,7 @@ pub struct Bandwidth {
 impl ChiSquared {
     /// The rule with its critical values. Annuli and sectors at least 1, `significance` in (0, 1).
     pub fn new(settings: &ChiSquaredSettings) -> ChiSquared {
-        let ChiSquaredSettings { annuli, sectors, k, beta, significance } = *settings;
+        let ChiSquaredSettings { annuli, sectors, k, beta, significance, plus: _ } = *settings;
         let quantile = |cells: usize| match Distribution::new((cells - 1) as f64) {
             Ok(distribution) => distribution.inverse_cdf(1.0 - significance),
             Err(_) => f64::INFINITY,
