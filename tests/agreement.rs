@@ -14,22 +14,8 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::{Eye, Interior, path_radiance};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
-use support::stats::{mean_and_error, t_critical};
-
-const SIZE: u32 = 32;
-const TILE: u32 = 8;
-const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
-
-/// Tile means of one image given per-pixel values.
-fn tiles(value: impl Fn(u32, u32) -> f64) -> Vec<f64> {
-    let mut sums = vec![0.0; TILES];
-    for y in 0..SIZE {
-        for x in 0..SIZE {
-            sums[(y / TILE * (SIZE / TILE) + x / TILE) as usize] += value(x, y) / f64::from(TILE * TILE);
-        }
-    }
-    sums
-}
+use support::stats::t_critical;
+use support::tiles::{SIZE, TILES, average, tiles};
 
 fn mean(c: Rgb) -> f64 {
     f64::from(c.element_sum()) / 3.0
@@ -49,7 +35,7 @@ fn by_photons(scene: &Scene, photons: u32, radius: f32, iterations: u64, seeds: 
             };
             let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
             assert_eq!(rendered.rejected(), 0);
-            tiles(|x, y| rendered.pixels[(y * SIZE + x) as usize].levels[0].mean.element_sum() / 3.0)
+            tiles(|index| rendered.pixels[index].levels[0].mean.element_sum() / 3.0)
         })
         .collect()
 }
@@ -60,8 +46,8 @@ fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
     let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX };
     (0..seeds)
         .map(|seed| {
-            tiles(|x, y| {
-                let index = u64::from(y * SIZE + x);
+            tiles(|index| {
+                let (x, y, index) = (index as u32 % SIZE, index as u32 / SIZE, index as u64);
                 let path = |pass| mean(path_radiance(&eye, (x, y), Stream::new(seed, pass, Domain::Test, index)));
                 (0..paths).map(path).sum::<f64>() / paths as f64
             })
@@ -71,20 +57,10 @@ fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
 
 /// Tiles in which two sets of seeds differ by more than chance and `bias` (relative) allow.
 fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
-    let critical = t_critical(1e-3, TILES, (a.len().min(b.len()) - 1) as f64);
-    (0..TILES)
-        .filter_map(|tile| {
-            let (mean_a, error_a) = mean_and_error(&a.iter().map(|s| s[tile]).collect::<Vec<_>>());
-            let (mean_b, error_b) = mean_and_error(&b.iter().map(|s| s[tile]).collect::<Vec<_>>());
-            let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
-            ((mean_a - mean_b).abs() > allowed)
-                .then(|| format!("tile {tile}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}"))
-        })
-        .collect()
+    support::tiles::disagreeing(a, b, t_critical(1e-3, TILES, (a.len().min(b.len()) - 1) as f64), bias)
 }
 
 fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, planted: f64) {
-    let average = |s: &[Vec<f64>]| s.iter().flatten().sum::<f64>() / (s.len() * TILES) as f64;
     println!("{what}: photons {:.5}, paths {:.5}", average(photons), average(paths));
     let found = disagreeing(photons, paths, bias);
     assert!(found.is_empty(), "{what}: {found:#?}");

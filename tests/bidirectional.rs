@@ -16,6 +16,7 @@ use caustique::scene::description::{
 use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
+use support::tiles::{SIZE, TILES, average};
 
 const ERROR_RATE: f64 = 1e-3;
 const ALL: [Method; 5] = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm];
@@ -217,34 +218,15 @@ fn white_sphere_in_glass_under_a_uniform_sky() {
     check.run("merging, sphere in glass", &scene, &[Method::Bpm, Method::Vcm], 1536, 0.05);
 }
 
-const SIZE: u32 = 32;
-const TILE: u32 = 8;
-const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
 const SEEDS: u64 = 10;
 
 fn tiles(rendered: &Rendered, level: usize) -> Vec<f64> {
-    let mut sums = vec![0.0; TILES];
-    for y in 0..SIZE {
-        for x in 0..SIZE {
-            sums[(y / TILE * (SIZE / TILE) + x / TILE) as usize] +=
-                value(rendered, level, (y * SIZE + x) as usize) / f64::from(TILE * TILE);
-        }
-    }
-    sums
+    support::tiles::tiles(|index| value(rendered, level, index))
 }
 
-/// Tiles in which two sets of seeds differ by more than chance and `bias` (relative) allow; `tests` share the error rate.
+/// [`support::tiles::disagreeing`] at the error rate of this file.
 fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], tests: usize, bias: f64) -> Vec<String> {
-    let critical = t_critical(ERROR_RATE, tests, (a.len().min(b.len()) - 1) as f64);
-    (0..TILES)
-        .filter_map(|tile| {
-            let (mean_a, error_a) = mean_and_error(&a.iter().map(|s| s[tile]).collect::<Vec<_>>());
-            let (mean_b, error_b) = mean_and_error(&b.iter().map(|s| s[tile]).collect::<Vec<_>>());
-            let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
-            ((mean_a - mean_b).abs() > allowed)
-                .then(|| format!("tile {tile}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}"))
-        })
-        .collect()
+    support::tiles::disagreeing(a, b, t_critical(ERROR_RATE, tests, (a.len().min(b.len()) - 1) as f64), bias)
 }
 
 fn by(scene: &Scene, (method, iterations): (Method, u64), radius: f32, max_depth: u32) -> Vec<Vec<f64>> {
@@ -252,10 +234,6 @@ fn by(scene: &Scene, (method, iterations): (Method, u64), radius: f32, max_depth
     let photons = if method == Method::Pm { 400_000 } else { 10_000 };
     let settings = |seed| Settings { photons, max_depth, ..settings(iterations, radius, seed) };
     (0..SEEDS).map(|seed| tiles(&render(scene, method, SIZE, &settings(seed)), 0)).collect()
-}
-
-fn average(images: &[Vec<f64>]) -> f64 {
-    images.iter().flatten().sum::<f64>() / (images.len() * TILES) as f64
 }
 
 /// All `methods` against the first, tile by tile; a tile brighter by `planted` must be noticed.

@@ -25,6 +25,9 @@ const PILOT: f32 = 4.0;
 /// Least and largest squared bandwidth, over that of the memoryless rule with alpha 2/3.
 const BOUNDS: (f64, f64) = (1.0 / 64.0, 4.0);
 
+/// Photons it takes for estimates to be worth anything.
+const LEAST_PHOTONS: u32 = 10;
+
 /// The rule for a kernel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adaptive<K>(PhantomData<K>);
@@ -40,6 +43,8 @@ pub struct Bandwidth {
     scale: f32,
     /// Radius squared of the Laplacian's kernel.
     pilot2: f32,
+    /// Photons found within the bandwidth.
+    photons: u32,
     /// Sum over iterations of the estimates of q.
     shot: f64,
     /// Sum over iterations of the estimates of D.
@@ -49,7 +54,9 @@ pub struct Bandwidth {
 /// What an iteration finds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
-    /// Sum of squared contributions within the bandwidth.
+    /// Photons within the bandwidth.
+    photons: u32,
+    /// Sum of their squared contributions.
     squares: f64,
     /// Estimate of D.
     laplacian: f64,
@@ -62,7 +69,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     fn begin(&self, radius2: f32, _: f32, above: i32) -> Bandwidth {
         let scale = 2f32.powi(above);
         let pilot2 = PILOT * radius2 / scale;
-        Bandwidth { radius2, initial2: radius2, scale, pilot2, shot: 0.0, laplacian: 0.0 }
+        Bandwidth { radius2, initial2: radius2, scale, pilot2, photons: 0, shot: 0.0, laplacian: 0.0 }
     }
 
     #[inline]
@@ -80,6 +87,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         let (Some(bandwidth), Some(tally)) = (bandwidths.last(), tallies.last_mut()) else { return };
         let light = f64::from(photon.light);
         if photon.distance2 < bandwidth.radius2 {
+            tally.photons += 1;
             tally.squares += light * light;
         }
         if photon.distance2 < bandwidth.pilot2 {
@@ -90,6 +98,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     fn update(&self, i: u64, bandwidths: &mut [Bandwidth], tallies: &mut [Tally]) {
         let (Some(last), Some(tally)) = (bandwidths.last_mut(), tallies.last_mut()) else { return };
         let found = std::mem::take(tally);
+        last.photons = last.photons.saturating_add(found.photons);
         last.shot += found.squares / (PI * f64::from(last.radius2));
         last.laplacian += found.laplacian;
         let usual2 = f64::from(last.initial2 / last.scale);
@@ -98,8 +107,8 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         let n = i as f64;
         let memoryless2 = usual2 * radius2_factor(next, 2.0 / 3.0);
         let optimum = optimum2::<K>(last.shot / n, last.laplacian / n, n);
-        // Without any photon both estimates are zero, and nothing is known.
-        let usual2 = if optimum.is_nan() { memoryless2 } else { optimum };
+        let known = last.photons >= LEAST_PHOTONS && !optimum.is_nan();
+        let usual2 = if known { optimum } else { memoryless2 };
         let usual2 = usual2.clamp(BOUNDS.0 * memoryless2, BOUNDS.1 * memoryless2) as f32;
         for bandwidth in bandwidths {
             bandwidth.radius2 = (usual2 * bandwidth.scale).max(f32::MIN_POSITIVE);
