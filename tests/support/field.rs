@@ -1,6 +1,6 @@
 //! A field of photons in closed form: a square lamp that faces a mirror lights a floor by its mirror image alone, as far as photons go.
 //!
-//! The lamp hangs in the plane x = 0 and faces the mirror at x = -0.4; on its way from there to the floor that the camera sees light passes below it, and with paths
+//! The lamp hangs in the plane x = 0 and faces the mirror at x = -0.25; on its way from there to the floor that the camera sees light passes below it, and with paths
 //! of three segments every photon there has come by the mirror. The floor's irradiance is an integral over the image of the lamp; a kernel's expectation is
 //! its mean over discs. Photons of equal flux that fall independently have the variance of a Poisson process.
 
@@ -17,14 +17,14 @@ pub const SIZE: (u32, u32) = (8, 16);
 /// Side of a pixel (m).
 pub const PIXEL: f64 = 0.1;
 /// Least x and z of the picture.
-pub const CORNER: (f64, f64) = (-0.15, -0.8);
+pub const CORNER: (f64, f64) = (0.0, -0.8);
 /// Reflectance of the floor, radiance of the lamp, its side and the height of its centre.
 const RHO: f64 = 0.5;
 const RADIANCE: f64 = 10.0;
-const SIDE: f64 = 0.3;
-const HEIGHT: f64 = 0.5;
+const SIDE: f64 = 0.06;
+const HEIGHT: f64 = 0.2;
 /// Where the mirror is.
-const MIRROR: f64 = -0.4;
+const MIRROR: f64 = -0.25;
 
 /// The scene, with its one camera.
 pub fn scene() -> Scene {

@@ -1,0 +1,131 @@
+//! Bias and variance against iterations on a field of photons in closed form: the memoryless rule beside its exact finite sums, and CPPM whose test always rejects.
+//!
+//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS]`; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
+//! the variance and the mean squared error (mean over pixels, over the squared truth), each with its standard error, and what is expected.
+
+#[path = "../support/field.rs"]
+mod field;
+#[path = "../support/scenes.rs"]
+#[allow(dead_code)]
+mod scenes;
+
+use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
+use caustique::estimator::rule::memoryless::radius2_factor;
+use caustique::render::{Control, Method, Settings, render};
+use field::PixelField;
+use serde_json::{Value, json};
+
+const RADIUS: f64 = 0.2;
+const PHOTONS: u32 = 2000;
+
+/// What a seed has at some number of iterations.
+struct Moment {
+    /// Estimates of all pixels.
+    estimates: Vec<f64>,
+    /// Mean over pixels of the sum over iterations of squared deviations from their expectation, over the squared number of iterations and the squared truth.
+    sum: f64,
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let number = |i: usize, default: u64| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
+    let (n, seeds) = (number(0, 8192), number(1, 16));
+    let scene = field::scene();
+    let camera = scene.camera(&field::view()).unwrap_or_else(|e| panic!("{e}"));
+    let (width, height) = field::SIZE;
+    let fields: Vec<PixelField> =
+        (0..width * height).map(|k| PixelField::new((k % width, k / width), RADIUS, PHOTONS)).collect();
+    let forced = |k: f64, beta: f64| ChiSquaredSettings { significance: 1.0 - 1e-12, k, beta, ..Default::default() };
+    let rules = [
+        ("memoryless", Some(2.0 / 3.0), ChiSquaredSettings::default()),
+        ("memoryless", Some(0.5), ChiSquaredSettings::default()),
+        ("cppm, forced", None, forced(0.8, 1.2)),
+        ("cppm, forced", None, forced(0.8, 1.0 / 0.64)),
+    ];
+    for (name, alpha, chi_squared) in rules {
+        let moments: Vec<u64> = (3..64).map(|e| 1u64 << e).take_while(|m| *m <= n).collect();
+        let mut found: Vec<Vec<Moment>> = moments.iter().map(|_| Vec::new()).collect();
+        for seed in 0..seeds {
+            let settings = Settings {
+                method: if alpha.is_some() { Method::Sppm } else { Method::Cppm },
+                alpha: alpha.unwrap_or(1.0),
+                chi_squared,
+                iterations: Some(n),
+                ..field::settings(RADIUS, PHOTONS, seed)
+            };
+            let (mut sums, mut squares) = (vec![0.0; fields.len()], 0.0);
+            render(&scene, &camera, &settings, |progress, pixels| {
+                let i = progress.iteration;
+                let radius2 = RADIUS * RADIUS * radius2_factor(i, settings.alpha);
+                for ((sum, pixel), field) in sums.iter_mut().zip(pixels).zip(&fields) {
+                    let now = field::photons_of(pixel) * i as f64;
+                    squares += ((now - *sum - field.moments(radius2).mean) / field.truth).powi(2);
+                    *sum = now;
+                }
+                if let Some(at) = moments.iter().position(|m| *m == i) {
+                    let estimates = pixels.iter().map(field::photons_of).collect();
+                    found[at].push(Moment { estimates, sum: squares / fields.len() as f64 / (i * i) as f64 });
+                }
+                Control::Continue
+            });
+        }
+        let series: Vec<Value> = moments.iter().zip(&found).map(|(m, e)| at(*m, e, &fields, alpha)).collect();
+        let parameters = match alpha {
+            Some(alpha) => json!({"alpha": alpha}),
+            None => json!({"k": chi_squared.k, "beta": chi_squared.beta}),
+        };
+        println!("{}", json!({"rule": name, "parameters": parameters, "seeds": seeds, "series": series}));
+    }
+}
+
+/// Mean and its standard error.
+fn mean(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt())
+}
+
+fn at(n: u64, seeds: &[Moment], fields: &[PixelField], alpha: Option<f64>) -> Value {
+    let first: Vec<f64> = fields.iter().map(|f| f.moments(RADIUS * RADIUS).mean - f.truth).collect();
+    let all: f64 = first.iter().map(|b| b * b).sum();
+    let share = |estimates: &[f64]| {
+        let along = first.iter().zip(estimates).zip(fields).map(|((b, estimate), f)| b * (estimate - f.truth));
+        along.sum::<f64>() / all
+    };
+    let pixels = fields.len() as f64;
+    let estimates: Vec<&Vec<f64>> = seeds.iter().map(|moment| &moment.estimates).collect();
+    // Variance of each seed about the mean of the others, and error about the truth.
+    let count = estimates.len() as f64;
+    let means: Vec<f64> = (0..fields.len()).map(|k| estimates.iter().map(|e| e[k]).sum::<f64>() / count).collect();
+    let by_seed = |about: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let squared = |e: &&Vec<f64>| {
+            e.iter().enumerate().map(|(k, x)| ((x - about(k)) / fields[k].truth).powi(2)).sum::<f64>() / pixels
+        };
+        estimates.iter().map(squared).collect()
+    };
+    let unbiased = count / (count - 1.0);
+    let variance = mean(&by_seed(&|k| means[k]));
+    let error = mean(&by_seed(&|k| fields[k].truth));
+    let bias = mean(&estimates.iter().map(|e| share(e)).collect::<Vec<_>>());
+    let mut value = json!({
+        "iterations": n,
+        "bias": bias,
+        "variance": [variance.0 * unbiased, variance.1 * unbiased],
+        "mse": error,
+    });
+    if let Some(alpha) = alpha {
+        let (mut expected, mut expected_variance) = (vec![0.0; fields.len()], 0.0);
+        for i in 1..=n {
+            let radius2 = RADIUS * RADIUS * radius2_factor(i, alpha);
+            for (k, field) in fields.iter().enumerate() {
+                let moments = field.moments(radius2);
+                expected[k] += moments.mean / n as f64;
+                expected_variance += moments.variance / (n * n) as f64 / field.truth.powi(2) / pixels;
+            }
+        }
+        value["bias_sum"] = share(&expected).into();
+        value["variance_sum"] = json!(mean(&seeds.iter().map(|moment| moment.sum).collect::<Vec<_>>()));
+        value["variance_poisson"] = expected_variance.into();
+    }
+    value
+}
