@@ -30,15 +30,31 @@ struct Counter<'a, R: CountingRule> {
 }
 
 impl<'a, R: CountingRule> Counter<'a, R> {
+    #[inline]
     fn new(rule: &'a R, bandwidths: &'a [R::Bandwidth], tallies: &'a mut [R::Tally]) -> Counter<'a, R> {
         let mut order = std::array::from_fn(|k| k);
         let radius2 = |level: usize| R::radius2(&bandwidths[level]);
-        order[..bandwidths.len()].sort_by(|&a, &b| radius2(a).total_cmp(&radius2(b)));
+        if !bandwidths.is_sorted_by(|a, b| R::radius2(a) <= R::radius2(b)) {
+            order[..bandwidths.len()].sort_by(|&a, &b| radius2(a).total_cmp(&radius2(b)));
+        }
         Counter { rule, bandwidths, order, tallies, frame: Frame::from_normal(Vec3::Z) }
     }
 
     fn ascending(&self) -> impl Iterator<Item = usize> {
         self.order.into_iter().take(self.bandwidths.len())
+    }
+
+    /// Puts the levels of a measure, which are in the order of bandwidths, where they belong.
+    #[inline]
+    fn by_level(&self, measure: &mut EyeMeasure) {
+        if self.order.is_sorted() {
+            return;
+        }
+        let (caustic, indirect) = (measure.caustic_photons, measure.indirect_photons);
+        for (at, level) in self.ascending().enumerate() {
+            measure.caustic_photons[level] = caustic[at];
+            measure.indirect_photons[level] = indirect[at];
+        }
     }
 }
 
@@ -111,6 +127,11 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             .zip(tallies.par_chunks_mut(band(size.0) * states * each));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
         par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), tallies), places| {
+            let waiting = places.iter().flatten().map(|place| {
+                let first = &bandwidths[place.at * states];
+                pixels[place.at].touch() + f64::from(R::radius2(first))
+            });
+            std::hint::black_box(waiting.sum::<f64>());
             let independent = eye.starts(places, independent);
             let correlated = levels.two_paths.then(|| eye.starts(places, correlated));
             for (k, place) in places.iter().enumerate() {
@@ -119,22 +140,23 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
                 let mut measure = |start: &(PathStart, _), levels: Range<usize>| {
-                    let mut all = None;
-                    for (channel, (photons, scratch)) in maps.iter().zip(scratches.iter_mut()).enumerate() {
+                    let mut channel = |channel: usize| {
                         let levels = channel * count + levels.start..channel * count + levels.end;
                         let tallies = &mut tallies[levels.start * each..levels.end * each];
                         let bandwidths = &mut bandwidths[levels];
                         let mut counter = Counter::new(rule, bandwidths, tallies);
-                        let measure = eye.measure(scratch, start, photons, &mut counter, kernel);
-                        let measure = by_level(measure, counter.ascending());
+                        let scratch = &mut scratches[channel];
+                        let mut measure = eye.measure(scratch, start, &maps[channel], &mut counter, kernel);
+                        counter.by_level(&mut measure);
                         rule.update(i, bandwidths, tallies);
-                        // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
-                        match &mut all {
-                            None => all = Some(measure),
-                            Some(all) => add_photons(all, &measure),
-                        }
+                        measure
+                    };
+                    let mut all = channel(0);
+                    // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
+                    for other in 1..maps.len() {
+                        add_photons(&mut all, &channel(other));
                     }
-                    all.unwrap_or_default()
+                    all
                 };
                 let pixel = &mut pixels[place.at];
                 match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
@@ -161,16 +183,6 @@ fn add_photons(all: &mut EyeMeasure, measure: &EyeMeasure) {
     for (sum, light) in sums.zip(measure.caustic_photons.iter().chain(&measure.indirect_photons)) {
         *sum += *light;
     }
-}
-
-/// A measure whose levels are `ascending` in bandwidth, by level.
-fn by_level(mut measure: EyeMeasure, ascending: impl Iterator<Item = usize>) -> EyeMeasure {
-    let (caustic, indirect) = (measure.caustic_photons, measure.indirect_photons);
-    for (at, level) in ascending.enumerate() {
-        measure.caustic_photons[level] = caustic[at];
-        measure.indirect_photons[level] = indirect[at];
-    }
-    measure
 }
 
 impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {

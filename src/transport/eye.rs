@@ -19,6 +19,7 @@ use crate::scene::Scene;
 use crate::trace::Ray;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
+use wide::f32x8;
 
 /// Most bandwidth levels of one eye path.
 pub const MAX_LEVELS: usize = 5;
@@ -54,25 +55,37 @@ impl LevelRadii {
     }
 }
 
-/// A photon that brings light to a vertex.
-#[derive(Clone, Copy, Debug, Default)]
+/// Up to eight photons that bring light to a vertex.
+#[derive(Clone, Copy, Debug)]
 pub struct Found {
-    /// Where it is from the vertex.
-    pub offset: Vec3,
-    /// Its distance squared.
-    pub distance2: f32,
-    /// What it adds to the path's measure, mean of RGB, before it is divided by an area.
-    pub light: f32,
+    /// Where they are from the vertex.
+    pub offset: [f32x8; 3],
+    /// Their distances squared; infinite where there is none.
+    pub distance2: f32x8,
+    /// What they add to the path's measure, mean of RGB, before it is divided by an area.
+    pub light: f32x8,
+}
+
+impl Found {
+    /// One photon.
+    pub fn one(offset: Vec3, distance2: f32, light: f32) -> Found {
+        let lane = |x: f32, others: f32| f32x8::from([x, others, others, others, others, others, others, others]);
+        Found {
+            offset: offset.to_array().map(|x| lane(x, 0.0)),
+            distance2: lane(distance2, f32::INFINITY),
+            light: lane(light, 0.0),
+        }
+    }
 }
 
 /// Bandwidths where an eye path gathers.
 pub trait Bandwidths {
     /// Whether [`Bandwidths::count`] is to be called.
     const COUNTS: bool = false;
-    /// A photon within reach of the vertex of the last call of [`Bandwidths::at`].
+    /// Photons within reach of the vertex of the last call of [`Bandwidths::at`].
     #[inline]
-    fn count(&mut self, photon: &Found) {
-        let _ = photon;
+    fn count(&mut self, photons: &Found) {
+        let _ = photons;
     }
     /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
     #[inline]

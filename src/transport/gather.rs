@@ -6,7 +6,7 @@ use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3, Vec3A};
 use crate::photon::{Kernel, Near, Photon, PhotonFlags};
 use bumpalo::Bump;
-use wide::f32x8;
+use wide::{CmpEq, f32x8};
 
 /// What a worker keeps from eye path to eye path of one pass.
 #[derive(Default)]
@@ -34,8 +34,10 @@ pub(super) struct Batch<'a, K> {
     wi: [[f32; 8]; 3],
     flux: [[f32; 8]; 3],
     bin: [u8; 8],
-    /// For kernels and for those who count: where they are from the gathering point, and their distance squared.
-    place: [(Vec3, f32); 8],
+    /// For those who count: where they are from the gathering point.
+    offset: [[f32; 8]; 3],
+    /// For those and for kernels: their distance squared.
+    distance2: [f32; 8],
     bins: [[Vec3A; BINS]; 2],
 }
 
@@ -55,7 +57,8 @@ impl<'a, K: Kernel> Batch<'a, K> {
             wi: [[0.0; 8]; 3],
             flux: [[0.0; 8]; 3],
             bin: [0; 8],
-            place: [(Vec3::ZERO, 0.0); 8],
+            offset: [[0.0; 8]; 3],
+            distance2: [f32::INFINITY; 8],
             bins: [[Vec3A::ZERO; BINS]; 2],
         }
     }
@@ -72,7 +75,11 @@ impl<'a, K: Kernel> Batch<'a, K> {
         let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
         if let (Some(gathering), true) = (&self.unreachable, photon.flags.has(PhotonFlags::UNREACHABLE)) {
             let light = gathering.photon(photon.wi) * photon.flux;
-            self.add(caustic, level, light.into(), (photon.p - self.p, distance2), counter);
+            self.add(caustic, level, light.into(), distance2);
+            if B::COUNTS && light != Rgb::ZERO {
+                let light = (light * self.throughput).element_sum() / 3.0;
+                counter.count(&Found::one(photon.p - self.p, distance2, light));
+            }
             return;
         }
         let at = self.count;
@@ -81,8 +88,13 @@ impl<'a, K: Kernel> Batch<'a, K> {
             self.flux[axis][at] = photon.flux[axis];
         }
         self.bin[at] = (caustic * BINS + level) as u8;
+        if B::COUNTS {
+            for axis in 0..3 {
+                self.offset[axis][at] = photon.p[axis] - self.p[axis];
+            }
+        }
         if B::COUNTS || !K::BOX {
-            self.place[at] = (photon.p - self.p, distance2);
+            self.distance2[at] = distance2;
         }
         self.count += 1;
         if self.count == 8 {
@@ -93,36 +105,35 @@ impl<'a, K: Kernel> Batch<'a, K> {
     #[inline(never)]
     fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
         let f = self.gathering.eight(self.wi.map(f32x8::from));
-        let light: [[f32; 8]; 3] = std::array::from_fn(|c| (f[c] * f32x8::from(self.flux[c])).to_array());
+        let found: [f32x8; 3] = std::array::from_fn(|c| f[c] * f32x8::from(self.flux[c]));
+        let light = found.map(f32x8::to_array);
         for k in 0..self.count {
             let bin = usize::from(self.bin[k]);
-            let light = Vec3A::new(light[0][k], light[1][k], light[2][k]);
-            self.add(bin / BINS, bin % BINS, light, self.place[k], counter);
+            self.add(bin / BINS, bin % BINS, Vec3A::new(light[0][k], light[1][k], light[2][k]), self.distance2[k]);
+        }
+        if B::COUNTS {
+            // What is left of the last eight is not there, nor are photons that bring nothing [CPPM 2020, 7.2].
+            self.distance2[self.count..].fill(f32::INFINITY);
+            let light = found[0] * self.throughput.x + found[1] * self.throughput.y + found[2] * self.throughput.z;
+            let dark = light.cmp_eq(f32x8::ZERO);
+            counter.count(&Found {
+                offset: self.offset.map(f32x8::from),
+                distance2: dark.blend(f32x8::splat(f32::INFINITY), f32x8::from(self.distance2)),
+                light: light * (1.0 / 3.0),
+            });
         }
         self.count = 0;
     }
 
     /// Adds what a photon brings to the levels that hold it.
     #[inline(always)]
-    fn add<B: Bandwidths>(
-        &mut self,
-        kind: usize,
-        level: usize,
-        light: Vec3A,
-        (offset, distance2): (Vec3, f32),
-        counter: &mut B,
-    ) {
+    fn add(&mut self, kind: usize, level: usize, light: Vec3A, distance2: f32) {
         if K::BOX {
             self.bins[kind][level] += light;
         } else {
             for (bin, radius2) in self.bins[kind].iter_mut().zip(self.radii).skip(level) {
                 *bin += light * K::weight(distance2 / radius2);
             }
-        }
-        // Photons that bring nothing are not there [CPPM 2020, 7.2].
-        if B::COUNTS && light != Vec3A::ZERO {
-            let light = (Rgb::from(light) * self.throughput).element_sum() / 3.0;
-            counter.count(&Found { offset, distance2, light });
         }
     }
 

@@ -19,6 +19,7 @@ use crate::photon::{Kernel, kernel::laplacian};
 use crate::transport::Found;
 use std::f64::consts::PI;
 use std::marker::PhantomData;
+use wide::{CmpLt, f32x8};
 
 /// Squared bandwidth of the Laplacian's first estimate over that of the usual image's.
 const PILOT: f32 = 4.0;
@@ -83,16 +84,16 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [Tally], _: &Frame, photon: &Found) {
+    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [Tally], _: &Frame, photons: &Found) {
         let (Some(bandwidth), Some(tally)) = (bandwidths.last(), tallies.last_mut()) else { return };
-        let light = f64::from(photon.light);
-        if photon.distance2 < bandwidth.radius2 {
-            tally.photons += 1;
-            tally.squares += light * light;
-        }
-        if photon.distance2 < bandwidth.pilot2 {
-            tally.laplacian += light * f64::from(laplacian(photon.distance2 / bandwidth.pilot2, bandwidth.pilot2));
-        }
+        let within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2));
+        tally.photons += within.move_mask().count_ones();
+        tally.squares += f64::from((within & (photons.light * photons.light)).reduce_add());
+        let s = photons.distance2 / bandwidth.pilot2;
+        let near = photons.distance2.cmp_lt(f32x8::splat(bandwidth.pilot2));
+        // What is not there is infinitely far away, and its product not a number: masked last.
+        let laplacian = (near & (photons.light * laplacian(s))).reduce_add();
+        tally.laplacian += f64::from(laplacian) / f64::from(bandwidth.pilot2).powi(2);
     }
 
     fn update(&self, i: u64, bandwidths: &mut [Bandwidth], tallies: &mut [Tally]) {
@@ -163,8 +164,8 @@ mod tests {
                     let u = Stream::new(5, i, Domain::Test, k).vertex(0);
                     let p = (u.two(Purpose::Pixel) - 0.5) * 1.0;
                     let keep = (1.0 + d / 4.0 * f64::from(p.length_squared())) / 1.8;
-                    let photon = Found { offset: Vec3::ZERO, distance2: p.length_squared(), light: 1.0 };
-                    if photon.distance2 < 0.04 && f64::from(u.one(Purpose::Lobe)) < keep {
+                    let photon = Found::one(Vec3::ZERO, p.length_squared(), 1.0);
+                    if p.length_squared() < 0.04 && f64::from(u.one(Purpose::Lobe)) < keep {
                         let (b, t) = (std::slice::from_ref(&bandwidth), std::slice::from_mut(&mut tally));
                         rule.count(b, t, &Frame::from_normal(Vec3::Z), &photon);
                     }

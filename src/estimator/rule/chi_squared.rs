@@ -7,6 +7,7 @@ use super::CountingRule;
 use crate::math::{Frame, Vec3};
 use crate::transport::Found;
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
+use wide::{CmpEq, CmpGe, CmpLt, CmpNe, f32x8};
 
 /// Parameters, with the paper's defaults (section 9.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,42 +80,44 @@ impl ChiSquared {
         }
     }
 
-    /// Sector of a photon at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
+    /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
     /// the normal through the point has none and counts in the first sector.
     #[inline]
-    pub fn sector(&self, frame: &Frame, offset: Vec3) -> usize {
-        let (mut u, mut v) = (offset.dot(frame.t), offset.dot(frame.b));
-        if self.sectors.is_multiple_of(2) {
-            // The lower half is the upper, turned by half the sectors.
-            let lower = v < 0.0 || (v == 0.0 && u < 0.0);
-            if lower {
-                (u, v) = (-u, -v);
-            }
-            let passed: usize =
-                self.borders.iter().map(|(c, s)| usize::from(c * v - s * u >= 0.0 && (u, v) != (0.0, 0.0))).sum();
-            passed + if lower { self.sectors / 2 } else { 0 }
-        } else {
-            let turn = v.atan2(u) / std::f32::consts::TAU;
-            let turn = if turn < 0.0 { turn + 1.0 } else { turn };
-            ((turn * self.sectors as f32) as usize).min(self.sectors - 1)
+    fn sectors(&self, frame: &Frame, [x, y, z]: &[f32x8; 3]) -> [i32; 8] {
+        let along = |axis: Vec3| *x * axis.x + *y * axis.y + *z * axis.z;
+        let (u, v) = (along(frame.t), along(frame.b));
+        if !self.sectors.is_multiple_of(2) {
+            let turn = |u: f32, v: f32| (v.atan2(u) / std::f32::consts::TAU).rem_euclid(1.0);
+            let (u, v) = (u.to_array(), v.to_array());
+            return std::array::from_fn(|k| {
+                ((turn(u[k], v[k]) * self.sectors as f32) as i32).min(self.sectors as i32 - 1)
+            });
         }
-    }
-
-    /// Cell of a photon at a squared distance below `radius2`: its distance is kept when it is laid flat \[(27)\].
-    #[inline]
-    pub fn cell(&self, sector: usize, distance2: f32, radius2: f32) -> usize {
-        let annulus = ((self.annuli as f32 * (distance2 / radius2)) as usize).min(self.annuli - 1);
-        annulus * self.sectors + sector
+        // The lower half is the upper, turned by half the sectors.
+        let (zero, one) = (f32x8::ZERO, f32x8::ONE);
+        let lower = v.cmp_lt(zero) | (v.cmp_eq(zero) & u.cmp_lt(zero));
+        let sign = lower.blend(-one, one);
+        let (u, v) = (u * sign, v * sign);
+        let somewhere = u.cmp_ne(zero) | v.cmp_ne(zero);
+        let mut passed = lower & f32x8::splat((self.sectors / 2) as f32);
+        for &(c, s) in &self.borders {
+            passed += (v * c - u * s).cmp_ge(zero) & somewhere & one;
+        }
+        passed.trunc_int().to_array()
     }
 
     /// Statistic of counts that should be equal \[(12)\]; 0 without any.
     pub fn statistic(counts: &[u32]) -> f64 {
-        let total: f64 = counts.iter().map(|&c| f64::from(c)).sum();
-        if total == 0.0 {
+        let (mut total, mut squares) = (0, 0);
+        for &count in counts {
+            let count = u64::from(count);
+            total += count;
+            squares += count * count;
+        }
+        if total == 0 {
             return 0.0;
         }
-        let squares: f64 = counts.iter().map(|&c| f64::from(c) * f64::from(c)).sum();
-        squares * counts.len() as f64 / total - total
+        squares as f64 * counts.len() as f64 / total as f64 - total as f64
     }
 
     /// After an iteration: tests if there are photons enough, and shrinks the bandwidth to the largest inner disc that looks uniform, or by k
@@ -160,11 +163,16 @@ impl CountingRule for ChiSquared {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photon: &Found) {
-        let sector = self.sector(frame, photon.offset);
+    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) {
+        let sectors = self.sectors(frame, &photons.offset);
         for (bandwidth, counts) in bandwidths.iter().zip(counts.chunks_mut(self.tallies())) {
-            if photon.distance2 < bandwidth.radius2 {
-                counts[self.cell(sector, photon.distance2, bandwidth.radius2)] += 1;
+            let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
+            let annuli = (photons.distance2 * (self.annuli as f32 / bandwidth.radius2)).trunc_int();
+            let (annuli, last) = (annuli.to_array(), self.annuli - 1);
+            while within != 0 {
+                let k = within.trailing_zeros() as usize;
+                within &= within - 1;
+                counts[(annuli[k] as usize).min(last) * self.sectors + sectors[k] as usize] += 1;
             }
         }
     }
@@ -195,27 +203,24 @@ mod tests {
     fn count(rule: &ChiSquared, counts: &mut [u32], (x, y): (f32, f32)) {
         let frame = Frame::from_normal(Vec3::Z);
         let offset = frame.t * x + frame.b * y;
-        counts[rule.cell(rule.sector(&frame, offset), x * x + y * y, 1.0)] += 1;
+        let bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
+        rule.count(&[bandwidth], counts, &frame, &Found::one(offset, x * x + y * y, 1.0));
     }
 
     #[test]
     fn cells_are_what_the_angle_says() {
         for sectors in [1, 2, 3, 4, 5, 6, 8, 12] {
             let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
-            let frame = Frame::from_normal(Vec3::new(0.3, -0.5, 0.8).normalize());
+            let frame = Frame::from_normal(Vec3::new(0.0, 1.0, 0.0));
+            let sector = |offset: Vec3| rule.sectors(&frame, &Found::one(offset, 0.0, 1.0).offset)[0];
             for i in 0..2000 {
                 let (x, y) = uniform(0, i);
                 let turn = y.atan2(x).rem_euclid(std::f32::consts::TAU) / std::f32::consts::TAU * sectors as f32;
                 if (turn - turn.round()).abs() > 1e-4 {
-                    assert_eq!(
-                        rule.sector(&frame, frame.t * x + frame.b * y + frame.n * 0.3),
-                        turn as usize,
-                        "{x} {y}"
-                    );
+                    assert_eq!(sector(frame.t * x + frame.b * y + frame.n * 0.3), turn as i32, "{x} {y}");
                 }
             }
-            assert_eq!(rule.sector(&frame, Vec3::ZERO), 0);
-            assert_eq!(rule.sector(&Frame::from_normal(Vec3::Z), Vec3::Z), 0);
+            assert_eq!((sector(Vec3::ZERO), sector(frame.n)), (0, 0));
         }
     }
 

@@ -9,6 +9,7 @@
 use super::CountingRule;
 use crate::math::Frame;
 use crate::transport::Found;
+use wide::{CmpLt, f32x8};
 
 /// The rule.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +41,9 @@ impl CountingRule for LocalStatistics {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [u32], _: &Frame, photon: &Found) {
+    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [u32], _: &Frame, photons: &Found) {
         for (bandwidth, tally) in bandwidths.iter().zip(tallies) {
-            *tally += u32::from(photon.distance2 < bandwidth.radius2);
+            *tally += photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask().count_ones();
         }
     }
 

@@ -31,8 +31,8 @@ pub trait CountingRule: Sync {
         let _ = bandwidths;
         largest2
     }
-    /// A photon within reach of a gathering point with this frame, which is one function of the normal in all iterations.
-    fn count(&self, bandwidths: &[Self::Bandwidth], tallies: &mut [Self::Tally], frame: &Frame, photon: &Found);
+    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all iterations.
+    fn count(&self, bandwidths: &[Self::Bandwidth], tallies: &mut [Self::Tally], frame: &Frame, photons: &Found);
     /// After iteration `i` (from 1).
     fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], tallies: &mut [Self::Tally]);
 }
