@@ -40,3 +40,5 @@ pub mod image;
 pub mod combine;
 
 pub mod render;
+
+pub mod report;

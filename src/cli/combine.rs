@@ -49,6 +49,11 @@ impl Named {
         Ok(Named { name: name.into(), combiner: Combiner::new(&model, &Runtime::find()?)? })
     }
 
+    /// The network alone.
+    pub fn into_combiner(self) -> Combiner {
+        self.combiner
+    }
+
     /// Levels that it takes.
     pub fn levels(&self) -> usize {
         self.combiner.facts().levels

@@ -2,6 +2,7 @@
 
 mod combine;
 mod compare;
+mod converge;
 mod doctor;
 mod info;
 mod number;
@@ -35,6 +36,8 @@ enum Command {
     Combine(combine::CombineArgs),
     /// Measure the error of an image against a reference
     Compare(compare::CompareArgs),
+    /// Compare methods and settings: accuracy against time
+    Converge(Box<converge::ConvergeArgs>),
     /// Say what a scene or an EXR holds
     Info(info::InfoArgs),
     /// Say which Embree and ONNX Runtime are found, and what to install if not
@@ -63,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(&args),
         Command::Combine(args) => combine::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Doctor(args) => doctor::run(&args),
     };

@@ -29,6 +29,38 @@ pub struct Comparison {
     pub flip_map: Vec<f32>,
 }
 
+/// The figures of a [`Comparison`] that need no look at neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// See [`Comparison::relmse`].
+    pub relmse: f64,
+    /// See [`Comparison::relmse_trimmed`].
+    pub relmse_trimmed: f64,
+    /// See [`Comparison::mse`].
+    pub mse: f64,
+    /// See [`Comparison::mean_ratio`].
+    pub mean_ratio: Option<f64>,
+}
+
+/// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is none.
+pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<Errors> {
+    let finite = |&i: &usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
+    let pixels: Vec<usize> = (0..a.len().min(b.len())).filter(finite).collect();
+    if pixels.is_empty() {
+        return None;
+    }
+    let n = pixels.len() as f64;
+    let mut relative: Vec<f64> = pixels.iter().map(|&i| relative_squared_error(a[i], b[i])).collect();
+    let relmse = relative.iter().sum::<f64>() / n;
+    relative.sort_unstable_by(f64::total_cmp);
+    relative.truncate(pixels.len() - pixels.len() / 1000);
+    let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
+    let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
+    let total = |image: &[[f32; 3]]| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
+    let (sum_a, sum_b) = (total(a), total(b));
+    Some(Errors { relmse, relmse_trimmed, mse, mean_ratio: (sum_b != 0.0).then(|| sum_a / sum_b) })
+}
+
 /// Mean over RGB of (x - r)^2, over (mean of r over RGB)^2 + 0.01.
 pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     let mean = r.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
@@ -59,31 +91,22 @@ pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usiz
     }
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
-    if pixels.is_empty() {
+    let Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }) = errors(a, b) else {
         return Err(Error::new(Kind::Image, "", "the pictures have no pixel with finite values in common"));
-    }
-    let n = pixels.len() as f64;
-    let mut relative: Vec<f64> = pixels.iter().map(|&i| relative_squared_error(a[i], b[i])).collect();
-    let relmse = relative.iter().sum::<f64>() / n;
-    relative.sort_unstable_by(f64::total_cmp);
-    relative.truncate(pixels.len() - pixels.len() / 1000);
-    let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
-    let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
-    let total = |image: &[[f32; 3]]| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
-    let (sum_a, sum_b) = (total(a), total(b));
+    };
 
     // FLIP filters over neighbours, so that a hole needs a value; black in both looks equal.
     let filled = |image: &[[f32; 3]]| -> Vec<Rgb> {
         (0..image.len()).map(|i| if finite(i) { Rgb::from_array(image[i]) } else { Rgb::ZERO }).collect()
     };
     let mut flip_map = flip::hdr(&filled(b), &filled(a), width, height);
-    let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / n;
+    let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / pixels.len() as f64;
     (0..a.len()).filter(|&i| !finite(i)).for_each(|i| flip_map[i] = 1.0);
     Ok(Comparison {
         relmse,
         relmse_trimmed,
         mse,
-        mean_ratio: (sum_b != 0.0).then(|| sum_a / sum_b),
+        mean_ratio,
         flip,
         pixels_not_finite: (a.len() - pixels.len()) as u64,
         flip_map,

@@ -11,18 +11,22 @@ use crate::math::Rgb;
 ///
 /// Errors: a number of pixels that is not `width * height`, or none; the file system.
 pub fn write(path: &Path, width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>) -> Result<()> {
+    let bytes = encode(width, height, pixels).map_err(|error| error.within(path.display()))?;
+    atomic::write_bytes(path, &bytes)
+}
+
+/// The bytes of such a file, see [`write()`].
+pub fn encode(width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>) -> Result<Vec<u8>> {
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     let bytes: Vec<u8> = pixels.into_iter().flat_map(|rgb| rgb.to_array().map(byte)).collect();
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok()).filter(|&(w, h)| w > 0 && h > 0);
     let picture = size.and_then(|(w, h)| image::RgbImage::from_raw(w, h, bytes));
     let picture = picture
         .filter(|picture| picture.as_raw().len() == 3 * width * height)
-        .ok_or_else(|| Error::new(Kind::Image, path.display(), format!("no picture of {width} x {height} pixels")))?;
+        .ok_or_else(|| Error::new(Kind::Image, "", format!("no picture of {width} x {height} pixels")))?;
     let mut encoded = std::io::Cursor::new(Vec::new());
-    picture
-        .write_to(&mut encoded, image::ImageFormat::Png)
-        .map_err(|cause| Error::new(Kind::Image, path.display(), cause))?;
-    atomic::write_bytes(path, encoded.get_ref())
+    picture.write_to(&mut encoded, image::ImageFormat::Png).map_err(|cause| Error::new(Kind::Image, "", cause))?;
+    Ok(encoded.into_inner())
 }
 
 /// Writes scene-linear Rec. 709 `pixels` after an exposure of `ev` stops and a tone curve, see [`write()`].

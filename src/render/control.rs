@@ -1,5 +1,7 @@
 //! Progress, stop conditions and history. The only clocks of a render are here and decide nothing but when to stop.
 
+use super::result::ErrorEstimate;
+use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
 /// What an observer wants after an iteration.
@@ -45,7 +47,7 @@ pub struct Progress {
 }
 
 /// One moment of a render's history.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct History {
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -55,8 +57,8 @@ pub struct History {
     pub iterations: u64,
     /// Light paths emitted.
     pub light_paths: u64,
-    /// Estimated relative error.
-    pub error: Option<f64>,
+    /// Estimated squared relative error, when two iterations are done.
+    pub estimate: Option<ErrorEstimate>,
 }
 
 /// Wall clock since its making.
@@ -76,18 +78,10 @@ impl Clock {
     }
 }
 
-/// Processor time of the process in seconds, from `/proc`; 0 where there is none.
+/// Processor time of the process in seconds.
 pub fn cpu_seconds() -> f64 {
-    // Fields 14 and 15 (user and system time) count in ticks of 1/100 s on every Linux platform; the name in field 2
-    // may hold spaces, so count from its closing parenthesis.
-    let read = || -> Option<f64> {
-        let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-        let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
-        let user: f64 = fields.next()?.parse().ok()?;
-        let system: f64 = fields.next()?.parse().ok()?;
-        Some((user + system) / 100.0)
-    };
-    read().unwrap_or(0.0)
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// Peak resident memory of the process in bytes, from `/proc`; 0 where there is none.

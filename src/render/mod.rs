@@ -1,6 +1,7 @@
 //! Rendering: the pass loop, when it stops, and what it reports.
 
 mod bidirectional;
+mod choice;
 mod control;
 mod counting;
 mod drive;
@@ -8,6 +9,7 @@ mod method;
 pub mod output;
 mod pm;
 mod result;
+mod session;
 mod settings;
 mod sppm;
 mod techniques;
@@ -17,7 +19,8 @@ pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, pe
 pub use drive::render;
 pub use method::Method;
 pub use pm::PHOTON_BYTES;
-pub use result::{Phases, Rendered};
+pub use result::{ErrorEstimate, Phases, Rendered};
+pub use session::{Session, Spent, Stage};
 pub use settings::{
     DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS,
     KernelChoice, Levels, RadiusRule, Settings, Shard,

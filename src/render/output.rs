@@ -5,6 +5,7 @@ use super::method::Method;
 use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
+use crate::estimator::Pixel;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::film::{LayerSet, output};
 use serde_json::{Map, Value, json};
@@ -23,6 +24,25 @@ pub fn shape(settings: &Settings, iterations: u64, environment: bool) -> output:
     }
 }
 
+/// Layers of pixels; `radii` of every pixel and level replace those that follow from the iteration, unless there are none.
+pub(super) fn layers(
+    size: (u32, u32),
+    pixels: &[Pixel],
+    radii: &[f32],
+    shape: &output::Shape,
+    wanted: impl Fn(&str) -> bool,
+) -> Result<LayerSet> {
+    let mut layers = output::layers(size, pixels, shape, wanted)?;
+    for level in (0..shape.levels).filter(|_| !radii.is_empty()) {
+        let name = format!("Radius{}", level + 1);
+        let planes = layers.layers.iter_mut().filter(|layer| layer.name == name).flat_map(|layer| &mut layer.planes);
+        for plane in planes {
+            plane.values = radii.iter().skip(level).step_by(shape.levels).copied().collect();
+        }
+    }
+    Ok(layers)
+}
+
 impl Rendered {
     /// The layers that are `wanted` by name, cryptomattes excepted.
     ///
@@ -30,17 +50,7 @@ impl Rendered {
     /// None for a render of ours: its pixels are as many as its size says.
     pub fn layers(&self, environment: bool, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
         let shape = shape(&self.settings, self.iterations, environment);
-        let mut layers = output::layers((self.width, self.height), &self.pixels, &shape, wanted)?;
-        let count = self.settings.levels.count;
-        for level in (0..count).filter(|_| !self.radii.is_empty()) {
-            let name = format!("Radius{}", level + 1);
-            let planes =
-                layers.layers.iter_mut().filter(|layer| layer.name == name).flat_map(|layer| &mut layer.planes);
-            for plane in planes {
-                plane.values = self.radii.iter().skip(level).step_by(count).copied().collect();
-            }
-        }
-        Ok(layers)
+        layers((self.width, self.height), &self.pixels, &self.radii, &shape, wanted)
     }
 
     /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know: arguments,
@@ -65,7 +75,9 @@ impl Rendered {
         put("rejected", self.rejected().into());
         let history = self.history.iter().map(|moment| {
             let mut entry = json!({
-                "iterations": moment.iterations, "light_paths": moment.light_paths, "error": moment.error,
+                "iterations": moment.iterations, "light_paths": moment.light_paths,
+                "error": moment.estimate.map(|estimate| estimate.root()),
+                "variance": moment.estimate.map(|estimate| estimate.variance),
             });
             if threads.is_some() {
                 entry["seconds"] = moment.seconds.into();

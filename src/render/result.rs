@@ -66,7 +66,7 @@ impl Rendered {
     /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance is
     /// large: where such pixels rule the error, the estimate is too small until they have been seen several times.
     pub fn relative_error(&self) -> Option<f64> {
-        relative_error(&self.pixels, &self.settings)
+        error_estimate(&self.pixels, &self.settings).map(|error| error.root())
     }
 
     /// Samples rejected as not finite.
@@ -75,8 +75,26 @@ impl Rendered {
     }
 }
 
+/// The square of [`Rendered::relative_error`], and of what it is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorEstimate {
+    /// Mean relative variance.
+    pub variance: f64,
+    /// Mean relative squared bias, not below zero.
+    pub squared_bias: f64,
+    /// Share of pixels of which nothing is known.
+    pub unknown: f64,
+}
+
+impl ErrorEstimate {
+    /// The relative error: the root of all parts together.
+    pub fn root(&self) -> f64 {
+        (self.variance + self.squared_bias + self.unknown).sqrt()
+    }
+}
+
 /// See [`Rendered::relative_error`].
-pub(super) fn relative_error(pixels: &[Pixel], settings: &Settings) -> Option<f64> {
+pub(super) fn error_estimate(pixels: &[Pixel], settings: &Settings) -> Option<ErrorEstimate> {
     let (own, compared) = (settings.levels.own(), settings.compared_levels());
     let (mut variance, mut squared_bias) = (0.0, 0.0);
     let (mut known, mut unknown) = (0u64, 0u64);
@@ -91,8 +109,12 @@ pub(super) fn relative_error(pixels: &[Pixel], settings: &Settings) -> Option<f6
         squared_bias += error.squared_bias.element_sum() * scale;
         known += 1;
     }
-    let total = variance + squared_bias.max(0.0) + unknown as f64;
-    (known > 0).then(|| (total / (known + unknown) as f64).sqrt())
+    let pixels = (known + unknown) as f64;
+    (known > 0).then(|| ErrorEstimate {
+        variance: variance / pixels,
+        squared_bias: squared_bias.max(0.0) / pixels,
+        unknown: unknown as f64 / pixels,
+    })
 }
 
 #[cfg(test)]
@@ -116,6 +138,7 @@ mod tests {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };
         let rejected = Pixel { rejected: 2, ..Pixel::new(1.0) };
         let once = Pixel { rejected: 1, iterations: 1, ..Pixel::new(1.0) };
+        let relative_error = |pixels: &[Pixel], s: &Settings| error_estimate(pixels, s).map(|e| e.root());
         assert_eq!(relative_error(&[certain(), certain()], &levels), Some(0.0));
         assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], &levels), Some(0.5));
         assert_eq!(relative_error(&[certain(), once, certain(), certain()], &levels), Some(0.5));

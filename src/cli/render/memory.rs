@@ -74,6 +74,28 @@ pub fn check(settings: &Settings, size: (u32, u32), channels: usize) -> Result<(
     Err(error.hint("use a smaller --width and --height, or fewer --photons"))
 }
 
+/// Channels of the layers that the combiner reads.
+const COMBINED_CHANNELS: usize = 37;
+
+/// Checks that several renders fit, that go on at the same time.
+///
+/// # Errors
+/// They need more memory than there is.
+pub fn check_all<'a>(all: impl Iterator<Item = &'a Settings>, size: (u32, u32)) -> Result<()> {
+    let needed: u64 = all.map(|settings| needed(size, COMBINED_CHANNELS, settings)).sum();
+    let Some(available) = available().filter(|available| needed > *available) else { return Ok(()) };
+    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+    let cause = format!(
+        "all runs together need about {:.1} GiB of memory at {} x {} pixels, {:.1} GiB are available",
+        gib(needed),
+        size.0,
+        size.1,
+        gib(available)
+    );
+    let error = Error::new(Kind::Usage, "command line", cause);
+    Err(error.hint("use a smaller --width and --height, or fewer runs"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,12 +1,12 @@
 //! `caustique render`: a scene in, an EXR and perhaps a PNG out.
 
-mod memory;
+pub mod memory;
 mod options;
-mod plan;
+pub mod plan;
 mod summary;
 mod techniques;
 
-pub use options::RenderArgs;
+pub use options::{Method, RenderArgs};
 
 use super::combine::{DEFAULT_MODEL, Named};
 use super::progress::Reporter;
@@ -20,7 +20,6 @@ use caustique::image::exr::{self, Attributes};
 use caustique::render::output::shape;
 use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory};
 use caustique::scene::Scene;
-use options::Method;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use summary::Summary;
@@ -191,7 +190,7 @@ fn selection(args: &RenderArgs, settings: &Settings) -> Result<Selection> {
 }
 
 /// The combiner, if it is to run.
-fn network(args: &RenderArgs, levels: usize) -> Result<Option<Named>> {
+pub fn network(args: &RenderArgs, levels: usize) -> Result<Option<Named>> {
     // A single level leaves nothing to combine.
     if args.no_combine || (levels == 1 && args.model.is_none()) {
         return Ok(None);

@@ -1,0 +1,172 @@
+//! `caustique converge`: accuracy against time.
+
+mod files;
+mod options;
+mod progress;
+mod reference;
+mod runs;
+
+pub use options::ConvergeArgs;
+
+use super::render::{memory, network, plan};
+use super::signals::Interrupt;
+use super::scene;
+use caustique::camera::Camera;
+use caustique::combine::{Combiner, Runtime};
+use caustique::error::{Error, Kind, Result};
+use caustique::render::Control;
+use caustique::report::crop::{Look, Window};
+use caustique::report::entry::Entry;
+use caustique::report::race::{Rules, race};
+use caustique::report::summary::{Subject, Wishes, find, summarize};
+use caustique::scene::{Scene, View};
+use progress::Reporter;
+use runs::Run;
+
+/// Seconds of each run where nothing says when to stop.
+const DEFAULT_TIME: f64 = 60.0;
+
+/// Seconds of each run.
+fn time(args: &ConvergeArgs) -> Option<f64> {
+    args.time.or(args.iterations.is_none().then_some(DEFAULT_TIME))
+}
+
+/// Compares: everything that can be wrong is found before the first light path.
+pub fn run(args: &ConvergeArgs) -> Result<()> {
+    let runs = runs::all(args)?;
+    let more = targets_of(args, &runs)?;
+    files::check(&args.output)?;
+    super::pool(args.threads)?.install(|| converge(args, runs, more))
+}
+
+fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Result<()> {
+    let threads = rayon::current_num_threads();
+    let scene = scene::read(&args.scene, threads)?;
+    scene::tell(&args.scene, &scene.warnings)?;
+    let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
+    let camera = scene.camera(&view)?;
+    let windows = windows(args, &camera)?;
+    memory::check_all(runs.iter().map(|run| &run.entry.settings), camera.size())?;
+    let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
+    let mut notes = Vec::new();
+    let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;
+    let (entries, mut combiners) = open(runs, &scene, &camera)?;
+    std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
+
+    let interrupt = Interrupt::listen()?;
+    let reference = reference::get(args, source, (&scene, &camera), &interrupt, &mut notes)?;
+    let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
+    let mut reporter = Reporter::new(args.progress);
+    let mut outcome = race((&scene, &camera), &entries, &mut combiners, &rules, &reference, &args.output, |step| {
+        reporter.step(&entries, step);
+        if interrupt.asked() { Control::Stop } else { Control::Continue }
+    })?;
+    reporter.finish();
+
+    let subject = Subject {
+        scene: args.scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+        size: camera.size(),
+        machine: machine(threads, &entries),
+        settings: settings(args, &rules),
+        metric: args.error_metric.into(),
+        entries,
+        rules,
+        reference,
+    };
+    let look = Look { exposure: args.exposure as f32, tonemap: args.tonemap.into() };
+    let wishes = Wishes { targets: args.targets.clone(), targets_of: more, windows, look, notes };
+    let summary = summarize(&subject, &mut outcome, &wishes)?;
+    files::write(args, &subject, &mut outcome, &summary, threads)?;
+    if let Some(error) = outcome.failures.pop() {
+        return Err(error);
+    }
+    if outcome.interrupted {
+        let cause = "interrupted; the report on what was done is written";
+        return Err(Error::new(Kind::Interrupted, args.output.display(), cause));
+    }
+    Ok(())
+}
+
+/// The runs and iterations whose errors are targets.
+fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
+    let entries: Vec<Entry> = runs.iter().map(|run| run.entry.clone()).collect();
+    let place = |target: &options::TargetOf| {
+        let usage = |cause: String| Error::new(Kind::Usage, "--target-of", cause);
+        let names: Vec<String> = entries.iter().map(|entry| format!("\"{}\"", entry.name)).collect();
+        let run = find(&entries, &target.run).ok_or_else(|| {
+            usage(format!("there is no run \"{}\"", target.run)).hint(format!("there are {}", names.join(", ")))
+        })?;
+        match args.iterations.filter(|n| *n < target.iterations) {
+            Some(n) => Err(usage(format!("{} iterations are more than the {n} of --iterations", target.iterations))
+                .hint(format!("use --iterations {} or a smaller number here", target.iterations))),
+            None => Ok((run, target.iterations)),
+        }
+    };
+    args.target_of.iter().map(place).collect()
+}
+
+/// The windows that are asked for.
+fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
+    let (width, height) = camera.size();
+    let windows: Vec<Window> = args.crop.iter().map(|crop| crop.0).collect();
+    if let Some(w) = windows.iter().find(|w| !w.fits(width as usize, height as usize)) {
+        let shown = format!("{},{},{},{}", w.x, w.y, w.width, w.height);
+        let error = Error::new(Kind::Usage, "--crop", format!("{shown} is not within the picture"));
+        return Err(error.hint(format!("it has {width} x {height} pixels")));
+    }
+    Ok(windows)
+}
+
+/// Opens the networks and tells what methods miss.
+fn open(runs: Vec<Run>, scene: &Scene, camera: &Camera) -> Result<(Vec<Entry>, Vec<Option<Combiner>>)> {
+    let mut entries = Vec::new();
+    let mut combiners = Vec::new();
+    for Run { mut entry, args } in runs {
+        plan::tell_missed(&args, &plan::plan(&args, scene, camera));
+        let place = format!("--run \"{}\"", entry.name);
+        let network = network(&args, entry.settings.levels.count).map_err(|mut error| {
+            if error.kind == Kind::Usage {
+                error.place = place;
+            }
+            error
+        })?;
+        entry.combiner = network.as_ref().map(|network| network.name.clone());
+        entries.push(entry);
+        combiners.push(network.map(super::combine::Named::into_combiner));
+    }
+    Ok((entries, combiners))
+}
+
+/// Options that concern all runs.
+fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
+    let mut settings = vec![("scene".to_string(), args.scene.path.display().to_string())];
+    let mut put = |name: &str, value: Option<String>| settings.extend(value.map(|value| (name.to_string(), value)));
+    put("camera", args.camera.clone());
+    put("longest path", args.max_depth.map(|n| format!("{n} segments")));
+    put("environment", args.scene.env.as_ref().map(|env| format!("{env:?}")));
+    put("seconds of each run", rules.time.map(|time| time.to_string()));
+    put("iterations of each run", rules.iterations.map(|n| n.to_string()));
+    let seeds: Vec<String> = rules.seeds.iter().map(u64::to_string).collect();
+    put("seeds", Some(seeds.join(", ")));
+    put("moments", Some(format!("iterations growing by {:.3}", rules.ratio)));
+    settings
+}
+
+/// What it ran on.
+fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let embree = caustique_embree::Library::load().ok().map(|library| library.version().to_string());
+    let combined = entries.iter().any(|entry| entry.combiner.is_some());
+    let runtime = if combined { Runtime::find().ok() } else { None };
+    let runtime = runtime.and_then(|runtime| runtime.version().map(str::to_string));
+    let known = [
+        ("processor", model.map(|(_, name)| name.trim().to_string())),
+        ("threads", Some(threads.to_string())),
+        ("system", Some(format!("{} {}", std::env::consts::OS, std::env::consts::ARCH))),
+        ("caustique", Some(env!("CARGO_PKG_VERSION").into())),
+        ("Embree", embree),
+        ("ONNX Runtime", runtime),
+    ];
+    known.into_iter().filter_map(|(name, value)| Some((name.to_string(), value?))).collect()
+}

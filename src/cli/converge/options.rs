@@ -1,0 +1,165 @@
+//! Every option of `caustique converge`.
+
+use crate::cli::number::{between, finite, positive, threads};
+use crate::cli::output::Tonemap;
+use crate::cli::progress::Form;
+use crate::cli::render::Method;
+use crate::cli::scene::SceneArgs;
+use caustique::report::crop::Window;
+use caustique::report::entry::Metric;
+use caustique::scene::MAX_SIZE;
+use clap::{ValueEnum, value_parser};
+use std::ops::Bound::{Excluded, Included};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Compare methods and settings: accuracy against time.
+///
+/// Renders all runs in turns, one iteration of each, measures them at a geometric series of moments against a reference, and writes plots, tables,
+/// fitted exponents and crops as one page, DIR/index.html, beside points.csv, points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the
+/// running iteration and writes what there is.
+///
+/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. Where levels are combined, the combiner's time is
+/// added once, as if the run stopped at that moment.
+#[derive(clap::Args)]
+#[command(next_line_help = true)]
+pub struct ConvergeArgs {
+    /// Folder to write to; made if need be
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+
+    /// Methods, each with its defaults and a single image: one bandwidth level, no combiner [default: path,sppm,cppm,vcm, unless
+    /// there is a --run]
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
+    pub methods: Vec<Method>,
+    /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5'; may be
+    /// repeated. As there, levels are combined unless --no-combine is given
+    #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
+    pub runs: Vec<String>,
+    /// Stop each run after so many seconds of its own [default: 60, without --iterations]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Runs")]
+    pub time: Option<f64>,
+    /// Stop each run after so many iterations
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "Runs")]
+    pub iterations: Option<u64>,
+    /// Measure at iterations that grow by this factor, in (1, 10]
+    #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, value_parser = between(Excluded(1.0), Included(10.0)), help_heading = "Runs")]
+    pub moments: f64,
+    /// Seed; a reference made here has others
+    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Runs")]
+    pub seed: u64,
+    /// Repeat everything with so many seeds: means and standard errors
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=1000), help_heading = "Runs")]
+    pub seeds: u64,
+
+    /// Figure of curves, targets and exponents
+    #[arg(long, value_enum, default_value_t = MetricChoice::Relmse, help_heading = "Error")]
+    pub error_metric: MetricChoice,
+    /// Errors for the table of times to a given error [default: some that two runs reach]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, help_heading = "Error")]
+    pub targets: Vec<f64>,
+    /// A target more: the error of a run after so many iterations, such as sppm@1000; may be repeated
+    #[arg(long, value_name = "RUN@N", help_heading = "Error")]
+    pub target_of: Vec<TargetOf>,
+    /// Reference EXR [default: one is made, and kept as DIR/reference.exr]
+    #[arg(long, value_name = "FILE.exr", help_heading = "Error")]
+    pub reference: Option<PathBuf>,
+    /// The reference's own error in the figure chosen, where its header does not tell: smaller figures are not reported
+    #[arg(long, value_name = "E", value_parser = positive, requires = "reference", help_heading = "Error")]
+    pub reference_error: Option<f64>,
+    /// Method of a reference made here [default: bdpt; vcm where the scene has caustics seen through glass or in mirrors]
+    #[arg(long, value_enum, value_name = "METHOD", conflicts_with = "reference", help_heading = "Error")]
+    pub reference_method: Option<Method>,
+    /// Seconds for a reference made here, both halves together [default: 8 times --time]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
+    pub reference_time: Option<f64>,
+    /// Iterations of each of the two halves of a reference made here [default: 16 times --iterations, without --time]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(2..=2_000_000_000), conflicts_with = "reference", help_heading = "Error")]
+    pub reference_iterations: Option<u64>,
+
+    /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
+    #[arg(long, value_name = "W", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    pub width: Option<u32>,
+    /// Height in pixels; without a width the camera's aspect is kept
+    #[arg(long, value_name = "H", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    pub height: Option<u32>,
+    /// Camera by name [default: the scene's first]
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    pub camera: Option<String>,
+    /// Longest light path in segments, camera to light, of all runs [default: no limit]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Picture")]
+    pub max_depth: Option<u32>,
+
+    #[command(flatten)]
+    pub scene: SceneArgs,
+
+    /// A part of the picture to show side by side; may be repeated [default: two, where the runs differ most]
+    #[arg(long, value_name = "X,Y,W,H", help_heading = "Page")]
+    pub crop: Vec<CropChoice>,
+    /// Exposure of the page's pictures in stops
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Page")]
+    pub exposure: f64,
+    /// From light to the page's colours
+    #[arg(long, value_enum, default_value_t = Tonemap::Agx, help_heading = "Page")]
+    pub tonemap: Tonemap,
+
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
+    pub threads: usize,
+    /// Reports on stderr
+    #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
+    pub progress: Form,
+}
+
+/// `--error-metric`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MetricChoice {
+    /// Squared error over the squared reference plus 0.01
+    Relmse,
+    /// Squared error
+    Mse,
+}
+
+impl From<MetricChoice> for Metric {
+    fn from(choice: MetricChoice) -> Metric {
+        match choice {
+            MetricChoice::Relmse => Metric::RelMse,
+            MetricChoice::Mse => Metric::Mse,
+        }
+    }
+}
+
+/// `--target-of RUN@N`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TargetOf {
+    /// A run's name.
+    pub run: String,
+    /// Its iterations.
+    pub iterations: u64,
+}
+
+impl FromStr for TargetOf {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.rsplit_once('@').and_then(|(run, n)| Some((run.trim(), n.trim().parse().ok()?)));
+        match parts {
+            Some((run, iterations)) if iterations > 0 => Ok(TargetOf { run: run.into(), iterations }),
+            _ => Err("it must be RUN@N, such as sppm@1000".into()),
+        }
+    }
+}
+
+/// `--crop X,Y,W,H`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CropChoice(pub Window);
+
+impl FromStr for CropChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let numbers: Option<Vec<usize>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+        match numbers.as_deref() {
+            Some(&[x, y, width, height]) if width > 0 && height > 0 => Ok(CropChoice(Window { x, y, width, height })),
+            _ => Err("it must be X,Y,W,H in pixels, such as 120,40,64,64".into()),
+        }
+    }
+}

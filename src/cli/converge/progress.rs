@@ -1,0 +1,87 @@
+//! Progress of a comparison on stderr.
+
+use crate::cli::progress::{Form, duration};
+use crate::cli::say;
+use caustique::render::Clock;
+use caustique::report::entry::Entry;
+use caustique::report::number::short;
+use caustique::report::race::Step;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::json;
+use std::io::IsTerminal;
+
+/// Seconds between plain lines.
+const PLAIN_EVERY: f64 = 5.0;
+const STEPS: u64 = 1000;
+
+/// Reports on a reference and a race.
+pub struct Reporter {
+    form: Form,
+    bar: ProgressBar,
+    clock: Clock,
+    next_line: f64,
+}
+
+impl Reporter {
+    /// In a form.
+    pub fn new(form: Form) -> Reporter {
+        let form = match form {
+            Form::Auto if !std::io::stderr().is_terminal() => Form::Plain,
+            form => form,
+        };
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden());
+        if form == Form::Auto {
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+            if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
+                bar.set_style(style);
+            }
+        }
+        Reporter { form, bar, clock: Clock::start(), next_line: 0.0 }
+    }
+
+    /// The reference's halves have done so much.
+    pub fn reference(&mut self, iterations: u64, seconds: f64, fraction: f64) {
+        let sentence = format!("reference: {iterations} iterations of each half, {}", duration(seconds));
+        let line = json!({"reference": true, "iteration": iterations, "seconds": seconds, "fraction": fraction});
+        self.tell(fraction, &sentence, &line.to_string());
+    }
+
+    /// A run has made a step.
+    pub fn step(&mut self, entries: &[Entry], step: &Step<'_>) {
+        let name = &entries[step.run].name;
+        let relmse = step.point.map(|point| point.errors.relmse);
+        let mut sentence = format!("{name}: iteration {}, {}", step.iterations, duration(step.seconds));
+        sentence += &relmse.map_or(String::new(), |relmse| format!(", relMSE {}", short(relmse)));
+        let line = json!({
+            "run": name, "iteration": step.iterations, "seconds": step.seconds, "fraction": step.fraction, "relmse": relmse,
+        });
+        self.tell(step.fraction, &sentence, &line.to_string());
+    }
+
+    fn tell(&mut self, fraction: f64, sentence: &str, line: &str) {
+        match self.form {
+            Form::Auto => {
+                self.bar.set_position((fraction * STEPS as f64) as u64);
+                self.bar.set_message(sentence.to_string());
+            }
+            Form::Plain => {
+                let now = self.clock.seconds();
+                if now >= self.next_line {
+                    self.next_line = now + PLAIN_EVERY;
+                    say(&format!("{:.0} %, {sentence}", 100.0 * fraction));
+                }
+            }
+            Form::Json => say(line),
+            Form::Openjd => {
+                say(&format!("openjd_progress: {:.1}", 100.0 * fraction));
+                say(&format!("openjd_status: {sentence}"));
+            }
+            Form::None => {}
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,133 @@
+//! The reference of a comparison: a file, or one made here.
+
+use super::options::ConvergeArgs;
+use super::progress::Reporter;
+use super::runs::{self, Run};
+use crate::cli::render::{Method, plan};
+use crate::cli::say;
+use crate::cli::signals::Interrupt;
+use caustique::camera::Camera;
+use caustique::error::{Error, Kind, Result};
+use caustique::render::{Control, Settings};
+use caustique::report::entry::Metric;
+use caustique::report::reference::{Halves, OwnError, Reference};
+use caustique::scene::Scene;
+use serde_json::Value;
+
+/// Where the reference comes from.
+pub enum Source {
+    /// A file, read.
+    File(Reference),
+    /// To be made with these settings.
+    Own(Box<Settings>),
+}
+
+/// Reads the file, or settles how to make one. Remarks go to `notes`.
+///
+/// # Errors
+/// A file that will not do; options.
+pub fn source(
+    args: &ConvergeArgs,
+    (scene, camera): (&Scene, &Camera),
+    runs: &[Run],
+    seeds: &[u64],
+    notes: &mut Vec<String>,
+) -> Result<Source> {
+    let metric = Metric::from(args.error_metric);
+    let Some(path) = &args.reference else { return own(args, scene, camera).map(Source::Own) };
+    let (mut reference, header) = Reference::read(path, camera.size())?;
+    if let Some(error) = args.reference_error {
+        reference.error = OwnError::in_metric(metric, error);
+    }
+    let mut note = |text: String| {
+        say(&format!("warning: {}: {text}", path.display()));
+        notes.push(format!("Reference: {text}."));
+    };
+    if reference.error.of(metric).is_none() {
+        note(format!(
+            "its own {} is not known, so that figures near it say nothing; --reference-error tells it",
+            metric.name()
+        ));
+    }
+    let same = |run: &&Run| header["method"] == run.entry.settings.method.name();
+    if let Some(run) = runs.iter().find(same)
+        && header["seed"].as_u64().is_some_and(|seed| seeds.contains(&seed))
+    {
+        let (name, seed) = (&run.entry.name, &header["seed"]);
+        note(format!(
+            "it has method and seed {seed} of the run \"{name}\", whose error will look too small; choose another --seed"
+        ));
+    }
+    Ok(Source::File(reference))
+}
+
+/// Settings of a reference to be made.
+fn own(args: &ConvergeArgs, scene: &Scene, camera: &Camera) -> Result<Box<Settings>> {
+    let method = match args.reference_method {
+        Some(method) => method,
+        None => {
+            let bdpt = runs::by_method(args, Method::Bdpt)?;
+            let plan = plan::plan(&bdpt.args, scene, camera);
+            let sds = |effect: &Value| effect["name"] == "sds" && effect["present"] == true;
+            if plan["effects"].as_array().is_some_and(|effects| effects.iter().any(sds)) {
+                Method::Vcm
+            } else {
+                Method::Bdpt
+            }
+        }
+    };
+    let mut settings = runs::by_method(args, method)?.entry.settings;
+    if settings.method == caustique::render::Method::Pm {
+        let error = Error::new(Kind::Usage, "command line", "pm does not converge: it makes no reference");
+        return Err(error.hint("choose another --reference-method"));
+    }
+    settings.time = args.reference_time;
+    settings.iterations = args.reference_iterations;
+    if settings.time.is_none() && settings.iterations.is_none() {
+        match (super::time(args), args.iterations) {
+            (Some(time), _) => settings.time = Some(8.0 * time),
+            (None, n) => settings.iterations = n.map(|n| n.saturating_mul(16).max(2)),
+        }
+    }
+    Ok(Box::new(settings))
+}
+
+/// The reference; one that is made here is also written to the folder.
+///
+/// # Errors
+/// The file system; a signal, when what was made has been written.
+pub fn get(
+    args: &ConvergeArgs,
+    source: Source,
+    (scene, camera): (&Scene, &Camera),
+    interrupt: &Interrupt,
+    notes: &mut Vec<String>,
+) -> Result<Reference> {
+    let settings = match source {
+        Source::File(reference) => return Ok(reference),
+        Source::Own(settings) => settings,
+    };
+    let mut reporter = Reporter::new(args.progress);
+    let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
+        let by_time = settings.time.map_or(0.0, |time| seconds / time);
+        let by_count = settings.iterations.map_or(0.0, |n| iterations as f64 / n as f64);
+        reporter.reference(iterations, seconds, by_time.max(by_count).min(1.0));
+        if interrupt.asked() { Control::Stop } else { Control::Continue }
+    });
+    reporter.finish();
+    let reference = halves.reference(camera.size());
+    let path = args.output.join("reference.exr");
+    reference.write(&path, &halves)?;
+    if interrupt.asked() {
+        let cause =
+            format!("interrupted, the reference after {} iterations of each half is written", halves.iterations);
+        return Err(Error::new(Kind::Interrupted, path.display(), cause));
+    }
+    if settings.method.has_bandwidths() {
+        notes.push(format!(
+            "The reference's stated error is its noise. What bias {} has left is common to both halves and does not show in it.",
+            settings.method.name()
+        ));
+    }
+    Ok(reference)
+}

@@ -1,0 +1,100 @@
+//! Runs from the words of the command line, read with the options of `caustique render`.
+
+use super::options::ConvergeArgs;
+use crate::cli::render::{Method, RenderArgs};
+use crate::cli::usage;
+use caustique::error::{Error, Kind, Result};
+use caustique::render::Settings;
+use caustique::report::entry::Entry;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
+
+/// Options of a render's method that concern the picture itself: all runs have them in common.
+const COMMON: [&str; 2] = ["seed", "max_depth"];
+
+/// A run, and the options it was read from.
+pub struct Run {
+    /// What competes; its combiner is not known before its network is opened.
+    pub entry: Entry,
+    /// All options of a render with this method.
+    pub args: RenderArgs,
+}
+
+/// All runs that are asked for.
+///
+/// # Errors
+/// Options that a render does not have, or that are not a run's; names given twice.
+pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
+    let usual = [Method::Path, Method::Sppm, Method::Cppm, Method::Vcm];
+    let methods = if args.methods.is_empty() && args.runs.is_empty() { &usual[..] } else { &args.methods };
+    let mut runs: Vec<Run> = methods.iter().map(|method| by_method(args, *method)).collect::<Result<_>>()?;
+    for text in &args.runs {
+        let (name, options) = match text.split_once(':') {
+            Some((name, options)) if !name.trim_start().starts_with('-') => (name.trim(), options.trim()),
+            _ => (text.trim(), text.trim()),
+        };
+        let place = format!("--run \"{name}\"");
+        let words = shell_words::split(options)
+            .map_err(|cause| Error::new(Kind::Usage, &place, cause).hint("close the quotes"))?;
+        if name.is_empty() {
+            return Err(Error::new(Kind::Usage, "--run", "a run needs a name or options")
+                .hint("such as --run 'five levels: --method sppm --levels 5'"));
+        }
+        runs.push(parse(args, name, options, words).map_err(|mut error| {
+            error.place = place;
+            error
+        })?);
+    }
+    let name = |run: usize| &runs[run].entry.name;
+    if let Some(twice) = (1..runs.len()).find(|&run| (0..run).any(|other| name(other) == name(run))) {
+        let error = Error::new(Kind::Usage, "command line", format!("two runs are called \"{}\"", name(twice)));
+        return Err(error.hint("give each --run a name of its own: --run 'NAME: OPTIONS'"));
+    }
+    Ok(runs)
+}
+
+/// A method with its defaults and one level.
+pub fn by_method(args: &ConvergeArgs, method: Method) -> Result<Run> {
+    let name = method.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
+    let mut words = vec!["--method".to_string(), name.clone()];
+    if method.chosen().has_levels() {
+        words.extend(["--levels".into(), "1".into()]);
+    }
+    parse(args, &name, &words.join(" "), words)
+}
+
+fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> Result<Run> {
+    let command = RenderArgs::augment_args(Command::new("render").no_binary_name(true).disable_help_flag(true));
+    let mut line: Vec<std::ffi::OsString> = words.into_iter().map(Into::into).collect();
+    // What a render needs besides.
+    line.extend(["-o".into(), "run.exr".into(), args.scene.path.clone().into()]);
+    let explain = |error: clap::Error| usage::explain(&error).unwrap_or_else(|| Error::new(Kind::Usage, "", error));
+    let matches = command.clone().try_get_matches_from(line).map_err(explain)?;
+    refuse_common(&command, &matches)?;
+    let render = RenderArgs::from_arg_matches(&matches).map_err(explain)?;
+    let settings = Settings {
+        max_depth: args.max_depth.unwrap_or(u32::MAX),
+        seed: args.seed,
+        iterations: None,
+        time: None,
+        ..render.settings()?
+    };
+    let entry = Entry { name: name.into(), options: options.into(), settings, combiner: None };
+    Ok(Run { entry, args: render })
+}
+
+/// Errors: an option that is not about the method or the combiner of one run.
+fn refuse_common(command: &Command, matches: &ArgMatches) -> Result<()> {
+    let given = |arg: &&clap::Arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
+    for arg in command.get_arguments().filter(given) {
+        let id = arg.get_id().as_str();
+        let of_run = matches!(arg.get_help_heading(), Some("Method" | "Combiner")) && !COMMON.contains(&id);
+        if !of_run && !["output", "path"].contains(&id) {
+            let option = arg.get_long().unwrap_or(id);
+            let cause = format!("--{option} cannot differ from run to run");
+            return Err(Error::new(Kind::Usage, "command line", cause)
+                .hint("a run has the method and combiner options of 'caustique render'; the others, where there are such, concern all runs"));
+        }
+    }
+    Ok(())
+}

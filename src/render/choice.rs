@@ -1,0 +1,62 @@
+//! From settings to the passes that they ask for: the one place where methods, rules and kernels are told apart.
+
+use super::bidirectional::Passes;
+use super::counting::Counting;
+use super::drive::Iterate;
+use super::method::Method;
+use super::pm::Pm;
+use super::settings::{KernelChoice, RadiusRule, Settings};
+use super::sppm::Sppm;
+use crate::camera::Camera;
+use crate::estimator::rule::CountingRule;
+use crate::estimator::rule::adaptive::Adaptive;
+use crate::estimator::rule::chi_squared::ChiSquared;
+use crate::estimator::rule::local::LocalStatistics;
+use crate::photon::{Kernel, kernel};
+use crate::scene::Scene;
+use crate::transport::Surroundings;
+
+/// The passes of a render, nothing done yet.
+pub(super) fn passes<'a>(
+    scene: &'a Scene,
+    camera: &'a Camera,
+    settings: &'a Settings,
+    surroundings: &'a Surroundings,
+) -> Box<dyn Iterate + 'a> {
+    match settings.method {
+        Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
+            gathering(Sppm::new(scene, camera, settings, surroundings), settings)
+        }
+        Method::Pm => Box::new(Pm::new(scene, camera, settings, surroundings)),
+        Method::Path | Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm => {
+            Box::new(Passes::new(scene, camera, settings, surroundings))
+        }
+    }
+}
+
+/// Progressive photon mapping by the rule that the settings say.
+fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Iterate + 'a> {
+    match (settings.method, settings.radius_rule, settings.kernel) {
+        (Method::Cppm, ..) => counting(sppm, settings, ChiSquared::new(&settings.chi_squared), kernel::Box),
+        (Method::Appm, _, KernelChoice::Box) => adaptive(sppm, settings, kernel::Box),
+        (Method::Appm, _, KernelChoice::Epanechnikov) => adaptive(sppm, settings, kernel::Epanechnikov),
+        (Method::Appm, _, KernelChoice::Gaussian) => adaptive(sppm, settings, kernel::Gaussian),
+        (Method::Ppm, ..) | (_, RadiusRule::Local, _) => {
+            counting(sppm, settings, LocalStatistics { alpha: settings.alpha }, kernel::Box)
+        }
+        (_, RadiusRule::Memoryless, _) => Box::new(sppm),
+    }
+}
+
+fn adaptive<'a, K: Kernel + Default>(sppm: Sppm<'a>, settings: &'a Settings, kernel: K) -> Box<dyn Iterate + 'a> {
+    counting(sppm, settings, Adaptive::<K>::default(), kernel)
+}
+
+fn counting<'a>(
+    sppm: Sppm<'a>,
+    settings: &'a Settings,
+    rule: impl CountingRule + 'a,
+    kernel: impl Kernel,
+) -> Box<dyn Iterate + 'a> {
+    Box::new(Counting::new(sppm, settings, rule, kernel))
+}

@@ -1,0 +1,231 @@
+//! A render that goes on one iteration at a time, so that several can take turns.
+
+use super::choice::passes;
+use super::control::{Clock, History, Progress, StopReason, cpu_seconds};
+use super::drive::Iterate;
+use super::output;
+use super::result::{ErrorEstimate, Phases, Rendered, error_estimate};
+use super::settings::{Levels, Settings};
+use crate::camera::Camera;
+use crate::error::Result;
+use crate::estimator::Pixel;
+use crate::film::LayerSet;
+use crate::scene::Scene;
+use crate::transport::Surroundings;
+
+/// What a render reads: scene, camera, settings, and what these say together.
+pub struct Stage<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    settings: Settings,
+    surroundings: Surroundings,
+}
+
+impl<'a> Stage<'a> {
+    /// Methods without bandwidth levels get one.
+    pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &Settings) -> Stage<'a> {
+        let mut settings = settings.clone();
+        if !settings.method.has_levels() {
+            settings.levels = Levels::new(1);
+        }
+        Stage { scene, camera, settings, surroundings: Surroundings::new(scene, camera.position()) }
+    }
+
+    /// The settings of the render.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+}
+
+/// Time that a render has taken: its own, not that of others between its iterations.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spent {
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Processor seconds of the whole process.
+    pub cpu_seconds: f64,
+}
+
+impl Spent {
+    /// Does some work and adds the time it takes.
+    pub fn during<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        let (clock, cpu_start) = (Clock::start(), cpu_seconds());
+        let done = work();
+        self.seconds += clock.seconds();
+        self.cpu_seconds += cpu_seconds() - cpu_start;
+        done
+    }
+}
+
+/// A render under way.
+pub struct Session<'a> {
+    stage: &'a Stage<'a>,
+    passes: Box<dyn Iterate + 'a>,
+    pixels: Vec<Pixel>,
+    phases: Phases,
+    spent: Spent,
+    pilot_seconds: f64,
+    /// The next iteration, from 0.
+    next: u64,
+    done: u64,
+    light_paths: u64,
+    photons: usize,
+    history: Vec<History>,
+    next_record: u64,
+}
+
+impl<'a> Session<'a> {
+    /// Runs the pilot, if the method has one.
+    pub fn new(stage: &'a Stage<'a>) -> Session<'a> {
+        let Stage { scene, camera, settings, surroundings } = stage;
+        let mut spent = Spent::default();
+        let (passes, pixels) = spent.during(|| {
+            let mut passes = passes(scene, camera, settings, surroundings);
+            let pixels = passes.pixels();
+            (passes, pixels)
+        });
+        Session {
+            stage,
+            passes,
+            pixels,
+            phases: Phases { pilot: spent.cpu_seconds, ..Phases::default() },
+            spent,
+            pilot_seconds: spent.seconds,
+            next: settings.shard.index,
+            done: 0,
+            light_paths: 0,
+            photons: 0,
+            history: Vec::new(),
+            next_record: 1,
+        }
+    }
+
+    /// Whether all iterations that were asked for are done.
+    pub fn finished(&self) -> bool {
+        self.stage.settings.iterations.is_some_and(|n| self.next >= n)
+    }
+
+    /// Adds one iteration.
+    pub fn step(&mut self) -> Progress {
+        let mut spent = self.spent;
+        let (record, error) = spent.during(|| self.iterate());
+        self.spent = spent;
+        if record {
+            self.record(error);
+        }
+        let error = error.or_else(|| self.history.last().and_then(|moment| moment.estimate));
+        let settings = &self.stage.settings;
+        let total = self.total();
+        Progress {
+            iteration: self.done,
+            iterations: total,
+            seconds: self.spent.seconds,
+            remaining: settings.remaining(self.done, total, self.spent.seconds, self.pilot_seconds),
+            light_paths: self.light_paths,
+            photons: self.photons,
+            error: error.map(|error| error.root()),
+        }
+    }
+
+    /// An iteration, and the error where it is wanted: for the history, or to stop the render.
+    fn iterate(&mut self) -> (bool, Option<ErrorEstimate>) {
+        let settings = &self.stage.settings;
+        // Iterations count from 1; pass 0 is the pilot's.
+        let work = self.passes.iterate(self.next + 1, &mut self.pixels, &mut self.phases);
+        self.next += settings.shard.count;
+        self.done += 1;
+        self.light_paths += work.light_paths;
+        self.photons = work.photons;
+        // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
+        let record = self.done >= self.next_record || Some(self.done) == self.total();
+        let wanted = record || settings.target_error.is_some();
+        (record, if wanted { self.estimate() } else { None })
+    }
+
+    fn record(&mut self, estimate: Option<ErrorEstimate>) {
+        let (iterations, light_paths) = (self.done, self.light_paths);
+        self.next_record = (iterations as f64 * std::f64::consts::SQRT_2).ceil() as u64;
+        let Spent { seconds, cpu_seconds } = self.spent;
+        self.history.push(History { seconds, cpu_seconds, iterations, light_paths, estimate });
+    }
+
+    /// Iterations of this shard, when their number is what stops the render.
+    fn total(&self) -> Option<u64> {
+        let Settings { iterations, shard, .. } = self.stage.settings;
+        iterations.map(|n| n.saturating_sub(shard.index).div_ceil(shard.count))
+    }
+
+    /// The pixels as they are.
+    pub fn pixels(&self) -> &[Pixel] {
+        &self.pixels
+    }
+
+    /// The settings it was made with.
+    pub fn settings(&self) -> &'a Settings {
+        &self.stage.settings
+    }
+
+    /// Iterations done.
+    pub fn iterations(&self) -> u64 {
+        self.done
+    }
+
+    /// Light paths emitted.
+    pub fn light_paths(&self) -> u64 {
+        self.light_paths
+    }
+
+    /// Time taken so far by pilot and iterations.
+    pub fn spent(&self) -> Spent {
+        self.spent
+    }
+
+    /// Core-seconds per phase so far.
+    pub fn phases(&self) -> Phases {
+        self.phases
+    }
+
+    /// Estimated error of the method's own image, see [`Rendered::relative_error`].
+    pub fn estimate(&self) -> Option<ErrorEstimate> {
+        error_estimate(&self.pixels, &self.stage.settings)
+    }
+
+    /// The method's own image as it is, row by row from the top.
+    pub fn picture(&self) -> Vec<[f32; 3]> {
+        let own = self.stage.settings.levels.own();
+        self.pixels.iter().map(|pixel| pixel.levels[own].mean.as_vec3().to_array()).collect()
+    }
+
+    /// The layers as they are, see [`Rendered::layers`].
+    ///
+    /// # Errors
+    /// None: its pixels are as many as its size says.
+    pub fn layers(&mut self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
+        let environment = self.stage.scene.lights.sky().environment.is_some();
+        let shape = output::shape(&self.stage.settings, self.done, environment);
+        output::layers(self.stage.camera.size(), &self.pixels, &self.passes.radii(), &shape, wanted)
+    }
+
+    /// Ends it.
+    pub fn finish(mut self, stop: StopReason) -> Rendered {
+        if self.done > 0 && self.history.last().is_none_or(|moment| moment.iterations != self.done) {
+            self.record(self.estimate());
+        }
+        let (width, height) = self.stage.camera.size();
+        Rendered {
+            width,
+            height,
+            techniques: self.passes.techniques(self.done),
+            radii: self.passes.radii(),
+            pixels: self.pixels,
+            settings: self.stage.settings.clone(),
+            iterations: self.done,
+            light_paths: self.light_paths,
+            photons: self.photons as u64,
+            seconds: self.spent.seconds,
+            phases: self.phases,
+            history: self.history,
+            stop,
+        }
+    }
+}

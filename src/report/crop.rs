@@ -1,0 +1,174 @@
+//! Parts of pictures side by side: where the runs differ most.
+
+use crate::error::Result;
+use crate::image::tonemap::ToneMap;
+use crate::image::{heat, png, relative_squared_error};
+use std::ops::Range;
+
+/// A part of the picture in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Window {
+    /// Left column.
+    pub x: usize,
+    /// Top row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Window {
+    /// All of a picture.
+    pub fn whole(width: usize, height: usize) -> Window {
+        Window { x: 0, y: 0, width, height }
+    }
+
+    /// Whether it lies within a picture and is not empty.
+    pub fn fits(&self, width: usize, height: usize) -> bool {
+        let within = |start: usize, length: usize, size: usize| {
+            length > 0 && start.checked_add(length).is_some_and(|end| end <= size)
+        };
+        within(self.x, self.width, width) && within(self.y, self.height, height)
+    }
+
+    fn meets(&self, other: &Window) -> bool {
+        let span = |start: usize, length: usize| start..start + length;
+        let cross = |a: Range<usize>, b: Range<usize>| a.start < b.end && b.start < a.end;
+        cross(span(self.x, self.width), span(other.x, other.width))
+            && cross(span(self.y, self.height), span(other.y, other.height))
+    }
+
+    fn indices(self, width: usize) -> impl Iterator<Item = usize> {
+        (self.y..self.y + self.height).flat_map(move |y| (self.x..self.x + self.width).map(move |x| y * width + x))
+    }
+}
+
+/// How pictures look.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Stops.
+    pub exposure: f32,
+    /// Curve.
+    pub tonemap: ToneMap,
+}
+
+/// The relative error of a pixel, at most 1: the root of its share of relMSE.
+fn relative_error(x: [f32; 3], r: [f32; 3]) -> f64 {
+    let error = relative_squared_error(x, r).sqrt();
+    if error.is_nan() { 1.0 } else { error.min(1.0) }
+}
+
+/// Up to `count` windows, apart from each other, in which the mean error of the worst picture exceeds that of the best by most; with one
+/// picture those in which it is largest.
+pub fn choose(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], size: (usize, usize), count: usize) -> Vec<Window> {
+    let (width, height) = size;
+    let side = |length: usize| (length / 4).clamp(length.min(24), length.min(160));
+    let (w, h) = (side(width.min(height)), side(width.min(height)));
+    let tables: Vec<Vec<f64>> = pictures.iter().map(|picture| integral(picture, reference, width)).collect();
+    let sum = |table: &Vec<f64>, x: usize, y: usize| {
+        let at = |x: usize, y: usize| table[y * (width + 1) + x];
+        at(x + w, y + h) - at(x, y + h) - at(x + w, y) + at(x, y)
+    };
+    let step = (w / 8).max(1);
+    let mut scored: Vec<(f64, Window)> = Vec::new();
+    for y in (0..=height - h).step_by(step) {
+        for x in (0..=width - w).step_by(step) {
+            let errors = tables.iter().map(|table| sum(table, x, y));
+            let worst = errors.clone().fold(0.0, f64::max);
+            let best = if tables.len() > 1 { errors.fold(f64::INFINITY, f64::min) } else { 0.0 };
+            scored.push((worst - best, Window { x, y, width: w, height: h }));
+        }
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<Window> = Vec::new();
+    for (_, window) in scored {
+        if chosen.len() < count && chosen.iter().all(|other| !other.meets(&window)) {
+            chosen.push(window);
+        }
+    }
+    chosen
+}
+
+/// Sums of relative errors over all rectangles that begin in the corner, one row and column more than pixels.
+fn integral(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize) -> Vec<f64> {
+    let mut table = vec![0.0; width + 1];
+    for (row, reference) in picture.chunks(width).zip(reference.chunks(width)) {
+        let above = table.len() - (width + 1);
+        let mut sum = 0.0;
+        table.push(0.0);
+        for (x, (&value, &truth)) in row.iter().zip(reference).enumerate() {
+            sum += relative_error(value, truth);
+            table.push(table[above + x + 1] + sum);
+        }
+    }
+    table
+}
+
+/// The relative error that is shown as the largest: the 99th percentile over all pictures within the windows, so that a few fireflies do not turn all else black.
+pub fn scale(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], width: usize, windows: &[Window]) -> f64 {
+    let pixels = windows.iter().flat_map(|window| window.indices(width));
+    let mut errors: Vec<f64> =
+        pixels.flat_map(|i| pictures.iter().map(move |picture| relative_error(picture[i], reference[i]))).collect();
+    errors.sort_unstable_by(f64::total_cmp);
+    errors.get(errors.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-6)
+}
+
+/// A window of a picture as PNG.
+///
+/// # Errors
+/// None for a window within the picture.
+pub fn picture(pixels: &[[f32; 3]], width: usize, window: Window, look: Look) -> Result<Vec<u8>> {
+    let shown = window.indices(width).map(|i| look.tonemap.display(pixels[i].into(), look.exposure));
+    png::encode(window.width, window.height, shown)
+}
+
+/// The relative error in a window as a heat map, `largest` being the palest.
+///
+/// # Errors
+/// None for a window within the picture.
+pub fn heat_map(
+    pixels: &[[f32; 3]],
+    reference: &[[f32; 3]],
+    width: usize,
+    window: Window,
+    largest: f64,
+) -> Result<Vec<u8>> {
+    let shown = window.indices(width).map(|i| heat::magma((relative_error(pixels[i], reference[i]) / largest) as f32));
+    png::encode(window.width, window.height, shown)
+}
+
+/// The colours of heat maps from left to right.
+///
+/// # Errors
+/// None.
+pub fn heat_bar() -> Result<Vec<u8>> {
+    png::encode(256, 1, (0..256).map(|i| heat::magma(i as f32 / 255.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_windows_are_where_pictures_differ_and_apart() {
+        let (width, height) = (96, 64);
+        let reference = vec![[1.0; 3]; width * height];
+        let with = |x: Range<usize>, y: Range<usize>, value: f32| {
+            let mut picture = vec![[1.1; 3]; width * height];
+            y.for_each(|y| x.clone().for_each(|x| picture[y * width + x] = [value; 3]));
+            picture
+        };
+        let pictures = [with(60..70, 30..40, 1.6), with(10..16, 5..11, 1.3)];
+        let windows = choose(&pictures, &reference, (width, height), 2);
+        let holds =
+            |w: &Window, x: usize, y: usize| (w.x..w.x + w.width).contains(&x) && (w.y..w.y + w.height).contains(&y);
+        assert_eq!(windows.len(), 2);
+        assert!(holds(&windows[0], 65, 35) && holds(&windows[1], 13, 8), "{windows:?}");
+        assert!(!windows[0].meets(&windows[1]) && windows.iter().all(|w| w.fits(width, height)));
+        assert!(!Window { x: 90, y: 0, width: 7, height: 1 }.fits(width, height));
+        assert!(!Window { x: usize::MAX, y: 0, width: 7, height: 1 }.fits(width, height));
+        let largest = scale(&pictures, &reference, width, &[Window::whole(width, height)]);
+        assert!((0.09..0.61).contains(&largest), "{largest}");
+    }
+}

@@ -1,0 +1,106 @@
+//! What is compared, and the figure it is compared by.
+
+use crate::image::Errors;
+use crate::render::Settings;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// A method with its settings, and a name.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// What the report calls it.
+    pub name: String,
+    /// The options of `caustique render` that it stands for.
+    pub options: String,
+    /// Its settings; seeds are the race's.
+    pub settings: Settings,
+    /// Name of the combiner's network, if its levels are combined.
+    pub combiner: Option<String>,
+}
+
+impl Entry {
+    /// Its settings as data: those that say something to its method.
+    pub fn object(&self) -> Value {
+        let Settings { method, levels, photons, alpha, initial, max_depth, .. } = self.settings;
+        let mut object = json!({
+            "name": self.name,
+            "options": self.options,
+            "method": method.name(),
+            "levels": levels.count,
+            "combiner": self.combiner,
+            "max_depth": (max_depth < u32::MAX).then_some(max_depth),
+        });
+        if method.counts_photons() {
+            object["photons"] = photons.into();
+        }
+        if method.has_bandwidths() {
+            object["alpha"] = alpha.into();
+            object["initial_bandwidth"] = format!("{initial:?}").into();
+        }
+        object
+    }
+}
+
+/// The figure that curves, targets and fits are about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Metric {
+    /// Mean relative squared error.
+    #[default]
+    RelMse,
+    /// Mean squared error.
+    Mse,
+}
+
+impl Metric {
+    /// Its name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Metric::RelMse => "relMSE",
+            Metric::Mse => "MSE",
+        }
+    }
+
+    /// Its value among the errors of a picture.
+    pub fn of(self, errors: &Errors) -> f64 {
+        match self {
+            Metric::RelMse => errors.relmse,
+            Metric::Mse => errors.mse,
+        }
+    }
+}
+
+/// Moments at which pictures are measured: iterations 1, 2, 3, ... in a geometric series.
+#[derive(Clone, Copy, Debug)]
+pub struct Moments {
+    ratio: f64,
+    next: u64,
+}
+
+impl Moments {
+    /// A series with this ratio, above 1.
+    pub fn new(ratio: f64) -> Moments {
+        Moments { ratio, next: 1 }
+    }
+
+    /// Whether so many iterations are a moment; asked after each.
+    pub fn reached(&mut self, iterations: u64) -> bool {
+        if iterations < self.next {
+            return false;
+        }
+        self.next = ((iterations as f64 * self.ratio).round() as u64).max(iterations + 1);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_are_a_geometric_series_without_repetition() {
+        let mut moments = Moments::new(std::f64::consts::SQRT_2);
+        let reached: Vec<u64> = (1..=70).filter(|&n| moments.reached(n)).collect();
+        assert_eq!(reached, [1, 2, 3, 4, 6, 8, 11, 16, 23, 33, 47, 66]);
+    }
+}

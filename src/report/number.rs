@@ -1,0 +1,44 @@
+//! Numbers as the report's tables and plots show them.
+
+use super::curve::Mean;
+
+/// Three digits: `0.0123`, `12.3`, `4.56e-5`.
+pub fn short(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format!("{x}");
+    }
+    let power = x.abs().log10().floor();
+    match power {
+        -3.0..5.0 => format!("{x:.digits$}", digits = (2.0 - power).max(0.0) as usize),
+        _ => format!("{x:.2e}"),
+    }
+}
+
+/// `-0.672 ± 0.014`; without an error the value alone.
+pub fn with_error(mean: &Mean, digits: usize) -> String {
+    let value = minus(&format!("{:.digits$}", mean.value));
+    mean.error.map_or(value.clone(), |error| format!("{value} ± {error:.digits$}"))
+}
+
+/// As [`short`], with the error in the same digits.
+pub fn short_with_error(mean: &Mean) -> String {
+    let value = short(mean.value);
+    mean.error.map_or(value.clone(), |error| format!("{value} ± {}", short(error)))
+}
+
+/// The typographic minus.
+pub fn minus(text: &str) -> String {
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        let shown = [0.0123456, 1.0, 12.345, 1234.0, 0.0000456, 1234567.0, 0.0].map(short);
+        assert_eq!(shown, ["0.0123", "1.00", "12.3", "1234", "4.56e-5", "1.23e6", "0"]);
+        assert_eq!(with_error(&Mean { value: -0.6721, error: Some(0.0144) }, 2), "−0.67 ± 0.01");
+    }
+}

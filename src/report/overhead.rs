@@ -1,0 +1,73 @@
+//! What an iteration costs and of what, and what levels and combiner add, as Table 2 of \[post-reconstruction 2021\].
+
+use super::entry::Entry;
+use super::race::Ending;
+use crate::render::Phases;
+use serde::Serialize;
+
+/// A row of the table; means over seeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Overhead {
+    /// Iterations done.
+    pub iterations: f64,
+    /// Wall-clock seconds of pilot and iterations.
+    pub render_seconds: f64,
+    /// Wall-clock seconds of the combiner with its layers, once at the end.
+    pub combine_seconds: Option<f64>,
+    /// All seconds over iterations.
+    pub seconds_per_iteration: f64,
+    /// All processor seconds over iterations.
+    pub cpu_seconds_per_iteration: f64,
+    /// Core-seconds of the pilot, once.
+    pub pilot: f64,
+    /// Core-seconds per iteration for light paths.
+    pub light: f64,
+    /// Core-seconds per iteration for photon maps.
+    pub map: f64,
+    /// Core-seconds per iteration for eye paths, with those light paths that take turns with them.
+    pub eye: f64,
+    /// Seconds per iteration over those of the first run.
+    pub over_first: f64,
+    /// Seconds per iteration over those of the first run with the same method, if that is another.
+    pub over_plain: Option<f64>,
+}
+
+/// The table, a row per entry; `None` for a run that did nothing.
+pub fn table(entries: &[Entry], endings: &[Ending]) -> Vec<Option<Overhead>> {
+    let rows: Vec<Option<Overhead>> = (0..entries.len()).map(|run| row(run, endings)).collect();
+    let cost = |run: usize| rows[run].as_ref().map(|row| row.seconds_per_iteration).filter(|cost| *cost > 0.0);
+    let against = |run: usize, base: usize| Some(cost(run)? / cost(base)?);
+    let method = |run: usize| entries[run].settings.method;
+    let mut table = rows.clone();
+    for (run, row) in table.iter_mut().enumerate() {
+        let Some(row) = row else { continue };
+        row.over_first = against(run, 0).unwrap_or(f64::NAN);
+        let plain = (0..run).find(|&other| method(other) == method(run));
+        row.over_plain = plain.and_then(|plain| against(run, plain));
+    }
+    table
+}
+
+fn row(run: usize, endings: &[Ending]) -> Option<Overhead> {
+    let mine: Vec<&Ending> = endings.iter().filter(|e| e.run == run && e.iterations > 0).collect();
+    let n = mine.len() as f64;
+    let mean = |get: &dyn Fn(&Ending) -> f64| mine.iter().map(|ending| get(ending)).sum::<f64>() / n;
+    if mine.is_empty() {
+        return None;
+    }
+    let combine = |e: &Ending| e.combine.unwrap_or_default();
+    let each = |get: fn(&Phases) -> f64| mean(&|e| get(&e.phases) / e.iterations as f64);
+    Some(Overhead {
+        iterations: mean(&|e| e.iterations as f64),
+        render_seconds: mean(&|e| e.spent.seconds),
+        combine_seconds: mine[0].combine.map(|_| mean(&|e| combine(e).seconds)),
+        seconds_per_iteration: mean(&|e| (e.spent.seconds + combine(e).seconds) / e.iterations as f64),
+        cpu_seconds_per_iteration: mean(&|e| (e.spent.cpu_seconds + combine(e).cpu_seconds) / e.iterations as f64),
+        pilot: mean(&|e| e.phases.pilot),
+        light: each(|p| p.light),
+        map: each(|p| p.map),
+        eye: each(|p| p.eye),
+        over_first: 1.0,
+        over_plain: None,
+    })
+}

@@ -1,0 +1,304 @@
+//! The report as one page that needs nothing from outside: pictures, plots and style are in it.
+
+use super::crop;
+use super::number::{minus, short, short_with_error, with_error};
+use super::overhead::Overhead;
+use super::plot::colour;
+use super::summary::{Strip, Subject, Summary};
+use super::target::Reached;
+use crate::error::Result;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const STYLE: &str = include_str!("page.css");
+
+/// The page. `plots` are SVG documents with the headings they go under.
+///
+/// # Errors
+/// None that memory would not have.
+pub fn html(subject: &Subject, summary: &Summary, plots: &[(&str, &str)]) -> Result<String> {
+    let bar = data_url(&crop::heat_bar()?);
+    let title = format!("Accuracy against time: {}", subject.scene);
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (title) }
+                    p.lead { (lead(subject)) }
+                }
+                @for (heading, svg) in plots {
+                    section.plot { h2 { (heading) } (PreEscaped(svg)) }
+                }
+                (targets(subject, summary))
+                (fits(subject, summary))
+                (overheads(subject, summary))
+                (reference(subject, summary))
+                @for strip in &summary.strips { (crops(strip, summary, &bar)) }
+                (runs(subject))
+                (facts(subject, summary))
+                footer { "caustique " (env!("CARGO_PKG_VERSION")) }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+fn lead(subject: &Subject) -> String {
+    let rules = &subject.rules;
+    let each = match (rules.time, rules.iterations) {
+        (Some(time), Some(n)) => format!("{} s or {n} iterations each", short(time)),
+        (Some(time), None) => format!("{} s each", short(time)),
+        (None, Some(n)) => format!("{n} iterations each"),
+        (None, None) => "no end".into(),
+    };
+    let seeds = match rules.seeds.len() {
+        1 => String::new(),
+        n => format!(", means over {n} seeds with standard errors"),
+    };
+    let (width, height) = subject.size;
+    let runs = match subject.entries.len() {
+        1 => "1 run".into(),
+        n => format!("{n} runs in turns of one iteration"),
+    };
+    format!("{runs}, {each}, {width} × {height} pixels{seeds}.")
+}
+
+/// A run's name beside its colour.
+fn name(subject: &Subject, run: usize) -> Markup {
+    let (r, g, b) = colour(run);
+    html! { span.dot style=(format!("background:rgb({r},{g},{b})")) {} (subject.entries[run].name) }
+}
+
+fn targets(subject: &Subject, summary: &Summary) -> Markup {
+    if summary.targets.is_empty() {
+        return html! {};
+    }
+    html! {
+        section {
+            h2 { "Time to a given error" }
+            div.wide { table {
+                thead { tr {
+                    th { "Run" }
+                    @for target in &summary.targets {
+                        th.number colspan="3" { (subject.metric.name()) " ≤ " (short(target.error))
+                            @if !target.of.is_empty() { br; small { (target.of) } } }
+                    }
+                } tr {
+                    th {}
+                    @for _ in &summary.targets { th.number { "iterations" } th.number { "seconds" } th.number { "of first" } }
+                } }
+                tbody { @for run in 0..subject.entries.len() { tr {
+                    td { (name(subject, run)) }
+                    @for reached in &summary.reached { (answer(&reached[run], &reached[0])) }
+                } } }
+            } }
+            p.note { "Where the error first falls to the target; between two measurements it is taken for a power of iterations and of seconds. "
+                "“Of first” is the time over that of the first run. “≤”: the first measurement was below the target already." }
+        }
+    }
+}
+
+fn answer(reached: &Reached, first: &Reached) -> Markup {
+    match reached {
+        Reached::After { iterations, seconds, at_once } => {
+            let bound = if *at_once { "≤ " } else { "" };
+            let share = match first {
+                Reached::After { seconds: base, .. } if base.value > 0.0 => {
+                    format!("{:.0} %", 100.0 * seconds.value / base.value)
+                }
+                _ => "–".into(),
+            };
+            html! {
+                td.number { (bound) (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
+                td.number { (bound) (short_with_error(seconds)) }
+                td.number { (share) }
+            }
+        }
+        Reached::Never(iterations, seconds) => html! {
+            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
+        },
+        Reached::BelowReference => html! { td.dim colspan="3" { "below the reference's error" } },
+        Reached::Unknown => html! { td.dim colspan="3" { "not measured" } },
+    }
+}
+
+/// Iterations, interpolated: whole where that says enough.
+fn whole(n: f64) -> String {
+    if n < 10.0 { format!("{n:.1}") } else { format!("{n:.0}") }
+}
+
+fn fits(subject: &Subject, summary: &Summary) -> Markup {
+    let how = if subject.rules.seeds.len() > 1 {
+        "over seeds"
+    } else {
+        "from the scatter about the line; errors of one run at successive moments are not independent, so that it is rather too small (--seeds gives an honest one)"
+    };
+    html! {
+        section {
+            h2 { "Exponents" }
+            div.wide { table {
+                thead { tr { th { "Run" } th.number { "in iterations" } th.number { "theory" } th.number { "in seconds" }
+                    th.number { "points" } th.number { "iterations" } th { "Theory" } } }
+                tbody { @for run in 0..subject.entries.len() {
+                    @let [by_iterations, by_seconds] = &summary.slopes[run];
+                    @let theory = summary.theories[run];
+                    tr {
+                        td { (name(subject, run)) }
+                        td.number { (by_iterations.as_ref().map_or("–".into(), |s| with_error(&s.exponent, 2))) }
+                        td.number { (theory.map_or("–".into(), |t| minus(&format!("{:.2}", t.exponent)))) }
+                        td.number { (by_seconds.as_ref().map_or("–".into(), |s| with_error(&s.exponent, 2))) }
+                        td.number { (by_iterations.as_ref().map_or("–".into(), |s| s.points.to_string())) }
+                        td.number { (by_iterations.as_ref().map_or("–".into(), |s| format!("{}–{}", s.range.0, s.range.1))) }
+                        td { small { (theory.map_or("no closed form", |t| t.because)) } }
+                    }
+                } }
+            } }
+            p.note { "Slopes of the squared error in the log-log plots, by least squares over the last decade of iterations, where there are four measurements at least. Standard errors are "
+                (how) ". Theory is the limit of many iterations." }
+        }
+    }
+}
+
+fn overheads(subject: &Subject, summary: &Summary) -> Markup {
+    let cell = |row: &Option<Overhead>, get: &dyn Fn(&Overhead) -> Option<f64>| {
+        row.as_ref().and_then(get).map_or("–".into(), short)
+    };
+    let percent = |ratio: f64| minus(&format!("{:+.1} %", 100.0 * (ratio - 1.0)));
+    html! {
+        section {
+            h2 { "What it costs" }
+            div.wide { table {
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "render" br; small { "s" } } th.number { "combiner" br; small { "s, once" } }
+                    th.number { "per iteration" br; small { "s" } } th.number { "over first" } th.number { "over same method" }
+                    th.number { "pilot" br; small { "core-s, once" } } th.number { "light" br; small { "core-s" } } th.number { "map" br; small { "core-s" } }
+                    th.number { "eye" br; small { "core-s" } } } }
+                tbody { @for (run, row) in summary.overhead.iter().enumerate() { tr {
+                    td { (name(subject, run)) }
+                    td.number { (row.as_ref().map_or("–".into(), |row| format!("{:.0}", row.iterations))) }
+                    td.number { (cell(row, &|row| Some(row.render_seconds))) }
+                    td.number { (cell(row, &|row| row.combine_seconds)) }
+                    td.number { (cell(row, &|row| Some(row.seconds_per_iteration))) }
+                    td.number { (row.as_ref().filter(|_| run > 0).map_or("–".into(), |row| percent(row.over_first))) }
+                    td.number { (row.as_ref().and_then(|row| row.over_plain).map_or("–".into(), percent)) }
+                    td.number { (cell(row, &|row| Some(row.pilot))) }
+                    td.number { (cell(row, &|row| Some(row.light))) }
+                    td.number { (cell(row, &|row| Some(row.map))) }
+                    td.number { (cell(row, &|row| Some(row.eye))) }
+                } } }
+            } }
+            p.note { "Seconds per iteration are those of pilot, iterations and combiner over the number of iterations. “Over same method” compares with the first run of that method. "
+                "Light, map and eye are processor seconds of one iteration; the methods that weigh strategies path by path count their light paths under eye." }
+        }
+    }
+}
+
+fn reference(subject: &Subject, summary: &Summary) -> Markup {
+    let (width, height) = (subject.size.0 as f64, subject.size.1 as f64);
+    html! {
+        section.reference {
+            h2 { "Reference" }
+            p { (subject.reference.about) ". " (own_error(subject)) }
+            div.frame {
+                @if let Some(whole) = summary.reference.pictures.first() { img src=(data_url(whole)) alt="the reference"; }
+                @for (i, w) in summary.windows.iter().enumerate() {
+                    div.box style=(format!("left:{:.3}%;top:{:.3}%;width:{:.3}%;height:{:.3}%",
+                        100.0 * w.x as f64 / width, 100.0 * w.y as f64 / height,
+                        100.0 * w.width as f64 / width, 100.0 * w.height as f64 / height)) { span { (letter(i)) } }
+                }
+            }
+        }
+    }
+}
+
+fn own_error(subject: &Subject) -> String {
+    let metric = subject.metric.name();
+    match subject.reference.error.of(subject.metric) {
+        Some(own) => format!(
+            "Its own error is {metric} {}. It is taken off every figure, for independent errors add; figures at or below it are not reported.",
+            short(own)
+        ),
+        None => format!("Its own error in {metric} is not known: figures near it say nothing."),
+    }
+}
+
+fn letter(i: usize) -> char {
+    char::from(b'A' + (i % 26) as u8)
+}
+
+fn crops(strip: &Strip, summary: &Summary, bar: &str) -> Markup {
+    html! {
+        section {
+            h2 { (strip.title) }
+            @for window in 0..summary.windows.len() {
+                div.crops {
+                    figure {
+                        @if let Some(png) = summary.reference.pictures.get(window + 1) { img src=(data_url(png)) alt="reference"; }
+                        figcaption { b { (letter(window)) ", reference" }
+                            span.scale { img src=(bar) alt="colours of the heat maps"; span { "0" } span.end { "≥ " (format!("{:.0} %", 100.0 * strip.largest)) } } }
+                    }
+                    @for run in &strip.runs {
+                        figure {
+                            img src=(data_url(&run.pictures[window])) alt=(run.name);
+                            img src=(data_url(&run.heat_maps[window])) alt=(format!("relative error of {}", run.name));
+                            figcaption { b { (run.name) } br; (run.caption) }
+                        }
+                    }
+                }
+            }
+            p.note { "Below each crop its relative error per pixel, the root of the pixel's share of relMSE. Figures are of the whole picture. "
+                "Pictures are those of the measurements nearest to the common time or error." }
+        }
+    }
+}
+
+fn runs(subject: &Subject) -> Markup {
+    html! {
+        section {
+            h2 { "Runs" }
+            div.wide { table {
+                thead { tr { th { "Run" } th { "Method" } th.number { "levels" } th { "combiner" } th.number { "light paths" } th.number { "alpha" } th { "options of caustique render" } } }
+                tbody { @for (run, entry) in subject.entries.iter().enumerate() {
+                    @let (settings, method) = (&entry.settings, entry.settings.method);
+                    tr {
+                        td { (name(subject, run)) }
+                        td { (method.name()) }
+                        td.number { (settings.levels.count) }
+                        td { (entry.combiner.as_deref().unwrap_or("off")) }
+                        td.number { (if method.counts_photons() { settings.photons.to_string() } else { "–".into() }) }
+                        td.number { (if method.has_bandwidths() { short(settings.alpha) } else { "–".into() }) }
+                        td { code { (entry.options) } }
+                    }
+                } }
+            } }
+        }
+    }
+}
+
+fn facts(subject: &Subject, summary: &Summary) -> Markup {
+    html! {
+        section {
+            h2 { "Conditions" }
+            table.facts { tbody {
+                @for (name, value) in subject.settings.iter().chain(&subject.machine) {
+                    tr { th { (name) } td { (value) } }
+                }
+            } }
+            @if !summary.notes.is_empty() {
+                h2 { "Notes" }
+                ul { @for note in &summary.notes { li { (note) } } }
+            }
+        }
+    }
+}
+
+fn data_url(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", STANDARD.encode(png))
+}

@@ -1,0 +1,239 @@
+//! The plots: error against iterations and against seconds, both axes logarithmic, as SVG.
+
+use super::curve::{Axis, Spot};
+use super::number::short;
+use super::summary::{Subject, Summary};
+use crate::error::{Error, Kind, Result};
+use plotters::coord::combinators::LogCoord;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Width and height of a plot.
+const SIZE: (u32, u32) = (860, 520);
+/// Room on the right for the runs' names.
+const NAMES: i32 = 170;
+/// Least distance of two names.
+const LINE: i32 = 17;
+const FONT: &str = "Helvetica, Arial, sans-serif";
+const INK: RGBColor = RGBColor(40, 40, 40);
+const GREY: RGBColor = RGBColor(150, 150, 150);
+const FAINT: RGBColor = RGBColor(228, 228, 228);
+
+/// Colours that all eyes tell apart \[Okabe and Ito 2008\], without the yellow that no paper shows.
+pub const COLOURS: [(u8, u8, u8); 7] =
+    [(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (0, 0, 0)];
+
+/// The colour of a run.
+pub fn colour(run: usize) -> (u8, u8, u8) {
+    COLOURS[run % COLOURS.len()]
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+
+/// Error against an axis; `None` where no run has a figure to show.
+///
+/// # Errors
+/// None that memory would not have.
+pub fn svg(subject: &Subject, summary: &Summary, axis: Axis) -> Result<Option<String>> {
+    let shown = |run: usize| summary.curves[run].mean.iter().filter(|spot| spot.reported).copied().collect();
+    let curves: Vec<Vec<Spot>> = (0..summary.curves.len()).map(shown).collect();
+    let Some((across, up)) = ranges(&curves, axis) else { return Ok(None) };
+    let mut text = String::new();
+    let drawn = draw(&mut text, subject, summary, &curves, axis, (across, up));
+    drawn.map_err(|cause| Error::new(Kind::Image, "plot", cause))?;
+    Ok(Some(text))
+}
+
+/// What both axes span.
+fn ranges(curves: &[Vec<Spot>], axis: Axis) -> Option<((f64, f64), (f64, f64))> {
+    let span = |values: &dyn Fn(&Spot) -> f64, room: f64| {
+        let all = || curves.iter().flatten().map(values).filter(|v| *v > 0.0 && v.is_finite());
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+        (high > 0.0).then(|| (low / room, (high * room).max(low * 1.5)))
+    };
+    Some((span(&|spot| axis.of(spot), 1.15)?, span(&|spot| spot.figure, 1.4)?))
+}
+
+fn draw(
+    text: &mut String,
+    subject: &Subject,
+    summary: &Summary,
+    curves: &[Vec<Spot>],
+    axis: Axis,
+    ((left, right), (low, high)): ((f64, f64), (f64, f64)),
+) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let root: Area<'_> = SVGBackend::with_string(text, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(12)
+        .margin_right(NAMES)
+        .x_label_area_size(46)
+        .y_label_area_size(74)
+        .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(if axis == Axis::Iterations { "iterations" } else { "seconds (wall clock)" })
+        .y_desc(subject.metric.name())
+        .x_label_formatter(&|x| tick(*x))
+        .y_label_formatter(&|y| tick(*y))
+        .x_labels(8)
+        .y_labels(8)
+        .axis_style(GREY)
+        .bold_line_style(FAINT)
+        .light_line_style(WHITE)
+        .label_style((FONT, 15).into_font().color(&INK))
+        .axis_desc_style((FONT, 16).into_font().color(&INK))
+        .draw()?;
+    floor(&mut chart, subject, (left, right), low)?;
+    if axis == Axis::Iterations {
+        guides(&mut chart, summary, (left, right), (low, high))?;
+    }
+    for (run, curve) in curves.iter().enumerate() {
+        series(&mut chart, run, curve, axis)?;
+    }
+    names(&root, &chart, subject, curves, axis)?;
+    root.present()?;
+    Ok(())
+}
+
+/// A run's line, markers and, with several seeds, bars of one standard error.
+fn series(
+    chart: &mut Chart<'_, '_>,
+    run: usize,
+    curve: &[Spot],
+    axis: Axis,
+) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let (r, g, b) = colour(run);
+    let ink = RGBColor(r, g, b);
+    let points: Vec<(f64, f64)> = curve.iter().map(|spot| (axis.of(spot), spot.figure)).collect();
+    chart.draw_series(LineSeries::new(points.iter().copied(), ink.stroke_width(2)))?;
+    let bar = |spot: &Spot| {
+        let spread = spot.spread?;
+        let (x, low) = (axis.of(spot), (spot.figure - spread).max(0.1 * spot.figure));
+        Some(PathElement::new(vec![(x, low), (x, spot.figure + spread)], ink.stroke_width(1)))
+    };
+    chart.draw_series(curve.iter().filter_map(bar))?;
+    // Beyond seven runs colours come again, with other markers.
+    if run < COLOURS.len() {
+        chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, ink.filled())))?;
+    } else {
+        chart.draw_series(points.iter().map(|&point| TriangleMarker::new(point, 5, ink.filled())))?;
+    }
+    Ok(())
+}
+
+/// The reference's own error, if that is near what is shown.
+fn floor(
+    chart: &mut Chart<'_, '_>,
+    subject: &Subject,
+    (left, right): (f64, f64),
+    low: f64,
+) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let Some(own) = subject.reference.error.of(subject.metric).filter(|own| *own > low) else { return Ok(()) };
+    let ends = [(left, own), (right, own)];
+    chart.draw_series(DashedLineSeries::new(ends, 6, 4, GREY.stroke_width(1)))?;
+    let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
+    chart.draw_series([Text::new(" the reference's own error", (left, own), style)])?;
+    Ok(())
+}
+
+/// Thin lines with the exponents of theory, through the left upper corner.
+fn guides(
+    chart: &mut Chart<'_, '_>,
+    summary: &Summary,
+    (left, right): (f64, f64),
+    (low, high): (f64, f64),
+) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let mut exponents: Vec<f64> =
+        summary.theories.iter().flatten().map(|theory| theory.exponent).filter(|e| *e < 0.0).collect();
+    exponents.sort_by(f64::total_cmp);
+    exponents.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+    for exponent in exponents {
+        // Where it leaves the plot, below or on the right.
+        let end = right.min(left * (low / high).powf(1.0 / exponent));
+        let at = |x: f64| high * (x / left).powf(exponent);
+        chart.draw_series(DashedLineSeries::new([(left, high), (end, at(end))], 2, 4, GREY.stroke_width(1)))?;
+        let place = left * (end / left).powf(0.86);
+        let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
+        let name = format!(" N^{}", super::number::minus(&nice(exponent)));
+        chart.draw_series([Text::new(name, (place, at(place)), style)])?;
+    }
+    Ok(())
+}
+
+/// `-2/3`, `-1`, `-0.5`.
+fn nice(exponent: f64) -> String {
+    let thirds = exponent * 3.0;
+    if (thirds - thirds.round()).abs() < 1e-6 && thirds.round() as i64 % 3 != 0 {
+        return format!("{}/3", thirds.round());
+    }
+    format!("{exponent}")
+}
+
+/// Every run's name beside the end of its line, moved apart where they would overlap.
+fn names(
+    root: &Area<'_>,
+    chart: &Chart<'_, '_>,
+    subject: &Subject,
+    curves: &[Vec<Spot>],
+    axis: Axis,
+) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let end = |(run, curve): (usize, &Vec<Spot>)| {
+        let spot = curve.last()?;
+        let (x, y) = chart.backend_coord(&(axis.of(spot), spot.figure));
+        Some((run, x, y))
+    };
+    let mut ends: Vec<(usize, i32, i32)> = curves.iter().enumerate().filter_map(end).collect();
+    ends.sort_by_key(|end| end.2);
+    let mut places: Vec<i32> = ends.iter().map(|end| end.2).collect();
+    for i in 1..places.len() {
+        places[i] = places[i].max(places[i - 1] + LINE);
+    }
+    let limit = SIZE.1 as i32 - 60;
+    for i in (0..places.len()).rev() {
+        let below = if i + 1 < places.len() { places[i + 1] - LINE } else { limit };
+        places[i] = places[i].min(below);
+    }
+    let margin = SIZE.0 as i32 - NAMES + 10;
+    for ((run, x, y), place) in ends.into_iter().zip(places) {
+        let (r, g, b) = colour(run);
+        let ink = RGBColor(r, g, b);
+        let leader = vec![(x + 5, y), (margin - 4, place)];
+        root.draw(&PathElement::new(leader, ink.mix(0.35).stroke_width(1)))?;
+        let style = (FONT, 15).into_font().color(&ink).pos(Pos::new(HPos::Left, VPos::Center));
+        root.draw(&Text::new(clip(&subject.entries[run].name), (margin, place), style))?;
+    }
+    Ok(())
+}
+
+/// A name that fits beside the plot; the page's tables have it whole.
+fn clip(name: &str) -> String {
+    const MOST: usize = 21;
+    if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
+}
+
+/// A number on an axis.
+fn tick(x: f64) -> String {
+    let shown = short(x);
+    let plain = |text: &str| {
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text.to_string() }
+    };
+    match shown.split_once('e') {
+        Some((digits, power)) => format!("{}e{}", plain(digits), super::number::minus(power)),
+        None => plain(&shown),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_and_exponents_are_short() {
+        assert_eq!([1000.0, 0.001, 0.5, 2e-5, 1e6].map(tick), ["1000", "0.001", "0.5", "2e−5", "1e6"]);
+        assert_eq!([-1.0, -2.0 / 3.0, -0.5].map(nice), ["-1", "-2/3", "-0.5"]);
+        assert_eq!(clip("sppm"), "sppm");
+        assert_eq!(clip(&"x".repeat(40)).chars().count(), 21);
+    }
+}

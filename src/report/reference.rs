@@ -1,0 +1,236 @@
+//! The picture that all others are judged by, and how wrong it is itself.
+//!
+//! A reference made here is the mean `(a + b) / 2` of two independent halves of as many iterations each. If a half has the variance `v`, the mean has `v / 2`, and
+//! `(a - b)^2` expects `2 v`: a quarter of the halves' squared difference estimates the squared error of the mean. What both
+//! halves have in common, the bias of a method that has some, does not show in it.
+
+use super::entry::Metric;
+use crate::camera::Camera;
+use crate::error::{Error, Kind, Result};
+use crate::film::{Layer, LayerSet};
+use crate::image::exr::{self, Attributes};
+use crate::image::{Errors, relative_squared_error, squared_error};
+use crate::render::{Control, Session, Settings, Stage};
+use crate::scene::Scene;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A reference's own error, as [`Errors`] measures it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OwnError {
+    /// Mean relative squared error.
+    pub relmse: Option<f64>,
+    /// Mean squared error.
+    pub mse: Option<f64>,
+}
+
+impl OwnError {
+    /// In a metric; `None` if it is not known.
+    pub fn of(&self, metric: Metric) -> Option<f64> {
+        match metric {
+            Metric::RelMse => self.relmse,
+            Metric::Mse => self.mse,
+        }
+    }
+
+    /// An error in one metric.
+    pub fn in_metric(metric: Metric, error: f64) -> OwnError {
+        match metric {
+            Metric::RelMse => OwnError { relmse: Some(error), mse: None },
+            Metric::Mse => OwnError { relmse: None, mse: Some(error) },
+        }
+    }
+}
+
+/// The reference.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Pixels, row by row from the top.
+    pub picture: Vec<[f32; 3]>,
+    /// Its own error.
+    pub error: OwnError,
+    /// Where it is from, for people.
+    pub about: String,
+}
+
+impl Reference {
+    /// A picture's error without the reference's own, in a metric; `None` where too little is left: no figure below the reference's own error is
+    /// reported.
+    ///
+    /// Errors of the picture and of the reference are independent, so their squares add in what is measured.
+    pub fn figure(&self, metric: Metric, errors: &Errors) -> Option<f64> {
+        let own = self.error.of(metric).unwrap_or(0.0);
+        let figure = metric.of(errors) - own;
+        (figure > own && figure > 0.0).then_some(figure)
+    }
+
+    /// Reads one, with the error that its header tells, if it is ours. Also returns the header's object.
+    ///
+    /// # Errors
+    /// A file that cannot be read, without a picture, or of another size.
+    pub fn read(path: &Path, size: (u32, u32)) -> Result<(Reference, Value)> {
+        let (set, attributes) = exr::read(path)?;
+        let (width, height) = (size.0 as usize, size.1 as usize);
+        if (set.width, set.height) != (width, height) {
+            let cause = format!("the reference has {} x {} pixels, not {width} x {height}", set.width, set.height);
+            let error = Error::new(Kind::Usage, path.display(), cause);
+            return Err(error.hint(format!("use --width {} --height {}", set.width, set.height)));
+        }
+        let picture = set.beauty().map_err(|error| error.within(path.display()))?;
+        if !picture.iter().flatten().any(|v| v.is_finite()) {
+            return Err(Error::new(Kind::Image, path.display(), "the reference has no finite value"));
+        }
+        let header = attributes.object().unwrap_or(Value::Null);
+        let about = path.display().to_string();
+        Ok((Reference { width, height, picture, error: told(&header), about }, header))
+    }
+
+    /// Writes it as a beauty with its estimated standard error, and its own error in the header.
+    ///
+    /// # Errors
+    /// The file system.
+    pub fn write(&self, path: &Path, halves: &Halves) -> Result<()> {
+        let mut set = LayerSet::new(self.width, self.height);
+        set.push(Layer::interleaved("", "RGB", self.picture.iter().copied()))?;
+        let errors = halves.a.iter().zip(&halves.b);
+        let errors = errors.map(|(a, b)| std::array::from_fn::<f32, 3, _>(|c| 0.5 * (a[c] - b[c]).abs()));
+        set.push(Layer::interleaved("Error", "RGB", errors))?;
+        let header = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "method": halves.method,
+            "seeds": halves.seeds,
+            "iterations": 2 * halves.iterations,
+            "seconds": halves.seconds,
+            "reference_error": {"relmse": self.error.relmse, "mse": self.error.mse},
+            "reference_error_of": "a quarter of the squared difference of two independent halves",
+        });
+        exr::write(path, &set, &Attributes::of(&header)?, exr::Options::default())
+    }
+}
+
+/// The error that a header of ours tells: as a reference, or as a render that was not combined and estimates itself.
+fn told(header: &Value) -> OwnError {
+    let own = &header["reference_error"];
+    if own.is_object() {
+        return OwnError { relmse: own["relmse"].as_f64(), mse: own["mse"].as_f64() };
+    }
+    let estimate = header["error"].as_f64().filter(|_| header["combined"].is_null());
+    OwnError { relmse: estimate.map(|error| error * error), mse: None }
+}
+
+/// Two independent renders of as many iterations.
+pub struct Halves {
+    /// One.
+    pub a: Vec<[f32; 3]>,
+    /// The other.
+    pub b: Vec<[f32; 3]>,
+    /// Their method.
+    pub method: &'static str,
+    /// Their seeds.
+    pub seeds: [u64; 2],
+    /// Iterations of each.
+    pub iterations: u64,
+    /// Wall-clock seconds of both.
+    pub seconds: f64,
+}
+
+impl Halves {
+    /// Renders both in turns until `settings` say stop, iterations counting for each and time for both together; at least two iterations.
+    /// `observe` gets iterations of each and seconds, and may stop it.
+    pub fn render(
+        scene: &Scene,
+        camera: &Camera,
+        settings: &Settings,
+        mut observe: impl FnMut(u64, f64) -> Control,
+    ) -> Halves {
+        // Numbers that nobody gives to a render.
+        let seeds = [0, 1].map(|half| settings.seed ^ (0x8000_cafe_0000_0000 + half));
+        let stages = seeds.map(|seed| Stage::new(scene, camera, &Settings { seed, ..settings.clone() }));
+        let [mut a, mut b] = [0, 1].map(|half| Session::new(&stages[half]));
+        loop {
+            a.step();
+            b.step();
+            let seconds = a.spent().seconds + b.spent().seconds;
+            let stopped = observe(a.iterations(), seconds) == Control::Stop;
+            if a.iterations() >= 2 && (stopped || a.finished() || settings.time.is_some_and(|time| seconds >= time)) {
+                break;
+            }
+        }
+        Halves {
+            seeds,
+            method: settings.method.name(),
+            iterations: a.iterations(),
+            seconds: a.spent().seconds + b.spent().seconds,
+            a: a.picture(),
+            b: b.picture(),
+        }
+    }
+
+    /// Their mean, and its error.
+    pub fn reference(&self, (width, height): (u32, u32)) -> Reference {
+        let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+        let picture: Vec<[f32; 3]> = self.a.iter().zip(&self.b).map(mean).collect();
+        let about = format!(
+            "two independent halves by {}, {} iterations each, {:.0} s in all",
+            self.method, self.iterations, self.seconds
+        );
+        let error = own_error(&self.a, &self.b);
+        Reference { width: width as usize, height: height as usize, picture, error, about }
+    }
+}
+
+/// The error of the mean of two independent halves: a quarter of their squared difference.
+pub fn own_error(a: &[[f32; 3]], b: &[[f32; 3]]) -> OwnError {
+    let (mut relmse, mut mse, mut count) = (0.0, 0.0, 0u64);
+    for (a, b) in a.iter().zip(b).filter(|(a, b)| a.iter().chain(*b).all(|v| v.is_finite())) {
+        let mean: [f32; 3] = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+        // Half the difference is the distance of either from the mean.
+        relmse += relative_squared_error(*a, mean);
+        mse += squared_error(*a, mean);
+        count += 1;
+    }
+    let mean = |sum: f64| (count > 0).then(|| sum / count as f64);
+    OwnError { relmse: mean(relmse), mse: mean(mse) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::errors;
+    use crate::random::{Domain, Purpose, Stream};
+
+    /// Pictures of known truth and noise: the stated error is that against the truth. Over 20000 pixels its standard error is below one
+    /// percent; the halves' difference itself would be four times as much, half of it twice.
+    #[test]
+    fn the_stated_error_of_two_halves_is_their_means_error() {
+        let noisy = |seed: u64| -> Vec<[f32; 3]> {
+            let pixel = |i: u64| {
+                let truth = 0.2 + (i % 7) as f32;
+                std::array::from_fn(|c| {
+                    let u = Stream::new(seed, 1 + c as u64, Domain::Test, i).vertex(0).two(Purpose::Pixel).x;
+                    truth * (1.0 + 0.3 * (u - 0.5))
+                })
+            };
+            (0..20_000).map(pixel).collect()
+        };
+        let (a, b) = (noisy(1), noisy(2));
+        let truth: Vec<[f32; 3]> = (0..20_000).map(|i| [0.2 + (i % 7) as f32; 3]).collect();
+        let halves = Halves { a, b, method: "path", seeds: [1, 2], iterations: 2, seconds: 1.0 };
+        let reference = halves.reference((200, 100));
+        let real = errors(&reference.picture, &truth).expect("finite pixels");
+        let stated = reference.error;
+        assert!((stated.mse.expect("known") / real.mse - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
+        assert!((stated.relmse.expect("known") / real.relmse - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
+        // Against this reference an independent picture's figure is its true error.
+        let other = noisy(3);
+        let measured = errors(&other, &reference.picture).expect("finite pixels");
+        let figure = reference.figure(Metric::Mse, &measured).expect("twice the reference's error");
+        let true_error = errors(&other, &truth).expect("finite pixels").mse;
+        assert!((figure / true_error - 1.0).abs() < 0.04, "{figure}, {true_error}");
+        assert_eq!(reference.figure(Metric::Mse, &errors(&halves.a, &reference.picture).expect("finite")), None);
+    }
+}

@@ -1,0 +1,234 @@
+//! A race with all that is told from it: what [`data`](super::data), [`plot`](super::plot) and [`page`](super::page) write down.
+
+use super::crop::{self, Look, Window};
+use super::curve::{Axis, Curve, Slope};
+use super::entry::{Entry, Metric};
+use super::overhead::{self, Overhead};
+use super::race::{Outcome, Point, Rules};
+use super::reference::Reference;
+use super::target::{self, Reached, Target};
+use super::theory::{Theory, theory};
+use crate::error::Result;
+use serde_json::Value;
+
+/// What was compared and how.
+pub struct Subject {
+    /// The scene's name for people.
+    pub scene: String,
+    /// Size of the picture.
+    pub size: (u32, u32),
+    /// The entries.
+    pub entries: Vec<Entry>,
+    /// Seeds, moments, ends.
+    pub rules: Rules,
+    /// The figure of curves, targets and fits.
+    pub metric: Metric,
+    /// The reference.
+    pub reference: Reference,
+    /// Processor, threads, versions: names and values.
+    pub machine: Vec<(String, String)>,
+    /// Options that concern all runs.
+    pub settings: Vec<(String, String)>,
+}
+
+/// A picture of the report as PNG, with what stands below it.
+pub struct Shown {
+    /// The run's name, or the reference's.
+    pub name: String,
+    /// Iterations, seconds, error; empty for the reference.
+    pub caption: String,
+    /// A PNG per window.
+    pub pictures: Vec<Vec<u8>>,
+    /// A heat map per window; none for the reference.
+    pub heat_maps: Vec<Vec<u8>>,
+}
+
+/// Crops of all runs at moments that have something in common.
+pub struct Strip {
+    /// What it is.
+    pub title: String,
+    /// The runs.
+    pub runs: Vec<Shown>,
+    /// The relative error that is palest in the heat maps.
+    pub largest: f64,
+}
+
+/// Everything that is told.
+pub struct Summary {
+    /// A curve per entry.
+    pub curves: Vec<Curve>,
+    /// Fitted exponents per entry, by iterations and by seconds.
+    pub slopes: Vec<[Option<Slope>; 2]>,
+    /// What theory says, per entry.
+    pub theories: Vec<Option<Theory>>,
+    /// Errors to reach.
+    pub targets: Vec<Target>,
+    /// Per target and entry.
+    pub reached: Vec<Vec<Reached>>,
+    /// Per entry.
+    pub overhead: Vec<Option<Overhead>>,
+    /// Parts of the picture that are shown.
+    pub windows: Vec<Window>,
+    /// The reference, whole and in parts.
+    pub reference: Shown,
+    /// Crops at equal time and at equal error.
+    pub strips: Vec<Strip>,
+    /// Remarks.
+    pub notes: Vec<String>,
+}
+
+/// What decides about the report, besides the race.
+pub struct Wishes {
+    /// Targets that were asked for; the usual ones otherwise.
+    pub targets: Vec<f64>,
+    /// More targets: the error of a run (from 0) after so many iterations.
+    pub targets_of: Vec<(usize, u64)>,
+    /// Windows to show; where runs differ most otherwise.
+    pub windows: Vec<Window>,
+    /// Exposure and tone curve.
+    pub look: Look,
+    /// Remarks from outside.
+    pub notes: Vec<String>,
+}
+
+/// Tells everything from a race.
+///
+/// # Errors
+/// Pictures that cannot be read again.
+pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> Result<Summary> {
+    let Subject { entries, metric, reference, .. } = subject;
+    let own = reference.error.of(*metric).unwrap_or(0.0);
+    let curves: Vec<Curve> =
+        (0..entries.len()).map(|run| Curve::of(run, &outcome.points, *metric, reference)).collect();
+    let mut notes = wishes.notes.clone();
+    let mut targets: Vec<Target> = wishes.targets.iter().map(|&error| Target { error, of: String::new() }).collect();
+    for &(run, iterations) in &wishes.targets_of {
+        let name = &entries[run].name;
+        match curves[run].mean.iter().find(|spot| spot.iterations == iterations) {
+            Some(spot) => {
+                targets.push(Target { error: spot.figure, of: format!("{name} after {iterations} iterations") });
+            }
+            None => notes.push(format!("{name} ended before {iterations} iterations: no target from there.")),
+        }
+    }
+    if targets.is_empty() {
+        targets = target::usual(&curves, own);
+    }
+    let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error, own)).collect()).collect();
+    let left_out = outcome.points.iter().filter(|p| reference.figure(*metric, &p.errors).is_none()).count();
+    if left_out > 0 {
+        notes.push(format!(
+            "{left_out} of {} measurements are at or below the reference's own error and are not reported.",
+            outcome.points.len()
+        ));
+    }
+    notes.extend(outcome.failures.iter().map(|error| format!("A run ended early: {error}.")));
+    if outcome.interrupted {
+        notes.push("The comparison was stopped before its end; this is what was done.".into());
+    }
+    let (windows, whole, strips) = pictures(subject, outcome, wishes, &curves)?;
+    Ok(Summary {
+        slopes: curves.iter().map(|curve| [Axis::Iterations, Axis::Seconds].map(|axis| curve.slope(axis))).collect(),
+        theories: entries.iter().map(|entry| theory(&entry.settings)).collect(),
+        curves,
+        targets,
+        reached,
+        overhead: overhead::table(entries, &outcome.endings),
+        windows,
+        reference: whole,
+        strips,
+        notes,
+    })
+}
+
+/// The points of a run whose pictures are kept.
+fn kept(points: &[Point], run: usize) -> impl Iterator<Item = &Point> {
+    points.iter().filter(move |point| point.run == run && point.picture.is_some())
+}
+
+/// The windows, the reference, and the crops.
+fn pictures(
+    subject: &Subject,
+    outcome: &mut Outcome,
+    wishes: &Wishes,
+    curves: &[Curve],
+) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
+    let Subject { entries, metric, reference, .. } = subject;
+    let (width, height) = (reference.width, reference.height);
+    let raw = |point: &Point| metric.of(&point.errors);
+    // The time that all runs have, and the error that all have reached.
+    let last = |run: usize| kept(&outcome.points, run).last();
+    let ends: Vec<&Point> = (0..entries.len()).filter_map(last).collect();
+    let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
+    let error = ends.iter().map(|p| raw(p)).fold(0.0, f64::max);
+    let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
+        let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
+        (0..entries.len()).filter_map(of_run).collect()
+    };
+    let at_time = nearest(&|p| (p.seconds / time).ln().abs());
+    let at_error = nearest(&|p| (raw(p) / error).ln().abs());
+
+    let mut load = |points: &[Point]| -> Result<Vec<Vec<[f32; 3]>>> {
+        points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
+    };
+    let (timed, equal) = (load(&at_time)?, load(&at_error)?);
+    let mut windows = wishes.windows.clone();
+    if windows.is_empty() && !timed.is_empty() {
+        windows = crop::choose(&timed, &reference.picture, (width, height), 2);
+    }
+    let strip = |title: String, points: &[Point], pictures: &[Vec<[f32; 3]>]| -> Result<Strip> {
+        let largest = crop::scale(pictures, &reference.picture, width, &windows);
+        let shown = |(point, picture): (&Point, &Vec<[f32; 3]>)| -> Result<Shown> {
+            let spot = curves[point.run]
+                .by_seed
+                .first()
+                .and_then(|curve| curve.iter().find(|spot| spot.iterations == point.iterations && spot.reported));
+            let figure = spot.map_or("below the reference's error".into(), |spot| {
+                format!("{} {}", metric.name(), super::number::short(spot.figure))
+            });
+            let seconds = super::number::short(point.seconds);
+            Ok(Shown {
+                name: entries[point.run].name.clone(),
+                caption: format!("{} iterations, {seconds} s, {figure}", point.iterations),
+                pictures: windows
+                    .iter()
+                    .map(|w| crop::picture(picture, width, *w, wishes.look))
+                    .collect::<Result<_>>()?,
+                heat_maps: windows
+                    .iter()
+                    .map(|w| crop::heat_map(picture, &reference.picture, width, *w, largest))
+                    .collect::<Result<_>>()?,
+            })
+        };
+        Ok(Strip { title, runs: points.iter().zip(pictures).map(shown).collect::<Result<_>>()?, largest })
+    };
+    let mut strips = Vec::new();
+    if !timed.is_empty() {
+        strips.push(strip(format!("At equal time: about {} s", super::number::short(time)), &at_time, &timed)?);
+        let own = reference.error.of(*metric).unwrap_or(0.0);
+        let title = format!("At equal error: {} about {}", metric.name(), super::number::short((error - own).max(0.0)));
+        strips.push(strip(title, &at_error, &equal)?);
+    }
+    let mut parts = vec![Window::whole(width, height)];
+    parts.extend(&windows);
+    let truth = Shown {
+        name: "reference".into(),
+        caption: String::new(),
+        pictures: parts
+            .into_iter()
+            .map(|part| crop::picture(&reference.picture, width, part, wishes.look))
+            .collect::<Result<_>>()?,
+        heat_maps: Vec::new(),
+    };
+    Ok((windows, truth, strips))
+}
+
+/// The run of a name.
+pub fn find(entries: &[Entry], name: &str) -> Option<usize> {
+    entries.iter().position(|entry| entry.name == name)
+}
+
+/// A value that JSON can hold.
+pub(super) fn finite(x: f64) -> Value {
+    if x.is_finite() { x.into() } else { Value::Null }
+}

@@ -1,0 +1,43 @@
+//! How fast the squared error should fall with iterations.
+
+use crate::render::{Method, Settings};
+
+/// An exponent of the squared error in the number of iterations, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Theory {
+    /// In the limit of many iterations.
+    pub exponent: f64,
+    /// The reason, in a clause.
+    pub because: &'static str,
+}
+
+/// What theory says of a method; `None` where it says nothing in closed form.
+///
+/// With squared bandwidths that shrink as i^(alpha - 1) the variance of the mean falls as N^-alpha and its squared bias as N^(2 alpha - 2) \[Knaus and Zwicker
+/// 2011\]; the slower of the two is the exponent, best at alpha = 2/3 \[Kaplanyan and Dachsbacher 2013\].
+pub fn theory(settings: &Settings) -> Option<Theory> {
+    let kernel = -settings.alpha.min(2.0 - 2.0 * settings.alpha);
+    let (exponent, because) = match settings.method {
+        Method::Path | Method::Light | Method::Bdpt => (-1.0, "unbiased: variance alone, N^-1"),
+        Method::Sppm | Method::Bpm => (kernel, "the slower of variance N^-alpha and squared bias N^(2 alpha - 2)"),
+        Method::Vcm => (kernel, "of what is merged; where connections do, N^-1"),
+        Method::Pm => (0.0, "one map: its error stays"),
+        _ => return None,
+    };
+    // Not -0.
+    Some(Theory { exponent: exponent + 0.0, because })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memoryless_rule_is_best_at_two_thirds() {
+        let of = |alpha| theory(&Settings { alpha, ..Settings::default() }).map(|t| t.exponent);
+        assert_eq!(of(2.0 / 3.0), Some(-2.0 / 3.0));
+        assert_eq!((of(0.75), of(0.5), of(1.0)), (Some(-0.5), Some(-0.5), Some(0.0)));
+        assert_eq!(theory(&Settings { method: Method::Path, ..Settings::default() }).map(|t| t.exponent), Some(-1.0));
+        assert_eq!(theory(&Settings { method: Method::Cppm, ..Settings::default() }), None);
+    }
+}
