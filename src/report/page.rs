@@ -1,7 +1,7 @@
 //! The report as one page that needs nothing from outside: pictures, plots and style are in it.
 
 use super::crop;
-use super::number::{minus, short, short_with_error, with_error};
+use super::number::{minus, plain, short, short_with_error, with_error};
 use super::overhead::Overhead;
 use super::plot::colour;
 use super::summary::{Strip, Subject, Summary};
@@ -54,8 +54,8 @@ pub fn html(subject: &Subject, summary: &Summary, plots: &[(&str, &str)]) -> Res
 fn lead(subject: &Subject) -> String {
     let rules = &subject.rules;
     let each = match (rules.time, rules.iterations) {
-        (Some(time), Some(n)) => format!("{} s or {n} iterations each", short(time)),
-        (Some(time), None) => format!("{} s each", short(time)),
+        (Some(time), Some(n)) => format!("{} s or {n} iterations each", plain(time)),
+        (Some(time), None) => format!("{} s each", plain(time)),
         (None, Some(n)) => format!("{n} iterations each"),
         (None, None) => "no end".into(),
     };
@@ -88,19 +88,19 @@ fn targets(subject: &Subject, summary: &Summary) -> Markup {
                 thead { tr {
                     th { "Run" }
                     @for target in &summary.targets {
-                        th.number colspan="3" { (subject.metric.name()) " ≤ " (short(target.error))
+                        th.number.group colspan="3" { (subject.metric.name()) " ≤ " (plain(target.error))
                             @if !target.of.is_empty() { br; small { (target.of) } } }
                     }
                 } tr {
                     th {}
-                    @for _ in &summary.targets { th.number { "iterations" } th.number { "seconds" } th.number { "of first" } }
+                    @for _ in &summary.targets { th.number.group { "iterations" } th.number { "seconds" } th.number { "of first" } }
                 } }
                 tbody { @for run in 0..subject.entries.len() { tr {
                     td { (name(subject, run)) }
                     @for reached in &summary.reached { (answer(&reached[run], &reached[0])) }
                 } } }
             } }
-            p.note { "Where the error first falls to the target; between two measurements it is taken for a power of iterations and of seconds. "
+            p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
                 "“Of first” is the time over that of the first run. “≤”: the first measurement was below the target already." }
         }
     }
@@ -117,16 +117,16 @@ fn answer(reached: &Reached, first: &Reached) -> Markup {
                 _ => "–".into(),
             };
             html! {
-                td.number { (bound) (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
+                td.number.group { (bound) (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
                 td.number { (bound) (short_with_error(seconds)) }
                 td.number { (share) }
             }
         }
         Reached::Never(iterations, seconds) => html! {
-            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
+            td.number.dim.group { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
         },
-        Reached::BelowReference => html! { td.dim colspan="3" { "below the reference's error" } },
-        Reached::Unknown => html! { td.dim colspan="3" { "not measured" } },
+        Reached::BelowReference => html! { td.number.dim colspan="3" { "below the reference's error" } },
+        Reached::Unknown => html! { td.number.dim colspan="3" { "not measured" } },
     }
 }
 

@@ -175,7 +175,7 @@ impl Halves {
         let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
         let picture: Vec<[f32; 3]> = self.a.iter().zip(&self.b).map(mean).collect();
         let about = format!(
-            "two independent halves by {}, {} iterations each, {:.0} s in all",
+            "Two independent halves by {}, {} iterations each, {:.0} s in all",
             self.method, self.iterations, self.seconds
         );
         let error = own_error(&self.a, &self.b);

@@ -114,7 +114,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> R
     if targets.is_empty() {
         targets = target::usual(&curves, own);
     }
-    let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error, own)).collect()).collect();
+    let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error)).collect()).collect();
     let left_out = outcome.points.iter().filter(|p| reference.figure(*metric, &p.errors).is_none()).count();
     if left_out > 0 {
         notes.push(format!(
