@@ -38,6 +38,11 @@ pub fn short_with_error(mean: &Mean) -> String {
     }
 }
 
+/// `1 iteration`, `12 iterations`.
+pub fn iterations(n: u64) -> String {
+    if n == 1 { "1 iteration".into() } else { format!("{n} iterations") }
+}
+
 /// The typographic minus.
 pub fn minus(text: &str) -> String {
     text.replace('-', "−")

@@ -85,45 +85,42 @@ fn targets(subject: &Subject, summary: &Summary) -> Markup {
         section {
             h2 { "Time to a given error" }
             div.wide { table {
-                thead { tr {
-                    th { "Run" }
-                    @for target in &summary.targets {
-                        th.number.group colspan="3" { (subject.metric.name()) " ≤ " (plain(target.error))
-                            @if !target.of.is_empty() { br; small { (target.of) } } }
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "of first" } } }
+                @for (target, reached) in summary.targets.iter().zip(&summary.reached) {
+                    tbody {
+                        tr.group { th colspan="4" { (subject.metric.name()) " ≤ " (plain(target.error))
+                            @if !target.of.is_empty() { small { " as " (target.of) } } } }
+                        @for run in 0..subject.entries.len() { tr { td { (name(subject, run)) } (answer(&reached[run], &reached[0])) } }
                     }
-                } tr {
-                    th {}
-                    @for _ in &summary.targets { th.number.group { "iterations" } th.number { "seconds" } th.number { "of first" } }
-                } }
-                tbody { @for run in 0..subject.entries.len() { tr {
-                    td { (name(subject, run)) }
-                    @for reached in &summary.reached { (answer(&reached[run], &reached[0])) }
-                } } }
+                }
             } }
             p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
-                "“Of first” is the time over that of the first run. “≤”: the first measurement was below the target already." }
+                "“Of first” is the time over that of the first run. “≤”: the first measurement was below the target already."
+                @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
         }
     }
 }
 
 fn answer(reached: &Reached, first: &Reached) -> Markup {
     match reached {
-        Reached::After { iterations, seconds, at_once } => {
-            let bound = if *at_once { "≤ " } else { "" };
+        Reached::After { iterations, seconds, at_once: true } => html! {
+            td.number { "≤ " (whole(iterations.value)) } td.number { "≤ " (short(seconds.value)) } td.number { "–" }
+        },
+        Reached::After { iterations, seconds, .. } => {
             let share = match first {
-                Reached::After { seconds: base, .. } if base.value > 0.0 => {
+                Reached::After { seconds: base, at_once: false, .. } if base.value > 0.0 => {
                     format!("{:.0} %", 100.0 * seconds.value / base.value)
                 }
                 _ => "–".into(),
             };
             html! {
-                td.number.group { (bound) (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
-                td.number { (bound) (short_with_error(seconds)) }
+                td.number { (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
+                td.number { (short_with_error(seconds)) }
                 td.number { (share) }
             }
         }
         Reached::Never(iterations, seconds) => html! {
-            td.number.dim.group { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
+            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
         },
         Reached::BelowReference => html! { td.number.dim colspan="3" { "below the reference's error" } },
         Reached::Unknown => html! { td.number.dim colspan="3" { "not measured" } },
@@ -254,7 +251,7 @@ fn crops(strip: &Strip, summary: &Summary, bar: &str) -> Markup {
                 }
             }
             p.note { "Below each crop its relative error per pixel, the root of the pixel's share of relMSE. Figures are of the whole picture. "
-                "Pictures are those of the measurements nearest to the common time or error." }
+                "Pictures are those of the measurements nearest to the common time or error, of the first seed." }
         }
     }
 }
