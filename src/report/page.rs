@@ -85,40 +85,40 @@ fn targets(subject: &Subject, summary: &Summary) -> Markup {
         section {
             h2 { "Time to a given error" }
             div.wide { table {
-                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "of first" } } }
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" } } }
                 @for (target, reached) in summary.targets.iter().zip(&summary.reached) {
                     tbody {
                         tr.group { th colspan="4" { (subject.metric.name()) " ≤ " (plain(target.error))
                             @if !target.of.is_empty() { small { " as " (target.of) } } } }
-                        @for run in 0..subject.entries.len() { tr { td { (name(subject, run)) } (answer(&reached[run], &reached[0])) } }
+                        @for run in 0..subject.entries.len() { tr { td { (name(subject, run)) } (answer(&reached[run], base(reached))) } }
                     }
                 }
             } }
             p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
-                "“Of first” is the time over that of the first run. “≤”: the first measurement was below the target already."
+                "“Relative” is the time over that of the first run listed that gets there. “≤”: the first measurement was below the target already."
                 @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
         }
     }
 }
 
-fn answer(reached: &Reached, first: &Reached) -> Markup {
+/// Seconds of the first run that reaches a target, in the order of the list.
+fn base(reached: &[Reached]) -> Option<f64> {
+    reached.iter().find_map(|reached| match reached {
+        Reached::After { seconds, at_once: false, .. } => Some(seconds.value),
+        _ => None,
+    })
+}
+
+fn answer(reached: &Reached, base: Option<f64>) -> Markup {
     match reached {
         Reached::After { iterations, seconds, at_once: true } => html! {
             td.number { "≤ " (whole(iterations.value)) } td.number { "≤ " (short(seconds.value)) } td.number { "–" }
         },
-        Reached::After { iterations, seconds, .. } => {
-            let share = match first {
-                Reached::After { seconds: base, at_once: false, .. } if base.value > 0.0 => {
-                    format!("{:.0} %", 100.0 * seconds.value / base.value)
-                }
-                _ => "–".into(),
-            };
-            html! {
-                td.number { (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
-                td.number { (short_with_error(seconds)) }
-                td.number { (share) }
-            }
-        }
+        Reached::After { iterations, seconds, .. } => html! {
+            td.number { (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
+            td.number { (short_with_error(seconds)) }
+            td.number { (base.map_or("–".into(), |base| format!("{:.0} %", 100.0 * seconds.value / base))) }
+        },
         Reached::Never(iterations, seconds) => html! {
             td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
         },
