@@ -4,6 +4,8 @@ mod support;
 
 #[path = "cli/commands.rs"]
 mod commands;
+#[path = "cli/converge.rs"]
+mod converge;
 #[path = "cli/files.rs"]
 mod files;
 #[path = "cli/running.rs"]

@@ -63,8 +63,9 @@ fn relative_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 /// picture those in which it is largest.
 pub fn choose(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], size: (usize, usize), count: usize) -> Vec<Window> {
     let (width, height) = size;
-    let side = |length: usize| (length / 4).clamp(length.min(24), length.min(160));
-    let (w, h) = (side(width.min(height)), side(width.min(height)));
+    let least = width.min(height);
+    let side = (least / 4).clamp(least.min(24), least.min(160));
+    let (w, h) = (side, side);
     let tables: Vec<Vec<f64>> = pictures.iter().map(|picture| integral(picture, reference, width)).collect();
     let sum = |table: &Vec<f64>, x: usize, y: usize| {
         let at = |x: usize, y: usize| table[y * (width + 1) + x];
@@ -105,13 +106,13 @@ fn integral(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize) -> Vec<f
     table
 }
 
-/// The relative error that is shown as the largest: the 99th percentile over all pictures within the windows, so that a few fireflies do not turn all else black.
+/// The relative error that is shown as the largest: the 95th percentile over all pictures within the windows, so that fireflies do not turn all else black.
 pub fn scale(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], width: usize, windows: &[Window]) -> f64 {
     let pixels = windows.iter().flat_map(|window| window.indices(width));
     let mut errors: Vec<f64> =
         pixels.flat_map(|i| pictures.iter().map(move |picture| relative_error(picture[i], reference[i]))).collect();
     errors.sort_unstable_by(f64::total_cmp);
-    errors.get(errors.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-6)
+    errors.get(errors.len() * 95 / 100).copied().unwrap_or(1.0).max(1e-6)
 }
 
 /// A window of a picture as PNG.

@@ -32,7 +32,7 @@ pub struct Spot {
     pub iterations: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
-    /// The error without the reference's own, not below that.
+    /// The error without the reference's own.
     pub figure: f64,
     /// Its standard error over seeds.
     pub spread: Option<f64>,
@@ -47,6 +47,25 @@ pub struct Curve {
     pub mean: Vec<Spot>,
     /// Of every seed.
     pub by_seed: Vec<Vec<Spot>>,
+    /// The reference's own error.
+    pub own: f64,
+}
+
+/// A share `t` of the way from `a` to `b`: a power where both are above zero.
+pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
+    if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { a + t * (b - a) }
+}
+
+/// Seconds and figure after so many iterations, between two moments as a power of iterations.
+fn at(curve: &[Spot], iterations: u64) -> Option<(f64, f64)> {
+    let next = curve.iter().position(|spot| spot.iterations >= iterations)?;
+    let after = &curve[next];
+    let Some(before) = next.checked_sub(1).map(|i| &curve[i]).filter(|_| after.iterations > iterations) else {
+        return (after.iterations == iterations).then_some((after.seconds, after.figure));
+    };
+    let t =
+        (iterations as f64 / before.iterations as f64).ln() / (after.iterations as f64 / before.iterations as f64).ln();
+    Some((between(before.seconds, after.seconds, t), between(before.figure, after.figure, t)))
 }
 
 /// A fitted exponent.
@@ -82,33 +101,46 @@ impl Axis {
 }
 
 impl Curve {
-    /// The curve of a run with so many seeds.
+    /// The curve of a run.
     pub fn of(run: usize, points: &[Point], metric: Metric, reference: &Reference) -> Curve {
         let own = reference.error.of(metric).unwrap_or(0.0);
-        let mut seeds: Vec<u64> = Vec::new();
-        let mine: Vec<&Point> = points.iter().filter(|point| point.run == run).collect();
-        for point in &mine {
-            if !seeds.contains(&point.seed) {
-                seeds.push(point.seed);
+        let mut by_seed: Vec<(u64, Vec<Spot>)> = Vec::new();
+        for point in points.iter().filter(|point| point.run == run) {
+            let figure = metric.of(&point.errors) - own;
+            let reported = reference.figure(metric, &point.errors).is_some();
+            let Point { iterations, seconds, .. } = *point;
+            let spot = Spot { iterations, seconds, figure, spread: None, reported };
+            match by_seed.iter_mut().find(|(seed, _)| *seed == point.seed) {
+                Some((_, spots)) => spots.push(spot),
+                None => by_seed.push((point.seed, vec![spot])),
             }
         }
-        let spot = |group: &[&Point]| {
-            let figures: Vec<f64> = group.iter().map(|point| metric.of(&point.errors) - own).collect();
-            let mean = Mean::of(&figures)?;
-            let seconds = group.iter().map(|point| point.seconds).sum::<f64>() / group.len() as f64;
-            let reported = mean.value > own && mean.value > 0.0;
-            let figure = mean.value.max(own);
-            Some(Spot { iterations: group[0].iterations, seconds, figure, spread: mean.error, reported })
-        };
-        let curve = |seed: &u64| mine.iter().filter(|p| p.seed == *seed).filter_map(|p| spot(&[p])).collect();
-        let by_seed: Vec<Vec<Spot>> = seeds.iter().map(curve).collect();
-        let mut moments: Vec<u64> = mine.iter().map(|point| point.iterations).collect();
+        Curve::from_seeds(by_seed.into_iter().map(|(_, spots)| spots).collect(), own)
+    }
+
+    /// The mean of curves, as far as all of them go. Those that a clock has stopped end after different numbers of iterations: a curve without a moment
+    /// that another has is interpolated there.
+    pub fn from_seeds(by_seed: Vec<Vec<Spot>>, own: f64) -> Curve {
+        let mut moments: Vec<u64> = by_seed.iter().flatten().map(|spot| spot.iterations).collect();
         moments.sort_unstable();
         moments.dedup();
-        // A mean needs all seeds: runs that a clock stops end after different numbers of iterations.
-        let group = |n: u64| mine.iter().filter(|point| point.iterations == n).copied().collect::<Vec<_>>();
-        let groups = moments.into_iter().map(group).filter(|group| group.len() == seeds.len());
-        Curve { mean: groups.filter_map(|group| spot(&group)).collect(), by_seed }
+        let mean = |&iterations: &u64| {
+            let all: Vec<(f64, f64)> = by_seed.iter().map(|curve| at(curve, iterations)).collect::<Option<_>>()?;
+            let seconds = Mean::of(&all.iter().map(|spot| spot.0).collect::<Vec<_>>())?.value;
+            let figure = Mean::of(&all.iter().map(|spot| spot.1).collect::<Vec<_>>())?;
+            let reported = figure.value > own && figure.value > 0.0;
+            Some(Spot { iterations, seconds, figure: figure.value, spread: figure.error, reported })
+        };
+        Curve { mean: moments.iter().filter_map(mean).collect(), by_seed, own }
+    }
+
+    /// The curves that leave one seed out; none with a single seed.
+    pub fn without_each_seed(&self) -> Vec<Curve> {
+        let without = |left: usize| {
+            let rest = self.by_seed.iter().enumerate().filter(|(seed, _)| *seed != left);
+            Curve::from_seeds(rest.map(|(_, spots)| spots.clone()).collect(), self.own)
+        };
+        if self.by_seed.len() > 1 { (0..self.by_seed.len()).map(without).collect() } else { Vec::new() }
     }
 
     /// Where it ends.
@@ -136,5 +168,33 @@ impl Curve {
             range: (points[0].0, points[points.len() - 1].0),
             points: points.len(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_goes_as_far_as_all_seeds_do() {
+        let spot = |iterations: u64, figure: f64| Spot {
+            iterations,
+            seconds: 0.5 * iterations as f64,
+            figure,
+            spread: None,
+            reported: true,
+        };
+        let power = |factor: f64, moments: &[u64]| moments.iter().map(|&n| spot(n, factor / n as f64)).collect();
+        let curve = Curve::from_seeds(vec![power(1.0, &[1, 2, 4, 8]), power(3.0, &[1, 2, 4, 7])], 0.2);
+        let shown: Vec<(u64, f64)> = curve.mean.iter().map(|spot| (spot.iterations, spot.figure)).collect();
+        assert_eq!(shown.len(), 4);
+        assert_eq!((shown[0], shown[2], shown[3].0), ((1, 2.0), (4, 0.5), 7));
+        assert!((shown[3].1 - 2.0 / 7.0).abs() < 1e-12 && (curve.mean[3].seconds - 3.5).abs() < 1e-12, "{shown:?}");
+        assert_eq!(curve.mean[0].spread, Some(1.0));
+        let slope = curve.slope(Axis::Seconds).expect("four moments");
+        assert!((slope.exponent.value + 1.0).abs() < 1e-12 && slope.exponent.error.is_some_and(|e| e < 1e-12));
+        assert_eq!(curve.without_each_seed()[0].mean[3].iterations, 7);
+        // Without a figure above the reference's own error there is nothing to fit.
+        assert!(Curve::from_seeds(vec![power(0.1, &[1, 2, 4, 8])], 0.2).slope(Axis::Iterations).is_none());
     }
 }

@@ -100,7 +100,7 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
         "interrupted": outcome.interrupted,
         "reference": {
             "from": subject.reference.about,
-            "error": {"relmse": subject.reference.error.relmse, "mse": subject.reference.error.mse},
+            "error": subject.reference.error.object(),
         },
         "runs": runs.collect::<Vec<_>>(),
         "targets": targets.collect::<Vec<_>>(),

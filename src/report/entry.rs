@@ -48,6 +48,9 @@ pub enum Metric {
     /// Mean relative squared error.
     #[default]
     RelMse,
+    /// The same without the worst 0.1 % of pixels.
+    #[serde(rename = "relmse_trimmed")]
+    RelMseTrimmed,
     /// Mean squared error.
     Mse,
 }
@@ -57,6 +60,7 @@ impl Metric {
     pub fn name(self) -> &'static str {
         match self {
             Metric::RelMse => "relMSE",
+            Metric::RelMseTrimmed => "trimmed relMSE",
             Metric::Mse => "MSE",
         }
     }
@@ -65,6 +69,7 @@ impl Metric {
     pub fn of(self, errors: &Errors) -> f64 {
         match self {
             Metric::RelMse => errors.relmse,
+            Metric::RelMseTrimmed => errors.relmse_trimmed,
             Metric::Mse => errors.mse,
         }
     }

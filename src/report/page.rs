@@ -1,7 +1,7 @@
 //! The report as one page that needs nothing from outside: pictures, plots and style are in it.
 
 use super::crop;
-use super::number::{minus, short, short_with_error, with_error};
+use super::number::{minus, plain, short, short_with_error, with_error};
 use super::overhead::Overhead;
 use super::plot::colour;
 use super::summary::{Strip, Subject, Summary};
@@ -54,8 +54,8 @@ pub fn html(subject: &Subject, summary: &Summary, plots: &[(&str, &str)]) -> Res
 fn lead(subject: &Subject) -> String {
     let rules = &subject.rules;
     let each = match (rules.time, rules.iterations) {
-        (Some(time), Some(n)) => format!("{} s or {n} iterations each", short(time)),
-        (Some(time), None) => format!("{} s each", short(time)),
+        (Some(time), Some(n)) => format!("{} s or {n} iterations each", plain(time)),
+        (Some(time), None) => format!("{} s each", plain(time)),
         (None, Some(n)) => format!("{n} iterations each"),
         (None, None) => "no end".into(),
     };
@@ -85,48 +85,45 @@ fn targets(subject: &Subject, summary: &Summary) -> Markup {
         section {
             h2 { "Time to a given error" }
             div.wide { table {
-                thead { tr {
-                    th { "Run" }
-                    @for target in &summary.targets {
-                        th.number colspan="3" { (subject.metric.name()) " ≤ " (short(target.error))
-                            @if !target.of.is_empty() { br; small { (target.of) } } }
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" } } }
+                @for (target, reached) in summary.targets.iter().zip(&summary.reached) {
+                    tbody {
+                        tr.group { th colspan="4" { (subject.metric.name()) " ≤ " (plain(target.error))
+                            @if !target.of.is_empty() { small { " as " (target.of) } } } }
+                        @for run in 0..subject.entries.len() { tr { td { (name(subject, run)) } (answer(&reached[run], base(reached))) } }
                     }
-                } tr {
-                    th {}
-                    @for _ in &summary.targets { th.number { "iterations" } th.number { "seconds" } th.number { "of first" } }
-                } }
-                tbody { @for run in 0..subject.entries.len() { tr {
-                    td { (name(subject, run)) }
-                    @for reached in &summary.reached { (answer(&reached[run], &reached[0])) }
-                } } }
+                }
             } }
-            p.note { "Where the error first falls to the target; between two measurements it is taken for a power of iterations and of seconds. "
-                "“Of first” is the time over that of the first run. “≤”: the first measurement was below the target already." }
+            p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
+                "“Relative” is the time over that of the first run listed that gets there. “≤”: the first measurement was below the target already."
+                @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
         }
     }
 }
 
-fn answer(reached: &Reached, first: &Reached) -> Markup {
+/// Seconds of the first run that reaches a target, in the order of the list.
+fn base(reached: &[Reached]) -> Option<f64> {
+    reached.iter().find_map(|reached| match reached {
+        Reached::After { seconds, at_once: false, .. } => Some(seconds.value),
+        _ => None,
+    })
+}
+
+fn answer(reached: &Reached, base: Option<f64>) -> Markup {
     match reached {
-        Reached::After { iterations, seconds, at_once } => {
-            let bound = if *at_once { "≤ " } else { "" };
-            let share = match first {
-                Reached::After { seconds: base, .. } if base.value > 0.0 => {
-                    format!("{:.0} %", 100.0 * seconds.value / base.value)
-                }
-                _ => "–".into(),
-            };
-            html! {
-                td.number { (bound) (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
-                td.number { (bound) (short_with_error(seconds)) }
-                td.number { (share) }
-            }
-        }
+        Reached::After { iterations, seconds, at_once: true } => html! {
+            td.number { "≤ " (whole(iterations.value)) } td.number { "≤ " (short(seconds.value)) } td.number { "–" }
+        },
+        Reached::After { iterations, seconds, .. } => html! {
+            td.number { (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
+            td.number { (short_with_error(seconds)) }
+            td.number { (base.map_or("–".into(), |base| format!("{:.0} %", 100.0 * seconds.value / base))) }
+        },
         Reached::Never(iterations, seconds) => html! {
             td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
         },
-        Reached::BelowReference => html! { td.dim colspan="3" { "below the reference's error" } },
-        Reached::Unknown => html! { td.dim colspan="3" { "not measured" } },
+        Reached::BelowReference => html! { td.number.dim colspan="3" { "below the reference's error" } },
+        Reached::Unknown => html! { td.number.dim colspan="3" { "not measured" } },
     }
 }
 
@@ -254,7 +251,7 @@ fn crops(strip: &Strip, summary: &Summary, bar: &str) -> Markup {
                 }
             }
             p.note { "Below each crop its relative error per pixel, the root of the pixel's share of relMSE. Figures are of the whole picture. "
-                "Pictures are those of the measurements nearest to the common time or error." }
+                "Pictures are those of the measurements nearest to the common time or error, of the first seed." }
         }
     }
 }

@@ -1,10 +1,10 @@
 //! The plots: error against iterations and against seconds, both axes logarithmic, as SVG.
 
 use super::curve::{Axis, Spot};
-use super::number::short;
+use super::number::{minus, plain};
 use super::summary::{Subject, Summary};
 use crate::error::{Error, Kind, Result};
-use plotters::coord::combinators::LogCoord;
+use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -12,11 +12,14 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 const SIZE: (u32, u32) = (860, 520);
 /// Room on the right for the runs' names.
 const NAMES: i32 = 170;
+/// Most ticks on an axis.
+const TICKS: usize = 12;
 /// Least distance of two names.
 const LINE: i32 = 17;
 const FONT: &str = "Helvetica, Arial, sans-serif";
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GREY: RGBColor = RGBColor(150, 150, 150);
+const GUIDE: RGBColor = RGBColor(190, 190, 190);
 const FAINT: RGBColor = RGBColor(228, 228, 228);
 
 /// Colours that all eyes tell apart \[Okabe and Ito 2008\], without the yellow that no paper shows.
@@ -29,7 +32,9 @@ pub fn colour(run: usize) -> (u8, u8, u8) {
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+/// A logarithmic axis whose ticks are chosen here.
+type Log = WithKeyPoints<LogCoord<f64>>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Log, Log>>;
 
 /// Error against an axis; `None` where no run has a figure to show.
 ///
@@ -55,6 +60,22 @@ fn ranges(curves: &[Vec<Spot>], axis: Axis) -> Option<((f64, f64), (f64, f64))> 
     Some((span(&|spot| axis.of(spot), 1.15)?, span(&|spot| spot.figure, 1.4)?))
 }
 
+/// A logarithmic axis with ticks at powers of ten, and at 2 and 5 times these where there is room.
+fn log(low: f64, high: f64) -> Log {
+    let decades = (high / low).log10();
+    let digits: &[f64] = match decades {
+        d if d < 0.7 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+        d if d < 3.0 => &[1.0, 2.0, 5.0],
+        _ => &[1.0],
+    };
+    let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let every = (decades / TICKS as f64).ceil().max(1.0) as i32;
+    let ticks = powers.filter(|power| power.rem_euclid(every) == 0);
+    let ticks = ticks.flat_map(|power| digits.iter().map(move |digit| digit * 10f64.powi(power)));
+    let ticks = ticks.filter(|tick| (low..=high).contains(tick)).collect();
+    LogCoord::from((low..high).log_scale()).with_key_points(ticks)
+}
+
 fn draw(
     text: &mut String,
     subject: &Subject,
@@ -70,15 +91,15 @@ fn draw(
         .margin_right(NAMES)
         .x_label_area_size(46)
         .y_label_area_size(74)
-        .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
+        .build_cartesian_2d(log(left, right), log(low, high))?;
     chart
         .configure_mesh()
         .x_desc(if axis == Axis::Iterations { "iterations" } else { "seconds (wall clock)" })
         .y_desc(subject.metric.name())
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
-        .x_labels(8)
-        .y_labels(8)
+        .x_label_formatter(&|x| minus(&plain(*x)))
+        .y_label_formatter(&|y| minus(&plain(*y)))
+        .x_labels(TICKS)
+        .y_labels(TICKS)
         .axis_style(GREY)
         .bold_line_style(FAINT)
         .light_line_style(WHITE)
@@ -132,7 +153,7 @@ fn floor(
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let Some(own) = subject.reference.error.of(subject.metric).filter(|own| *own > low) else { return Ok(()) };
     let ends = [(left, own), (right, own)];
-    chart.draw_series(DashedLineSeries::new(ends, 6, 4, GREY.stroke_width(1)))?;
+    chart.draw_series(LineSeries::new(ends, GREY.stroke_width(1)))?;
     let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
     chart.draw_series([Text::new(" the reference's own error", (left, own), style)])?;
     Ok(())
@@ -153,10 +174,10 @@ fn guides(
         // Where it leaves the plot, below or on the right.
         let end = right.min(left * (low / high).powf(1.0 / exponent));
         let at = |x: f64| high * (x / left).powf(exponent);
-        chart.draw_series(DashedLineSeries::new([(left, high), (end, at(end))], 2, 4, GREY.stroke_width(1)))?;
+        chart.draw_series(LineSeries::new([(left, high), (end, at(end))], GUIDE.stroke_width(1)))?;
         let place = left * (end / left).powf(0.86);
         let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
-        let name = format!(" N^{}", super::number::minus(&nice(exponent)));
+        let name = format!(" N^{}", minus(&nice(exponent)));
         chart.draw_series([Text::new(name, (place, at(place)), style)])?;
     }
     Ok(())
@@ -213,25 +234,12 @@ fn clip(name: &str) -> String {
     if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
 }
 
-/// A number on an axis.
-fn tick(x: f64) -> String {
-    let shown = short(x);
-    let plain = |text: &str| {
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text.to_string() }
-    };
-    match shown.split_once('e') {
-        Some((digits, power)) => format!("{}e{}", plain(digits), super::number::minus(power)),
-        None => plain(&shown),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn ticks_and_exponents_are_short() {
-        assert_eq!([1000.0, 0.001, 0.5, 2e-5, 1e6].map(tick), ["1000", "0.001", "0.5", "2e−5", "1e6"]);
+    fn exponents_and_names_are_short() {
         assert_eq!([-1.0, -2.0 / 3.0, -0.5].map(nice), ["-1", "-2/3", "-0.5"]);
         assert_eq!(clip("sppm"), "sppm");
         assert_eq!(clip(&"x".repeat(40)).chars().count(), 21);

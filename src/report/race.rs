@@ -46,7 +46,8 @@ pub struct Point {
     pub seconds: f64,
     /// Processor seconds, likewise.
     pub cpu_seconds: f64,
-    /// Wall-clock seconds of the combiner and its layers, of runs that have one.
+    /// Wall-clock seconds of the combiner and its layers, of runs that have one: the median of all its uses with this seed, which do the same
+    /// work.
     pub combine_seconds: Option<f64>,
     /// Its error as measured against the reference, the reference's own included.
     pub errors: Errors,
@@ -69,7 +70,7 @@ pub struct Ending {
     pub spent: Spent,
     /// Core-seconds by phase.
     pub phases: Phases,
-    /// Time of the combiner's last use.
+    /// Time of the combiner: the median of its uses.
     pub combine: Option<Spent>,
 }
 
@@ -116,7 +117,8 @@ impl Outcome {
 struct Lane<'a> {
     session: Session<'a>,
     moments: Moments,
-    combine: Option<Spent>,
+    /// Times of the combiner.
+    combines: Vec<Spent>,
     measured: u64,
     open: bool,
 }
@@ -148,7 +150,7 @@ impl Lane<'_> {
             let set = session.layers(|name| COMBINED_LAYERS.iter().any(|stem| name.starts_with(stem)))?;
             combiner.run(&LevelStack::of(&set)?)
         })?;
-        self.combine = Some(spent);
+        self.combines.push(spent);
         Ok(picture)
     }
 }
@@ -186,7 +188,7 @@ pub fn race(
         for stage in &stages {
             let session = Session::new(stage);
             let moments = Moments::new(rules.ratio);
-            lanes.push(Lane { session, moments, combine: None, measured: 0, open: true });
+            lanes.push(Lane { session, moments, combines: Vec::new(), measured: 0, open: true });
         }
         while let Some(run) = next(&lanes, rules) {
             lanes[run].session.step();
@@ -216,7 +218,10 @@ pub fn race(
             if lane.open && iterations > lane.measured {
                 outcome.measure(run, seed, round == 0, &mut lane, &mut combiners[run], reference);
             }
-            let (spent, phases, combine) = (lane.session.spent(), lane.session.phases(), lane.combine);
+            let (spent, phases, combine) = (lane.session.spent(), lane.session.phases(), median(&lane.combines));
+            if let Some(combine) = combine {
+                outcome.charge(run, seed, combine);
+            }
             outcome.endings.push(Ending { run, seed, iterations, spent, phases, combine });
             if round == 0 {
                 let stop = if outcome.interrupted { StopReason::Interrupted } else { StopReason::Iterations };
@@ -238,7 +243,23 @@ fn next(lanes: &[Lane<'_>], rules: &Rules) -> Option<usize> {
     open.min_by(|&a, &b| lanes[a].used(rules).total_cmp(&lanes[b].used(rules)))
 }
 
+/// The median by wall clock. The first use of a network is slower than those after it, and so is one that the machine disturbs.
+fn median(times: &[Spent]) -> Option<Spent> {
+    let mut times = times.to_vec();
+    times.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    times.get(times.len() / 2).copied()
+}
+
 impl Outcome {
+    /// Adds the combiner's time to all points of a run.
+    fn charge(&mut self, run: usize, seed: u64, combine: Spent) {
+        for point in self.points.iter_mut().filter(|point| point.run == run && point.seed == seed) {
+            point.seconds += combine.seconds;
+            point.cpu_seconds += combine.cpu_seconds;
+            point.combine_seconds = Some(combine.seconds);
+        }
+    }
+
     /// Adds a point; a run that cannot be measured ends.
     fn measure(
         &mut self,
@@ -273,21 +294,20 @@ impl Outcome {
         combiner: &mut Option<Combiner>,
         reference: &Reference,
     ) -> Result<Option<Point>> {
-        let combines = combiner.is_some();
         let picture = lane.picture(combiner.as_mut())?;
         let iterations = lane.session.iterations();
         lane.measured = iterations;
         let Some(errors) = errors(&picture, &reference.picture) else { return Ok(None) };
-        let (spent, combine) = (lane.session.spent(), lane.combine.filter(|_| combines));
-        let estimate = lane.session.estimate().filter(|_| !combines);
+        let spent = lane.session.spent();
+        let estimate = lane.session.estimate().filter(|_| combiner.is_none());
         Ok(Some(Point {
             run,
             seed,
             iterations,
             light_paths: lane.session.light_paths(),
-            seconds: spent.seconds + combine.map_or(0.0, |c| c.seconds),
-            cpu_seconds: spent.cpu_seconds + combine.map_or(0.0, |c| c.cpu_seconds),
-            combine_seconds: combine.map(|c| c.seconds),
+            seconds: spent.seconds,
+            cpu_seconds: spent.cpu_seconds,
+            combine_seconds: None,
             errors,
             estimate: estimate.map(|e| e.root().powi(2)),
             picture: if keep { Some(self.pictures.push(&picture)?) } else { None },

@@ -9,7 +9,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
 use crate::film::{Layer, LayerSet};
 use crate::image::exr::{self, Attributes};
-use crate::image::{Errors, relative_squared_error, squared_error};
+use crate::image::{Errors, errors};
 use crate::render::{Control, Session, Settings, Stage};
 use crate::scene::Scene;
 use serde_json::{Value, json};
@@ -20,6 +20,8 @@ use std::path::Path;
 pub struct OwnError {
     /// Mean relative squared error.
     pub relmse: Option<f64>,
+    /// The same without the worst 0.1 % of pixels.
+    pub relmse_trimmed: Option<f64>,
     /// Mean squared error.
     pub mse: Option<f64>,
 }
@@ -29,16 +31,21 @@ impl OwnError {
     pub fn of(&self, metric: Metric) -> Option<f64> {
         match metric {
             Metric::RelMse => self.relmse,
+            Metric::RelMseTrimmed => self.relmse_trimmed,
             Metric::Mse => self.mse,
         }
     }
 
     /// An error in one metric.
     pub fn in_metric(metric: Metric, error: f64) -> OwnError {
-        match metric {
-            Metric::RelMse => OwnError { relmse: Some(error), mse: None },
-            Metric::Mse => OwnError { relmse: None, mse: Some(error) },
-        }
+        let of = |other: Metric| (metric == other).then_some(error);
+        let [relmse, relmse_trimmed, mse] = [Metric::RelMse, Metric::RelMseTrimmed, Metric::Mse].map(of);
+        OwnError { relmse, relmse_trimmed, mse }
+    }
+
+    /// As data.
+    pub fn object(&self) -> Value {
+        json!({"relmse": self.relmse, "relmse_trimmed": self.relmse_trimmed, "mse": self.mse})
     }
 }
 
@@ -105,7 +112,7 @@ impl Reference {
             "seeds": halves.seeds,
             "iterations": 2 * halves.iterations,
             "seconds": halves.seconds,
-            "reference_error": {"relmse": self.error.relmse, "mse": self.error.mse},
+            "reference_error": self.error.object(),
             "reference_error_of": "a quarter of the squared difference of two independent halves",
         });
         exr::write(path, &set, &Attributes::of(&header)?, exr::Options::default())
@@ -116,10 +123,11 @@ impl Reference {
 fn told(header: &Value) -> OwnError {
     let own = &header["reference_error"];
     if own.is_object() {
-        return OwnError { relmse: own["relmse"].as_f64(), mse: own["mse"].as_f64() };
+        let [relmse, relmse_trimmed, mse] = ["relmse", "relmse_trimmed", "mse"].map(|key| own[key].as_f64());
+        return OwnError { relmse, relmse_trimmed, mse };
     }
     let estimate = header["error"].as_f64().filter(|_| header["combined"].is_null());
-    OwnError { relmse: estimate.map(|error| error * error), mse: None }
+    OwnError { relmse: estimate.map(|error| error * error), ..OwnError::default() }
 }
 
 /// Two independent renders of as many iterations.
@@ -175,7 +183,7 @@ impl Halves {
         let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
         let picture: Vec<[f32; 3]> = self.a.iter().zip(&self.b).map(mean).collect();
         let about = format!(
-            "two independent halves by {}, {} iterations each, {:.0} s in all",
+            "Two independent halves by {}, {} iterations each, {:.0} s in all",
             self.method, self.iterations, self.seconds
         );
         let error = own_error(&self.a, &self.b);
@@ -185,22 +193,19 @@ impl Halves {
 
 /// The error of the mean of two independent halves: a quarter of their squared difference.
 pub fn own_error(a: &[[f32; 3]], b: &[[f32; 3]]) -> OwnError {
-    let (mut relmse, mut mse, mut count) = (0.0, 0.0, 0u64);
-    for (a, b) in a.iter().zip(b).filter(|(a, b)| a.iter().chain(*b).all(|v| v.is_finite())) {
-        let mean: [f32; 3] = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-        // Half the difference is the distance of either from the mean.
-        relmse += relative_squared_error(*a, mean);
-        mse += squared_error(*a, mean);
-        count += 1;
-    }
-    let mean = |sum: f64| (count > 0).then(|| sum / count as f64);
-    OwnError { relmse: mean(relmse), mse: mean(mse) }
+    let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+    let mean: Vec<[f32; 3]> = a.iter().zip(b).map(mean).collect();
+    // Half the difference is the distance of either from the mean.
+    errors(a, &mean).map_or(OwnError::default(), |errors| OwnError {
+        relmse: Some(errors.relmse),
+        relmse_trimmed: Some(errors.relmse_trimmed),
+        mse: Some(errors.mse),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::errors;
     use crate::random::{Domain, Purpose, Stream};
 
     /// Pictures of known truth and noise: the stated error is that against the truth. Over 20000 pixels its standard error is below one
@@ -225,6 +230,8 @@ mod tests {
         let stated = reference.error;
         assert!((stated.mse.expect("known") / real.mse - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
         assert!((stated.relmse.expect("known") / real.relmse - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
+        let trimmed = stated.relmse_trimmed.expect("known");
+        assert!((trimmed / real.relmse_trimmed - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
         // Against this reference an independent picture's figure is its true error.
         let other = noisy(3);
         let measured = errors(&other, &reference.picture).expect("finite pixels");

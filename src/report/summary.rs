@@ -106,7 +106,10 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> R
         let name = &entries[run].name;
         match curves[run].mean.iter().find(|spot| spot.iterations == iterations) {
             Some(spot) => {
-                targets.push(Target { error: spot.figure, of: format!("{name} after {iterations} iterations") });
+                targets.push(Target {
+                    error: spot.figure,
+                    of: format!("{name} after {}", super::number::iterations(iterations)),
+                });
             }
             None => notes.push(format!("{name} ended before {iterations} iterations: no target from there.")),
         }
@@ -114,7 +117,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> R
     if targets.is_empty() {
         targets = target::usual(&curves, own);
     }
-    let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error, own)).collect()).collect();
+    let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error)).collect()).collect();
     let left_out = outcome.points.iter().filter(|p| reference.figure(*metric, &p.errors).is_none()).count();
     if left_out > 0 {
         notes.push(format!(
@@ -156,11 +159,19 @@ fn pictures(
     let Subject { entries, metric, reference, .. } = subject;
     let (width, height) = (reference.width, reference.height);
     let raw = |point: &Point| metric.of(&point.errors);
-    // The time that all runs have, and the error that all have reached.
+    // The time that all runs have.
     let last = |run: usize| kept(&outcome.points, run).last();
     let ends: Vec<&Point> = (0..entries.len()).filter_map(last).collect();
     let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
-    let error = ends.iter().map(|p| raw(p)).fold(0.0, f64::max);
+    // Of the errors that runs end with the one that most runs pass, and of several the smallest.
+    let passes = |error: f64, run: usize| {
+        let errors = || kept(&outcome.points, run).map(raw);
+        errors().any(|e| e >= error) && errors().any(|e| e <= error)
+    };
+    let count = |error: f64| (0..entries.len()).filter(|&run| passes(error, run)).count();
+    let mut finals: Vec<f64> = ends.iter().map(|p| raw(p)).collect();
+    finals.sort_by(f64::total_cmp);
+    let error = finals.iter().rev().copied().max_by_key(|&error| count(error)).unwrap_or(0.0);
     let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
         let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
         (0..entries.len()).filter_map(of_run).collect()
@@ -189,7 +200,7 @@ fn pictures(
             let seconds = super::number::short(point.seconds);
             Ok(Shown {
                 name: entries[point.run].name.clone(),
-                caption: format!("{} iterations, {seconds} s, {figure}", point.iterations),
+                caption: format!("{}, {seconds} s, {figure}", super::number::iterations(point.iterations)),
                 pictures: windows
                     .iter()
                     .map(|w| crop::picture(picture, width, *w, wishes.look))

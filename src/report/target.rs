@@ -1,6 +1,6 @@
 //! Time to target: iterations and seconds until a run's error has fallen to a given one, as Table 1 of \[CPPM 2020\].
 
-use super::curve::{Curve, Mean, Spot};
+use super::curve::{Curve, Mean, between};
 
 /// An error to reach, and why this one.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,37 +31,40 @@ pub enum Reached {
     Unknown,
 }
 
-/// Where a curve first falls to `target`: iterations, seconds, and whether it began there. Between two moments the error is a power of each.
-pub fn first(curve: &[Spot], target: f64) -> Option<(f64, f64, bool)> {
-    let at = curve.iter().position(|spot| spot.figure <= target)?;
-    let after = &curve[at];
-    let Some(before) = at.checked_sub(1).map(|i| &curve[i]) else {
-        return Some((after.iterations as f64, after.seconds, true));
+/// From where on a curve stays at or below `target`: iterations, seconds, and whether it always was. Between two moments the error is a power of each.
+pub fn fall(curve: &Curve, target: f64) -> Option<(f64, f64, bool)> {
+    let spots = &curve.mean;
+    let Some(last_above) = spots.iter().rposition(|spot| spot.figure > target) else {
+        return spots.first().map(|first| (first.iterations as f64, first.seconds, true));
     };
-    let fall = before.figure.ln() - after.figure.ln();
-    let t = if fall > 0.0 { (before.figure.ln() - target.ln()) / fall } else { 1.0 };
-    let between = |a: f64, b: f64| if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { b };
-    let iterations = between(before.iterations as f64, after.iterations as f64);
-    Some((iterations, between(before.seconds, after.seconds), false))
+    let (before, after) = (&spots[last_above], spots.get(last_above + 1)?);
+    // What is below the reference's own error is not known.
+    let [high, low] = [before.figure, after.figure].map(|figure| figure.max(curve.own));
+    let t = if low > 0.0 && high > low { (high / target).ln() / (high / low).ln() } else { 1.0 };
+    let iterations = between(before.iterations as f64, after.iterations as f64, t);
+    Some((iterations, between(before.seconds, after.seconds, t), false))
 }
 
-/// When a run reaches a target; `own` is the reference's error.
-pub fn reach(curve: &Curve, target: f64, own: f64) -> Reached {
-    if target <= own {
+/// When a run reaches a target: of the mean curve, with the jackknife's standard error, for which each seed is left out in turn.
+pub fn reach(curve: &Curve, target: f64) -> Reached {
+    if target <= curve.own {
         return Reached::BelowReference;
     }
-    let found: Vec<Option<(f64, f64, bool)>> = curve.by_seed.iter().map(|spots| first(spots, target)).collect();
-    let all: Vec<(f64, f64, bool)> = found.iter().flatten().copied().collect();
-    let values = |get: fn(&(f64, f64, bool)) -> f64| Mean::of(&all.iter().map(get).collect::<Vec<_>>());
-    match (values(|f| f.0), values(|f| f.1)) {
-        (Some(iterations), Some(seconds)) if all.len() == found.len() => {
-            Reached::After { iterations, seconds, at_once: all.iter().any(|f| f.2) }
-        }
-        _ => {
-            let ends: Vec<&Spot> = curve.by_seed.iter().filter_map(|spots| spots.last()).collect();
-            let longest = ends.iter().max_by(|a, b| a.seconds.total_cmp(&b.seconds));
-            longest.map_or(Reached::Unknown, |end| Reached::Never(end.iterations, end.seconds))
-        }
+    let Some((iterations, seconds, at_once)) = fall(curve, target) else {
+        return curve.last().map_or(Reached::Unknown, |end| Reached::Never(end.iterations, end.seconds));
+    };
+    let without: Vec<Curve> = curve.without_each_seed();
+    let others: Vec<(f64, f64, bool)> = without.iter().filter_map(|curve| fall(curve, target)).collect();
+    let jackknife = |get: fn(&(f64, f64, bool)) -> f64| {
+        let n = others.len() as f64;
+        let mean = others.iter().map(get).sum::<f64>() / n;
+        let squares: f64 = others.iter().map(|other| (get(other) - mean).powi(2)).sum();
+        (n > 1.0 && others.len() == curve.by_seed.len()).then(|| (squares * (n - 1.0) / n).sqrt())
+    };
+    Reached::After {
+        iterations: Mean { value: iterations, error: jackknife(|other| other.0) },
+        seconds: Mean { value: seconds, error: jackknife(|other| other.1) },
+        at_once,
     }
 }
 
@@ -81,6 +84,7 @@ pub fn usual(curves: &[Curve], own: f64) -> Vec<Target> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::curve::Spot;
 
     fn spots(figures: &[(u64, f64, f64)]) -> Vec<Spot> {
         let spot = |&(iterations, seconds, figure): &(u64, f64, f64)| Spot {
@@ -93,27 +97,34 @@ mod tests {
         figures.iter().map(spot).collect()
     }
 
+    fn one(figures: &[(u64, f64, f64)]) -> Curve {
+        Curve::from_seeds(vec![spots(figures)], 0.0)
+    }
+
     #[test]
     fn between_moments_the_error_is_a_power_of_time() {
         // N^-1/2 and a tenth of a second an iteration.
-        let curve = spots(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (16, 1.6, 0.25)]);
-        let (n, s, at_once) = first(&curve, 1.0 / 3.0).expect("it is reached");
+        let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (16, 1.6, 0.25)]);
+        let (n, s, at_once) = fall(&curve, 1.0 / 3.0).expect("it is reached");
         assert!((n - 9.0).abs() < 1e-9 && (s - 0.9).abs() < 1e-9 && !at_once, "{n} {s}");
-        assert_eq!(first(&curve, 2.0), Some((1.0, 0.1, true)));
-        assert_eq!(first(&curve, 0.25).map(|f| f.0), Some(16.0));
-        assert_eq!(first(&curve, 0.2), None);
+        assert_eq!(fall(&curve, 2.0), Some((1.0, 0.1, true)));
+        assert_eq!(fall(&curve, 0.25).map(|f| f.0), Some(16.0));
+        assert_eq!(fall(&curve, 0.2), None);
+        // A firefly takes it back: what counts is from where on the error stays.
+        let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (8, 0.8, 2.0), (32, 3.2, 0.5)]);
+        assert_eq!(fall(&curve, 1.0), Some((16.0, 1.6, false)));
     }
 
     #[test]
     fn answers_of_the_table() {
-        let curve = |factor: f64| spots(&[(1, 0.1, factor), (4, 0.4, 0.5 * factor), (16, 1.6, 0.25 * factor)]);
-        let two = Curve { mean: curve(1.0), by_seed: vec![curve(1.0), curve(1.0)] };
-        assert_eq!(reach(&two, 0.1, 0.2), Reached::BelowReference);
-        assert_eq!(reach(&two, 0.1, 0.0), Reached::Never(16, 1.6));
-        let Reached::After { iterations, .. } = reach(&two, 0.5, 0.0) else { panic!("it is reached") };
+        let of = |factor: f64| spots(&[(1, 0.1, factor), (4, 0.4, 0.5 * factor), (16, 1.6, 0.25 * factor)]);
+        let two = |own: f64| Curve::from_seeds(vec![of(1.0), of(1.0)], own);
+        assert_eq!(reach(&two(0.2), 0.1), Reached::BelowReference);
+        assert_eq!(reach(&two(0.0), 0.1), Reached::Never(16, 1.6));
+        let Reached::After { iterations, .. } = reach(&two(0.0), 0.5) else { panic!("it is reached") };
         assert_eq!(iterations, Mean { value: 4.0, error: Some(0.0) });
-        assert_eq!(reach(&Curve::default(), 0.5, 0.0), Reached::Unknown);
-        let targets: Vec<f64> = usual(&[two.clone(), two], 0.0).iter().map(|t| t.error).collect();
+        assert_eq!(reach(&Curve::default(), 0.5), Reached::Unknown);
+        let targets: Vec<f64> = usual(&[two(0.0), two(0.0)], 0.0).iter().map(|t| t.error).collect();
         assert_eq!(targets, [0.5]);
     }
 }

@@ -65,7 +65,8 @@ mod tests {
             let claimed = (fits.iter().map(|f| f.exponent_error.powi(2)).sum::<f64>() / n).sqrt();
             assert!((mean - planted).abs() < 4.0 * deviation / n.sqrt(), "{planted}: {mean}");
             assert!((claimed / deviation - 1.0).abs() < 0.15, "{claimed} for {deviation}");
-            let away = |exponent: f64| fits.iter().filter(|f| (f.exponent - exponent).abs() > 3.0 * f.exponent_error);
+            let away =
+                |exponent: f64| fits.iter().filter(move |f| (f.exponent - exponent).abs() > 3.0 * f.exponent_error);
             // With six degrees of freedom 2.4 % lie beyond three standard errors.
             assert!(away(planted).count() < 24, "{planted}");
             assert!(away(planted + 0.33).count() > 380, "{planted}");

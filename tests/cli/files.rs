@@ -66,7 +66,7 @@ fn a_render_leaves_all_layers_and_its_account() {
         assert!(!header[key].is_null(), "{key} in {header}");
     }
     for moment in header["history"].as_array().expect("a history") {
-        for key in ["seconds", "cpu_seconds", "iterations", "light_paths", "error"] {
+        for key in ["seconds", "cpu_seconds", "iterations", "light_paths", "error", "variance"] {
             assert!(moment.get(key).is_some(), "{key} in {moment}");
         }
     }

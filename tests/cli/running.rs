@@ -81,6 +81,26 @@ fn a_signal_writes_what_is_finished() {
     }
 }
 
+/// A comparison that is stopped reports on what was done.
+#[test]
+fn a_signal_writes_the_report() {
+    let folder = Folder::new();
+    folder.run("render scene.glb -o reference.exr --method bdpt --width 48 --height 36 --iterations 4 --seed 9");
+    let arguments = "converge scene.glb --width 48 --height 36 --methods bdpt,path --time 600 --reference reference.exr --progress plain -o out";
+    let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut rest = wait_for_line(&mut child, "0 %, ");
+    signal(&child, "-INT");
+    let status = child.wait().expect("the program ends");
+    let mut text = String::new();
+    rest.read_to_string(&mut text).expect("stderr can be read");
+    assert_eq!(status.code(), Some(130), "{text}");
+    assert!(text.ends_with("out: interrupted; the report on what was done is written\n"), "{text}");
+    let json = std::fs::read_to_string(folder.path("out/points.json")).expect("it is there");
+    let json: Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json["interrupted"], true);
+    assert!(folder.path("out/index.html").exists());
+}
+
 #[test]
 fn a_second_signal_ends_at_once() {
     let folder = Folder::new();

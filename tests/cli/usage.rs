@@ -186,7 +186,8 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
         assert!(!help.stdout.contains(absent), "{absent}");
     }
     let commands = folder.run("--help").stdout;
-    for (command, listed) in [("combine", true), ("compare", true), ("doctor", true), ("plan", false), ("merge", false)]
+    for (command, listed) in
+        [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", false), ("merge", false)]
     {
         assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
     }

@@ -9,8 +9,8 @@ mod runs;
 pub use options::ConvergeArgs;
 
 use super::render::{memory, network, plan};
-use super::signals::Interrupt;
 use super::scene;
+use super::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::combine::{Combiner, Runtime};
 use caustique::error::{Error, Kind, Result};

@@ -116,6 +116,8 @@ pub struct ConvergeArgs {
 pub enum MetricChoice {
     /// Squared error over the squared reference plus 0.01
     Relmse,
+    /// The same without the worst 0.1 % of pixels, which fireflies rule
+    RelmseTrimmed,
     /// Squared error
     Mse,
 }
@@ -124,6 +126,7 @@ impl From<MetricChoice> for Metric {
     fn from(choice: MetricChoice) -> Metric {
         match choice {
             MetricChoice::Relmse => Metric::RelMse,
+            MetricChoice::RelmseTrimmed => Metric::RelMseTrimmed,
             MetricChoice::Mse => Metric::Mse,
         }
     }

@@ -3,6 +3,7 @@
 use super::options::ConvergeArgs;
 use super::progress::Reporter;
 use super::runs::{self, Run};
+use crate::cli::progress::duration;
 use crate::cli::render::{Method, plan};
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
@@ -107,6 +108,13 @@ pub fn get(
         Source::File(reference) => return Ok(reference),
         Source::Own(settings) => settings,
     };
+    if args.progress.for_people() {
+        let time = settings.time.map(|time| format!("in {}", duration(time)));
+        let count = settings.iterations.map(|n| format!("of {n} iterations each"));
+        let ends: Vec<String> = [count, time].into_iter().flatten().collect();
+        let method = settings.method.name();
+        say(&format!("reference: two halves by {method}, {}; --reference takes one that is there", ends.join(" or ")));
+    }
     let mut reporter = Reporter::new(args.progress);
     let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
         let by_time = settings.time.map_or(0.0, |time| seconds / time);

@@ -1,0 +1,294 @@
+//! `caustique converge`: the report of a small comparison, and what is refused.
+
+use crate::{Folder, Outcome, values};
+use serde_json::Value;
+
+/// Three quick runs against a reference of their own.
+const SMALL: &str = "converge scene.glb --width 48 --height 36 --progress none -o out";
+
+/// A comparison with runs that are one argument each.
+fn converge(folder: &Folder, arguments: &str, runs: &[&str]) -> Outcome {
+    let mut command = folder.command(arguments);
+    for run in runs {
+        command.args(["--run", run]);
+    }
+    Outcome::of(command)
+}
+
+fn text(folder: &Folder, name: &str) -> String {
+    std::fs::read_to_string(folder.path(name)).expect("the file is there")
+}
+
+/// Every element that is opened is closed, in order; returns the names of all.
+fn elements(document: &str) -> Vec<String> {
+    let void = ["meta", "img", "br", "!doctype"];
+    let (mut open, mut all) = (Vec::new(), Vec::new());
+    for part in document.split('<').skip(1) {
+        let (tag, _) = part.split_once('>').unwrap_or_else(|| panic!("a tag without end: <{part}"));
+        let name: String =
+            tag.trim_start_matches('/').chars().take_while(|c| !c.is_whitespace() && *c != '/').collect();
+        let name = name.to_lowercase();
+        if tag.starts_with('/') {
+            assert_eq!(open.pop().as_ref(), Some(&name), "closed in the wrong order");
+        } else {
+            if !tag.ends_with('/') && !void.contains(&name.as_str()) {
+                open.push(name.clone());
+            }
+            all.push(name);
+        }
+    }
+    assert_eq!(open, [""; 0], "never closed");
+    all
+}
+
+#[test]
+fn the_report_of_a_small_comparison() {
+    let folder = Folder::new();
+    let runs = [
+        "one: --method sppm --levels 1 --photons 2000",
+        "\"a<b\" & 'c': --method sppm --levels 2 --no-combine --photons 2000",
+        "five: --method sppm --photons 2000",
+    ];
+    let arguments = format!(
+        "{SMALL} --methods path --iterations 12 --seeds 2 --target-of one@10 --targets 1e-9 --reference-method vcm --reference-iterations 40"
+    );
+    let outcome = converge(&folder, &arguments, &runs);
+    assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(0), ""), "{}", outcome.stderr);
+    let mut files: Vec<String> = std::fs::read_dir(folder.path("out"))
+        .expect("the folder is there")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    files.sort();
+    let expected = "a-b-c.exr error-iterations.svg error-seconds.svg five.exr index.html one.exr path.exr points.csv points.json reference.exr";
+    assert_eq!(files.join(" "), expected);
+
+    // A row per run, seed and moment: 1, 2, 3, 4, 6, 8, 11 and the last, and the target's 10 of one run.
+    let csv = text(&folder, "out/points.csv");
+    let mut lines = csv.lines();
+    let header = "run,method,seed,iterations,light_paths,seconds,cpu_seconds,combine_seconds,figure,relmse,relmse_trimmed,mse,mean_ratio,estimated_error";
+    assert_eq!(lines.next(), Some(header));
+    assert_eq!(lines.clone().count(), 2 * (4 * 8 + 1));
+    let json: Value = serde_json::from_str(&text(&folder, "out/points.json")).expect("it is JSON");
+    let points = json["points"].as_array().expect("a list");
+    assert_eq!(points.len(), 2 * (4 * 8 + 1));
+    let of = |run: &str, key: &str| -> Vec<f64> {
+        let mine = points.iter().filter(|p| p["run"] == run && p["seed"] == 1);
+        mine.map(|p| p[key].as_f64().unwrap_or_else(|| panic!("{key}: {p}"))).collect()
+    };
+    assert_eq!(of("one", "iterations"), [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 11.0, 12.0]);
+    assert_eq!(of("five", "iterations"), [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 12.0]);
+    for run in ["path", "one", "\"a<b\" & 'c'", "five"] {
+        for key in ["seconds", "cpu_seconds"] {
+            let times = of(run, key);
+            assert!(times[0] > 0.0 && times.is_sorted(), "{run} {key} {times:?}");
+        }
+        let errors = of(run, "relmse");
+        assert!(errors[errors.len() - 1] < errors[0], "{run} {errors:?}");
+    }
+    assert!(of("five", "combine_seconds").iter().all(|seconds| *seconds > 0.0));
+    assert!(points.iter().all(|p| p["combine_seconds"].is_null() == (p["run"] != "five")));
+    let own = json["reference"]["error"]["relmse"].as_f64().expect("a number");
+    assert!(own > 0.0 && own < of("five", "relmse")[0], "{own}");
+    for point in points {
+        let (figure, measured) = (point["figure"].as_f64(), point["relmse"].as_f64().expect("a number"));
+        match figure {
+            // Numbers lose their last bit when JSON is read.
+            Some(figure) => assert!(figure > own && (figure + own - measured).abs() < 1e-12 * measured, "{point}"),
+            None => assert!(measured - own <= own, "{point}"),
+        }
+    }
+    // The first run that the target is of reaches it there; nothing reaches what the reference does not.
+    assert_eq!(json["targets"][0]["error"], 1e-9);
+    assert_eq!(json["targets"][0]["runs"][1]["because"], "below the reference's error");
+    assert_eq!(json["targets"][1]["of"], "one after 10 iterations");
+    assert_eq!(json["runs"][0]["theory"]["exponent"], -1.0);
+    assert_eq!((&json["runs"][3]["combiner"], &json["runs"][3]["levels"]), (&"compact".into(), &5.into()));
+    assert!(json["runs"][3]["overhead"]["combine_seconds"].as_f64().is_some_and(|seconds| seconds > 0.0));
+
+    // The page holds everything, fetches nothing, and shows names as they are.
+    let page = text(&folder, "out/index.html");
+    let names = elements(&page);
+    let count = |name: &str| names.iter().filter(|n| n.as_str() == name).count();
+    assert_eq!((count("svg"), count("html"), count("script"), count("link")), (2, 1, 0, 0));
+    assert!(count("table") >= 5 && count("figure") >= 2 * 5, "tables or figures are missing");
+    assert_eq!(page.matches("http").count(), page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
+    assert_eq!(page.matches("src=").count(), page.matches("src=\"data:image/png;base64,").count());
+    assert!(!page.contains("href") && !page.contains("url(") && !page.contains("@import"));
+    assert!(page.contains("&quot;a&lt;b&quot; &amp; 'c'") && !page.contains("a<b"));
+    for svg in ["out/error-seconds.svg", "out/error-iterations.svg"] {
+        let names = elements(&text(&folder, svg));
+        assert!(names[0] == "svg" && names.iter().filter(|name| *name == "circle").count() > 20, "{svg}");
+    }
+    let header = "run,method,seed";
+    assert!(csv.starts_with(header) && !csv.contains("NaN") && !page.contains("NaN") && !page.contains("inf "));
+}
+
+/// Turns change nothing: after as many iterations the picture is the one that `render` makes, combined or not; and a reference that was made tells its
+/// error when it is read again.
+#[test]
+fn pictures_are_those_of_render_and_references_know_their_error() {
+    let folder = Folder::new();
+    let options = [
+        ("one", "--method sppm --levels 1 --photons 2000"),
+        ("five", "--method sppm --photons 2000"),
+        ("cppm", "--method cppm --levels 1 --photons 2000"),
+    ];
+    let runs = options.map(|(name, options)| format!("{name}: {options}"));
+    let runs: Vec<&str> = runs.iter().map(String::as_str).collect();
+    let arguments = format!("{SMALL} --iterations 5 --seed 3 --reference-method bdpt --reference-iterations 8");
+    let outcome = converge(&folder, &arguments, &runs);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    for (name, options) in options {
+        let render = format!("render scene.glb --width 48 --height 36 --iterations 5 --seed 3 -o {name}.exr {options}");
+        assert_eq!(folder.run(&render).code, Some(0));
+        let (alone, _) = folder.read(&format!("{name}.exr"));
+        let (raced, header) = folder.read(&format!("out/{name}.exr"));
+        assert_eq!(values(&raced, ""), values(&alone, ""), "{name}");
+        assert_eq!((&header["iterations"], &header["name"]), (&5.into(), &name.into()));
+        let history = header["history"].as_array().expect("a list");
+        let last = &history[history.len() - 1];
+        let (error, variance) = (last["error"].as_f64().expect("known"), last["variance"].as_f64().expect("known"));
+        assert!(variance > 0.0 && error >= variance.sqrt() * 0.999, "{last}");
+    }
+    let json = |folder: &Folder| serde_json::from_str::<Value>(&text(folder, "out/points.json")).expect("it is JSON");
+    let first = json(&folder)["reference"]["error"].clone();
+    assert!(first["mse"].as_f64().is_some_and(|mse| mse > 0.0));
+    // The measured error is the one that `compare` tells.
+    let compared = folder.run("compare out/one.exr out/reference.exr --json").json();
+    let points = json(&folder)["points"].clone();
+    let last = points.as_array().and_then(|points| points.iter().rfind(|point| point["run"] == "one").cloned());
+    assert_eq!(last.expect("a point")["relmse"], compared["relmse"]);
+    std::fs::rename(folder.path("out/reference.exr"), folder.path("reference.exr")).expect("it is there");
+    let outcome =
+        converge(&folder, &format!("{SMALL} --iterations 1 --error-metric mse --reference reference.exr"), &runs[..1]);
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
+    assert_eq!((&json(&folder)["reference"]["error"], &json(&folder)["metric"]), (&first, &"mse".into()));
+    // A render of ours estimates itself, and may be no judge of its own method and seed.
+    let same = "warning: one.exr: it has method and seed 3 of the run \"one\", whose error will look too small; choose another --seed\n";
+    let outcome = converge(&folder, &format!("{SMALL} --iterations 1 --seed 3 --reference one.exr"), &runs[..1]);
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), same));
+    assert!(json(&folder)["reference"]["error"]["relmse"].as_f64().is_some_and(|error| error > 0.0));
+}
+
+#[test]
+fn what_is_refused_word_for_word() {
+    let folder = Folder::new();
+    folder.render("-o other.exr --iterations 1 --no-combine --layers beauty");
+    folder.render("-o depth.exr --iterations 1 --no-combine --layers depth");
+    let small = "converge scene.glb --width 48 --height 36 -o out --iterations 1";
+    let help = "'--help' explains every option";
+    let cases: [(&str, &[&str], i32, &str, &str); 14] = [
+        (
+            "converge scene.glb",
+            &[],
+            2,
+            "command line: the following required arguments were not provided: --output <DIR>",
+            help,
+        ),
+        (
+            &format!("{small} --moments 1"),
+            &[],
+            2,
+            "command line: invalid value '1' for '--moments <RATIO>': it must be in (1, 10]",
+            help,
+        ),
+        (
+            &format!("{small} --crop 1,2,3"),
+            &[],
+            2,
+            "command line: invalid value '1,2,3' for '--crop <X,Y,W,H>': it must be X,Y,W,H in pixels, such as 120,40,64,64",
+            help,
+        ),
+        (
+            &format!("{small} --crop 40,0,9,9"),
+            &[],
+            2,
+            "--crop: 40,0,9,9 is not within the picture",
+            "it has 48 x 36 pixels",
+        ),
+        (
+            &format!("{small} --methods path,path"),
+            &[],
+            2,
+            "command line: two runs are called \"path\"",
+            "give each --run a name of its own: --run 'NAME: OPTIONS'",
+        ),
+        (
+            &format!("{small} --methods path --target-of sppm@4"),
+            &[],
+            2,
+            "--target-of: there is no run \"sppm\"",
+            "there are \"path\"",
+        ),
+        (
+            &format!("{small} --methods path --target-of path@4"),
+            &[],
+            2,
+            "--target-of: 4 iterations are more than the 1 of --iterations",
+            "use --iterations 4 or a smaller number here",
+        ),
+        (
+            small,
+            &["x: --methd sppm"],
+            2,
+            "--run \"x\": unexpected argument '--methd' found",
+            "a similar argument exists: '--method'",
+        ),
+        (
+            small,
+            &["x: --method sppm --width 3"],
+            2,
+            "--run \"x\": --width cannot differ from run to run",
+            "a run has the method and combiner options of 'caustique render'; the others, where there are such, concern all runs",
+        ),
+        (
+            small,
+            &["x: --method path --cppm-k 0.5"],
+            2,
+            "--run \"x\": --cppm-k has no effect with --method path",
+            "leave --cppm-k out, or choose --method cppm",
+        ),
+        (
+            &format!("{small} --methods path --reference other.exr"),
+            &[],
+            2,
+            "other.exr: the reference has 64 x 48 pixels, not 48 x 36",
+            "use --width 64 --height 48",
+        ),
+        (
+            "converge scene.glb --width 64 --height 48 -o out --iterations 1 --methods path --reference depth.exr",
+            &[],
+            1,
+            "depth.exr: no picture among the layers (depth)",
+            "a picture has the channels R, G, B, or a layer named Combined, beauty or rgba",
+        ),
+        (
+            "converge scene.glb --width 64 --height 48 -o out --iterations 1 --methods path --reference nope.exr",
+            &[],
+            1,
+            "nope.exr: No such file or directory (os error 2)",
+            "",
+        ),
+        (
+            "converge scene.glb -o other.exr",
+            &[],
+            1,
+            "other.exr: Not a directory (os error 20)",
+            "-o names a folder; a file of that name is there",
+        ),
+    ];
+    for (arguments, runs, code, error, hint) in cases {
+        let outcome = converge(&folder, arguments, runs);
+        let hint = if hint.is_empty() { String::new() } else { format!("hint: {hint}\n") };
+        // What a method cannot find is told before.
+        let told: String = outcome
+            .stderr
+            .lines()
+            .filter(|line| !line.starts_with("warning: "))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        assert_eq!(told, format!("{error}\n{hint}"), "{arguments}");
+        assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(code), ""), "{arguments}");
+    }
+    assert_eq!(folder.files(), ["depth.exr", "other.exr"]);
+}
