@@ -130,6 +130,12 @@ impl Stream {
 pub struct Draws(u64);
 
 impl Draws {
+    /// Draws for the `n`-th of several like decisions at this vertex.
+    #[inline]
+    pub fn nth(self, n: u32) -> Draws {
+        Draws(mix(self.0 ^ (u64::from(n) + 1).wrapping_mul(0xa076_1d64_78bd_642f)))
+    }
+
     /// 64 random bits for `purpose`.
     #[inline]
     pub fn bits(self, purpose: Purpose) -> u64 {

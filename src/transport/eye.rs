@@ -13,6 +13,7 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::math::{Rgb, Vec2, Vec3};
+use crate::medium::Flight;
 use crate::photon::{Near, Photon, PhotonMap};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
@@ -108,6 +109,10 @@ pub struct EyeMeasure {
     pub caustic_photons: [Rgb; MAX_LEVELS],
     /// All other photons, per level.
     pub indirect_photons: [Rgb; MAX_LEVELS],
+    /// Light whose first vertex that is not clear is in a medium, found without photons.
+    pub volume: Rgb,
+    /// The same, found with photons or depending on their bandwidth, per level.
+    pub volume_photons: [Rgb; MAX_LEVELS],
     /// G-buffer.
     pub features: Features,
     /// First visible hit.
@@ -118,7 +123,9 @@ impl EyeMeasure {
     /// The radiance estimate of a level.
     #[inline]
     pub fn radiance(&self, level: usize) -> Rgb {
-        self.emission + self.direct + self.indirect + self.caustic_photons[level] + self.indirect_photons[level]
+        let surfaces =
+            self.emission + self.direct + self.indirect + self.caustic_photons[level] + self.indirect_photons[level];
+        surfaces + (self.volume + self.volume_photons[level])
     }
 }
 
@@ -196,6 +203,8 @@ impl<B: Bandwidths> Gather<'_, B> {
 }
 
 impl<'a, B: Bandwidths> Visitor<'a> for Gather<'_, B> {
+    const SPLITS: bool = true;
+
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let (surface, shading) = (vertex.surface, vertex.shading);
@@ -238,7 +247,7 @@ impl<'a, B: Bandwidths> Visitor<'a> for Gather<'_, B> {
     }
 
     #[inline]
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
         let scene = self.scene;
         scene.lights.escape(direction, |radiance, pdf| self.run_into(radiance, throughput, pdf, scattered));
     }
@@ -270,6 +279,7 @@ impl Eye<'_> {
             throughput: Rgb::ONE,
             interior: self.interior,
             first: Known::Unknown,
+            far: false,
         }
     }
 
@@ -355,6 +365,8 @@ struct FindGatherPoint {
 }
 
 impl<'a> Visitor<'a> for FindGatherPoint {
+    const SPLITS: bool = true;
+
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         self.length += vertex.distance;
         let lobes = vertex.shading.bsdf.lobes();

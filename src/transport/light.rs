@@ -5,7 +5,7 @@ use super::segment::Known;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::EmissionDensity;
-use crate::math::{Rgb, Vec2};
+use crate::math::Vec2;
 use crate::photon::{Photon, PhotonFlags};
 use crate::random::{Domain, SobolPair, Stream, mix};
 use crate::scene::Scene;
@@ -66,7 +66,7 @@ impl LightPass {
             && let Some(medium) = scene.medium
         {
             // It has come through the medium that fills all space, from infinity.
-            flux *= Rgb::select(medium.sigma_a.cmpgt(Rgb::ZERO), Rgb::ZERO, Rgb::ONE);
+            flux *= medium.transmittance(f32::INFINITY);
         }
         Some(Emitted {
             start: PathStart {
@@ -75,6 +75,7 @@ impl LightPass {
                 throughput: flux,
                 interior: surroundings.light(emission.light),
                 first: Known::Unknown,
+                far: emission.infinite,
             },
             stream: Stream::new(self.seed, self.pass, self.domain, u64::from(index)),
             delta: emission.delta,
