@@ -5,6 +5,7 @@
 
 mod support;
 
+use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::HenyeyGreenstein;
@@ -89,6 +90,12 @@ fn settings(iterations: u64, seed: u64) -> Settings {
     Settings { seed, levels: Levels::new(1), iterations: Some(iterations), ..Settings::default() }
 }
 
+/// With bandwidth levels for methods that gather photons in media.
+fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
+    let initial = InitialBandwidth::Fixed(radius);
+    Settings { photons, initial, levels: Levels::new(5), ..settings(iterations, seed) }
+}
+
 fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
     let camera = scene.camera(&square(size)).expect("a camera");
     let settings = Settings { method, ..settings.clone() };
@@ -163,6 +170,9 @@ fn beer_lambert() {
             let one = |seed| Settings { max_depth: 1, ..settings(300, seed) };
             check.run(&format!("lamp behind fog, {method:?}"), &means(&scene, method, 4, 8, one));
         }
+        let one = |seed| Settings { max_depth: 1, ..photons(0, 0.1, 4, seed) };
+        let check = Check { detects: 1e-3, ..check };
+        check.run("lamp behind fog, sppm", &means(&scene, Method::Sppm, 4, 4, one));
     }
 }
 
@@ -181,6 +191,27 @@ fn furnace() {
             let check = Check { expected: [1.0; 3], bias: 1e-3, detects: 0.04 };
             check.run(&format!("furnace, g {g}, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(400, seed)));
         }
+    }
+}
+
+/// A closed box whose walls give radiance e and reflect rho, full of fog that absorbs nothing: e / (1 - rho) everywhere.
+#[test]
+fn furnace_box_full_of_fog() {
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
+    add(&mut description, "glass", sphere(Vec3::new(0.2, 0.1, 0.6), 0.2, 32), glass(1.3));
+    description.medium = Some(fog([0.0; 3], [1.5, 0.5, 1.0], 0.5));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    let scene = build(description);
+    for method in WHOLE_PATHS {
+        let check = Check { expected: [1.0; 3], bias: 2e-3, detects: 0.03 };
+        check.run(&format!("foggy furnace, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(100, seed)));
+    }
+    for method in [Method::Sppm, Method::Cppm] {
+        // Kernels lose what they would hold behind a wall, where they reach: 3/16 of the light scattered that near.
+        let check = Check { expected: [1.0; 3], bias: 0.012, detects: 0.04 };
+        let means = means(&scene, method, 8, 8, |seed| photons(20_000, 0.04, 8, seed));
+        check.run(&format!("foggy furnace, {method:?}"), &means);
     }
 }
 
@@ -228,6 +259,10 @@ fn single_scattering_of_a_point_light() {
         let one = |seed| Settings { max_depth: 2, ..settings(400, seed) };
         check.run(&format!("airlight, {method:?}"), &means(&scene, method, 8, 8, one));
     }
+    // Next-event estimation alone: what has scattered once before is the photons'.
+    let one = |seed| Settings { max_depth: 2, ..photons(1000, 0.1, 60, seed) };
+    let check = Check { expected, bias: 2e-3, detects: 0.06 };
+    check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
 }
 
 // ---------------------------------------------------------------- agreement
@@ -304,4 +339,74 @@ fn god_rays_agree() {
     agree("god rays, bdpt", &bdpt, &path, 2e-3, 0.1);
     let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(80, seed));
     agree("god rays, vcm", &vcm, &path, 0.01, 0.12);
+    for method in [Method::Sppm, Method::Cppm] {
+        let by_photons = seeds(&scene, method, 10, |seed| photons(20_000, 0.08, 6, seed));
+        agree(&format!("god rays, {method:?}"), &by_photons, &path, 0.02, 0.15);
+    }
+}
+
+/// A ball of clear glass in fog under a lamp: light through the ball lights the fog behind it.
+#[test]
+fn a_glass_ball_in_fog_agrees() {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.3, 0.0));
+    let lamp = quad(Vec3::new(-0.3, 1.98, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
+    add(&mut description, "lamp", lamp, matte(0.0, 10.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 1.3, 0.0), 0.35, 64), glass(1.5));
+    description.medium = Some(fog([0.1, 0.05, 0.0], [0.6, 0.8, 1.0], 0.3));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.9, 0.0), 55.0));
+    let scene = build(description);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(500, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(100, seed));
+    agree("ball in fog, bdpt", &bdpt, &path, 2e-3, 0.12);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(20_000, 0.06, 6, seed));
+    agree("ball in fog, sppm", &sppm, &path, 0.02, 0.15);
+}
+
+/// A coloured medium that scatters and absorbs, in a block of rough glass and in one whose surface is nothing.
+#[test]
+fn coloured_media_in_meshes_agree() {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    let jade = fog([1.5, 0.2, 0.8], [2.0, 6.0, 3.0], 0.4);
+    let smoke = fog([0.2, 0.6, 1.0], [1.5, 1.0, 0.5], -0.2);
+    let block = cuboid(Vec3::new(-0.8, 0.02, -0.5), Vec3::new(-0.1, 0.9, 0.2), false);
+    add(&mut description, "jade", block, Material { medium: Some(jade), roughness: 0.5, ..glass(1.4) });
+    add(&mut description, "smoke", sphere(Vec3::new(0.45, 0.6, 0.2), 0.45, 48), holds(smoke));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.7, 0.0), 55.0));
+    let scene = build(description);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(400, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(80, seed));
+    agree("coloured media, bdpt", &bdpt, &path, 2e-3, 0.12);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(40_000, 0.04, 6, seed));
+    agree("coloured media, sppm", &sppm, &path, 0.03, 0.15);
+}
+
+/// A point light's caustic in fog, which no eye path can run into: light tracing finds it, and so must photons.
+#[test]
+fn a_volumetric_caustic_agrees() {
+    let mut description = Description::default();
+    let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
+    add(&mut description, "floor", floor, matte(0.4, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 1.2, 0.0), 0.4, 96), glass(1.5));
+    description.lights.push(point_light(DVec3::new(0.3, 2.4, 0.1), 6.0));
+    description.medium = Some(fog([0.02; 3], [0.4, 0.3, 0.2], 0.2));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.7, 0.0), 40.0));
+    let scene = build(description);
+    // Five segments: lamp, into the ball, out of it, fog, camera. Longer paths come back through the ball, which light tracing cannot follow.
+    let four = |settings: Settings| Settings { max_depth: 4, ..settings };
+    let light = seeds(&scene, Method::Light, 10, |seed| four(settings(60, seed)));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| four(settings(40, seed)));
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| four(photons(40_000, 0.04, 6, seed)));
+    // Tiles that show the ball show the fog through it, which connections do not.
+    let without_ball = |seeds: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let keep = |at: usize| !(4..12).contains(&(at / 3)) || !matches!(at / 3 % 4, 1 | 2);
+        seeds.iter().map(|s| (0..3 * TILES).map(|at| if keep(at) { s[at] } else { 1.0 }).collect()).collect()
+    };
+    agree("volumetric caustic, bdpt", &without_ball(&bdpt), &without_ball(&light), 5e-3, 0.15);
+    agree("volumetric caustic, sppm", &without_ball(&sppm), &without_ball(&light), 0.03, 0.2);
 }

@@ -48,6 +48,8 @@ pub struct Pixel {
     pub rejected: u32,
     /// Largest initial bandwidth (scene units).
     pub bandwidth: f32,
+    /// The same for photons in media; 0 where there are none.
+    pub volume_bandwidth: f32,
     /// Camera depth of the first visible hit of the first iteration; 1e10 where there is none.
     pub z: f32,
     /// Its position.

@@ -1,5 +1,6 @@
 //! Chi-squared progressive photon mapping \[CPPM 2020\]: the passes of stochastic progressive photon mapping with a bandwidth of its own for every pixel and
-//! level, which shrinks only where the photons counted so far do not look uniform.
+//! level, which shrinks only where the photons counted so far do not look uniform. In media the test is not defined, and bandwidths
+//! follow the memoryless rule of volumes.
 //!
 //! An iteration depends on all before it, so shards cannot share them out.
 
@@ -8,6 +9,7 @@ use super::drive::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::{Sppm, keep_first_hit};
+use super::volume::Maps;
 use crate::camera::{band, par_pixels};
 use crate::estimator::rule::chi_squared::{Bandwidth, ChiSquared, LEAST_BOUND};
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -80,7 +82,7 @@ impl<'a> Cppm<'a> {
         Cppm { sppm, settings, rule, bandwidths: Vec::new(), counts: Vec::new() }
     }
 
-    fn eye_pass(&mut self, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
+    fn eye_pass(&mut self, i: u64, maps: &Maps, pixels: &mut [Pixel]) {
         let Cppm { sppm, settings, rule, bandwidths, counts } = self;
         let (eye, rule, levels) = (sppm.eye(), &*rule, settings.levels);
         let (size, count, cells) = (eye.camera.size(), levels.count, rule.cells());
@@ -97,22 +99,25 @@ impl<'a> Cppm<'a> {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
                 let bandwidths = &mut bandwidths[place.at * count..][..count];
                 let counts = &mut counts[place.at * count * cells..][..count * cells];
-                let mut measure = |start: &(PathStart, _), levels: Range<usize>| {
+                let pixel = &mut pixels[place.at];
+                let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
+                    let first = levels.start;
                     let counts = &mut counts[levels.start * cells..levels.end * cells];
                     let mut counter = Counter::new(rule, &bandwidths[levels], counts);
-                    let measure = eye.measure(scratch, start, photons, &mut counter);
+                    // In the order of the surfaces' bandwidths, though its own follow the levels.
+                    let volume = maps.volume(pixel, counter.ascending().map(|level| first + level));
+                    let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter);
                     by_level(measure, counter.ascending())
                 };
-                let pixel = &mut pixels[place.at];
                 match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                     Some(correlated) => {
-                        let first = measure(start, 0..1);
-                        let others = measure(correlated, 1..count);
+                        let first = measure(pixel, start, 0..1);
+                        let others = measure(pixel, correlated, 1..count);
                         keep_first_hit(&eye, pixel, &first);
                         pixel.add(&first, Some(&others), count, levels.own());
                     }
                     None => {
-                        let all = measure(start, 0..count);
+                        let all = measure(pixel, start, 0..count);
                         keep_first_hit(&eye, pixel, &all);
                         pixel.add(&all, None, count, levels.own());
                     }
@@ -127,10 +132,11 @@ impl<'a> Cppm<'a> {
 
 /// A measure whose levels are `ascending` in bandwidth, by level.
 fn by_level(mut measure: EyeMeasure, ascending: impl Iterator<Item = usize>) -> EyeMeasure {
-    let (caustic, indirect) = (measure.caustic_photons, measure.indirect_photons);
+    let (caustic, indirect, volume) = (measure.caustic_photons, measure.indirect_photons, measure.volume_photons);
     for (at, level) in ascending.enumerate() {
         measure.caustic_photons[level] = caustic[at];
         measure.indirect_photons[level] = indirect[at];
+        measure.volume_photons[level] = volume[at];
     }
     measure
 }
@@ -155,9 +161,9 @@ impl Iterate for Cppm<'_> {
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let (map, work) = self.sppm.map(i, phases);
+        let (maps, work) = self.sppm.map(i, phases);
         let start = cpu_seconds();
-        self.eye_pass(i, &map, pixels);
+        self.eye_pass(i, &maps, pixels);
         phases.eye += cpu_seconds() - start;
         work
     }

@@ -3,7 +3,7 @@
 use super::method::Method;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
-use crate::estimator::rule::memoryless;
+use crate::estimator::rule::{memoryless, volume};
 use crate::transport::MAX_LEVELS;
 
 /// Iterations when no stop condition is given.
@@ -69,6 +69,8 @@ pub struct Settings {
     pub initial: InitialBandwidth,
     /// Reduction rate of the memoryless rule, in (0, 1].
     pub alpha: f64,
+    /// The same for photons in media.
+    pub volume_alpha: f64,
     /// Parameters of [`Method::Cppm`]'s rule.
     pub chi_squared: ChiSquaredSettings,
     /// Longest path in segments.
@@ -94,6 +96,7 @@ impl Default for Settings {
             techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             alpha: memoryless::ALPHA,
+            volume_alpha: volume::ALPHA,
             chi_squared: ChiSquaredSettings::default(),
             max_depth: u32::MAX,
             iterations: Some(DEFAULT_ITERATIONS),

@@ -7,14 +7,15 @@ use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
+use super::volume::{Maps, VolumeMap};
 use crate::camera::{Camera, band, par_pixels};
-use crate::estimator::bandwidth::initial_bandwidths;
+use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths};
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::photon::{Photon, PhotonMap};
+use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
+use crate::transport::{Eye, EyeMeasure, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,7 +24,7 @@ use std::ops::Range;
 const CHUNK: u32 = 1024;
 
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
-pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Vec<Photon> {
+pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Photons {
     trace_some(scene, surroundings, pass, 0..pass.paths())
 }
 
@@ -33,12 +34,13 @@ pub(super) fn trace_some(
     surroundings: &Surroundings,
     pass: &LightPass,
     paths: Range<u32>,
-) -> Vec<Photon> {
-    let parts: Vec<Vec<Photon>> = (0..paths.len() as u32)
+) -> Photons {
+    let parts: Vec<Photons> = (0..paths.len() as u32)
         .into_par_iter()
         .step_by(CHUNK as usize)
         .map_init(Bump::new, |arena, first| {
-            let mut photons = Vec::with_capacity(CHUNK as usize * 2);
+            let surface = Vec::with_capacity(CHUNK as usize * 2);
+            let mut photons = Photons { surface, ..Photons::default() };
             let first = paths.start + first;
             for index in first..paths.end.min(first.saturating_add(CHUNK)) {
                 light_path(scene, arena, surroundings, pass, index, &mut photons);
@@ -47,11 +49,13 @@ pub(super) fn trace_some(
             photons
         })
         .collect();
-    parts.concat()
+    let (surface, volume): (Vec<_>, Vec<_>) = parts.into_iter().map(|part| (part.surface, part.volume)).unzip();
+    Photons { surface: surface.concat(), volume: volume.concat() }
 }
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
-fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pixels: &mut [Pixel]) {
+fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, maps: &Maps, pixels: &mut [Pixel]) {
+    let photons = &maps.surface;
     let size = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
@@ -71,14 +75,16 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, photons: &PhotonMap, pix
             let all = LevelRadii::new((0..levels.count).map(radius2));
             match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                 Some(correlated) => {
-                    let independent = eye.measure(scratch, start, photons, &all.part(0..1));
-                    let others = if levels.count > 1 { all.part(1..levels.count) } else { all };
-                    let correlated = eye.measure(scratch, correlated, photons, &others);
+                    let volume = maps.volume(pixel, 0..1);
+                    let independent = eye.measure(scratch, start, photons, volume, &all.part(0..1));
+                    let (from, others) = if levels.count > 1 { (1, all.part(1..levels.count)) } else { (0, all) };
+                    let volume = maps.volume(pixel, from..levels.count);
+                    let correlated = eye.measure(scratch, correlated, photons, volume, &others);
                     keep_first_hit(eye, pixel, &independent);
                     pixel.add(&independent, Some(&correlated), levels.count, levels.own());
                 }
                 None => {
-                    let all = eye.measure(scratch, start, photons, &all);
+                    let all = eye.measure(scratch, start, photons, maps.volume(pixel, 0..levels.count), &all);
                     keep_first_hit(eye, pixel, &all);
                     pixel.add(&all, None, levels.count, levels.own());
                 }
@@ -119,15 +125,17 @@ impl<'a> Sppm<'a> {
     }
 
     /// The photons of an iteration.
-    pub fn map(&self, i: u64, phases: &mut Phases) -> (PhotonMap, Work) {
+    pub fn map(&self, i: u64, phases: &mut Phases) -> (Maps, Work) {
         let t0 = cpu_seconds();
         let photons = trace_photons(self.eye.scene, self.surroundings, &self.light_pass(i, Domain::Light));
         let t1 = cpu_seconds();
-        let map = PhotonMap::build(photons);
+        let scatters = self.eye.scene.survey.scattering;
+        let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
+        let maps = Maps { surface: PhotonMap::build(photons.surface), volume };
         phases.light += t1 - t0;
         phases.map += cpu_seconds() - t1;
-        let photons = map.photons().len();
-        (map, Work { light_paths: u64::from(self.settings.photons), photons })
+        let photons = maps.len();
+        (maps, Work { light_paths: u64::from(self.settings.photons), photons })
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass {
@@ -142,16 +150,24 @@ impl Iterate for Sppm<'_> {
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
             trace_photons(self.eye.scene, self.surroundings, &self.light_pass(0, Domain::PilotLight))
         } else {
-            Vec::new()
+            Photons::default()
         };
-        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &PhotonMap::build(pilot));
-        bandwidths.into_iter().map(Pixel::new).collect()
+        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &PhotonMap::build(pilot.surface));
+        let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
+        if self.eye.scene.survey.scattering {
+            let pilot = PhotonMap::build(pilot.volume);
+            let bandwidths = initial_volume_bandwidths(&self.eye, initial, seed, &pilot);
+            for (pixel, bandwidth) in pixels.iter_mut().zip(bandwidths) {
+                pixel.volume_bandwidth = bandwidth;
+            }
+        }
+        pixels
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let (map, work) = self.map(i, phases);
+        let (maps, work) = self.map(i, phases);
         let start = cpu_seconds();
-        eye_pass(&self.eye, self.settings, i, &map, pixels);
+        eye_pass(&self.eye, self.settings, i, &maps, pixels);
         phases.eye += cpu_seconds() - start;
         work
     }

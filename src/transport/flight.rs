@@ -94,6 +94,7 @@ impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
                 from: self.from,
                 draws,
                 flight: Flight::FREE,
+                opacity: 1.0 - left.element_sum() / 3.0,
                 survival_scale: self.survival_scale,
                 met,
             };

@@ -3,7 +3,7 @@
 use super::eye::{Bandwidths, MAX_LEVELS};
 use crate::bsdf::{Gathering, LobeSet, Shading};
 use crate::math::{Rgb, Vec3, Vec3A};
-use crate::photon::{Near, Photon, PhotonFlags};
+use crate::photon::{Near, Photon, PhotonFlags, VolumePhoton};
 use bumpalo::Bump;
 use wide::f32x8;
 
@@ -14,6 +14,8 @@ pub struct Scratch {
     pub(super) arena: Bump,
     /// Photons near the last vertices.
     pub(super) near: Near<Photon>,
+    /// Photons in media near the last vertices there.
+    pub(super) near_volume: Near<VolumePhoton>,
 }
 
 /// Photons waiting for their BSDF, and the sums of those that have had it: by kind (other, caustic) and by the smallest level that holds

@@ -27,6 +27,8 @@ pub struct MediumVertex {
     pub draws: Draws,
     /// Densities of the last segment's flight.
     pub flight: Flight,
+    /// Share of the light that the medium takes from rays through all of it; 1 where chance has brought the path here.
+    pub opacity: f32,
     pub(super) survival_scale: f32,
 }
 

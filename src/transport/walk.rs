@@ -204,6 +204,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
                     from: origin,
                     draws,
                     flight,
+                    opacity: 1.0,
                     survival_scale,
                 };
                 // Where the channel that has brought it here scatters nothing, it carries nothing.

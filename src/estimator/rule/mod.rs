@@ -2,3 +2,4 @@
 
 pub mod chi_squared;
 pub mod memoryless;
+pub mod volume;
