@@ -15,6 +15,8 @@ pub mod geometry;
 
 pub mod trace;
 
+pub mod medium;
+
 pub mod texture;
 
 pub mod bsdf;

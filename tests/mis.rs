@@ -1,6 +1,6 @@
 //! The oracle of multiple importance sampling: every weight again, from explicit densities of whole paths.
 //!
-//! A recorder sees each contribution that the walks make on random paths in three scenes. The oracle walks the same paths by the same draws, writes down
+//! A recorder sees each contribution that the walks make on random paths in a few scenes, one of them foggy. The oracle walks the same paths by the same draws, writes down
 //! every vertex, multiplies densities per area for every strategy that could have made the path, and must find the weight that the
 //! recursion gave. Then the recursion is run by hand over the same vertices for all strategies of a path: the weights must sum to one, and no longer do
 //! when a bug is planted in it.
@@ -11,28 +11,44 @@ use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
 use caustique::light::{EmissionDensity, Emitter};
-use caustique::material::Material;
+use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::medium::{Flight, HenyeyGreenstein};
 use caustique::photon::PhotonMap;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
-    Bidirectional, Eye, Left, LightPass, LightVertices, Meets, MergeLevels, Next, PathStart, Record, Scattered,
-    Strategies, Surroundings, Technique, Vertex, Visitor, walk,
+    Bidirectional, Eye, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next, PathStart, Record,
+    Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
 const SIZE: u32 = 16;
 const TOLERANCE: f64 = 1e-4;
 
+/// How a vertex scatters.
+#[derive(Clone, Copy)]
+enum Scatters<'s> {
+    Surface(Shading<'s>),
+    Medium(HenyeyGreenstein),
+}
+
+impl Scatters<'_> {
+    fn in_medium(&self) -> bool {
+        matches!(self, Scatters::Medium(_))
+    }
+}
+
 /// A vertex as a walk has met it.
 #[derive(Clone, Copy)]
 struct Met<'s> {
     p: Vec3,
     ng: Vec3,
-    shading: Shading<'s>,
+    scatters: Scatters<'s>,
+    /// What the last segment went through.
+    medium: Option<MediumParameters>,
     /// Back along the walk.
     wo: Vec3,
     distance: f32,
@@ -54,7 +70,8 @@ impl<'a> Visitor<'a> for Notes<'a> {
         self.met.push(Met {
             p: v.surface.p,
             ng: v.surface.ng,
-            shading: *v.shading,
+            scatters: Scatters::Surface(*v.shading),
+            medium: v.interior.medium(self.scene),
             wo: v.wo,
             distance: v.distance,
             onward: None,
@@ -63,13 +80,33 @@ impl<'a> Visitor<'a> for Notes<'a> {
         Next::Continue(LobeSet::ALL)
     }
 
+    fn medium(&mut self, v: &MediumVertex, _: Option<Scattered>) -> Next {
+        self.met.push(Met {
+            p: v.met.p,
+            ng: Vec3::ZERO,
+            scatters: Scatters::Medium(v.phase()),
+            medium: Some(v.met.medium),
+            wo: v.wo,
+            distance: v.met.distance,
+            onward: None,
+            emitted: None,
+        });
+        Next::Continue(LobeSet::ALL)
+    }
+
+    fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
+        if let Some(last) = self.met.last_mut() {
+            last.onward = Some((sample.wi, false, sample.pdf_w));
+        }
+    }
+
     fn scatter(&mut self, _: &Vertex<'_, 'a>, sample: &BsdfSample) {
         if let Some(last) = self.met.last_mut() {
             last.onward = Some((sample.wi, sample.lobe == LobeSet::DELTA, sample.pdf_w));
         }
     }
 
-    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>) {
+    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>, _: Flight) {
         self.escaped = Some(direction);
     }
 }
@@ -80,10 +117,10 @@ fn notes<'a>(scene: &'a Scene, arena: &'a Bump, start: PathStart, stream: Stream
     notes
 }
 
-/// A surface vertex of a whole path.
+/// A vertex of a whole path.
 #[derive(Clone, Copy)]
 struct Node<'s> {
-    shading: Shading<'s>,
+    scatters: Scatters<'s>,
     to_light: Vec3,
     to_eye: Vec3,
     /// Cosines for arrivals from the light's and from the eye's side (two surfaces where a photon is merged).
@@ -100,6 +137,8 @@ struct Whole<'s> {
     nodes: Vec<Node<'s>>,
     /// Squared lengths: `distance2[j]` is that of the segment before node `j`; one more to the camera.
     distance2: Vec<f64>,
+    /// What they go through.
+    media: Vec<Option<MediumParameters>>,
     /// Density per solid angle of the rays of one pixel.
     camera_pdf_w: f64,
 }
@@ -123,8 +162,35 @@ impl<'s> Whole<'s> {
     {
         for met in met {
             self.nodes.push(passed(met, eye_side));
-            self.distance2.push(f64::from(met.distance) * f64::from(met.distance));
+            self.segment(f64::from(met.distance) * f64::from(met.distance), met.medium);
         }
+    }
+
+    fn segment(&mut self, distance2: f64, medium: Option<MediumParameters>) {
+        self.distance2.push(distance2);
+        self.media.push(medium);
+    }
+
+    /// Mean over channels of the density of flying segment `j` and stopping at a vertex of its medium, or of getting through.
+    fn flies(&self, j: usize, stops: bool) -> f64 {
+        let Some(medium) = self.media[j].filter(|m| m.sigma_s != Rgb::ZERO) else { return 1.0 };
+        let distance = self.distance2[j].sqrt();
+        let channel = |c: usize| {
+            let sigma = f64::from(medium.sigma_a[c]) + f64::from(medium.sigma_s[c]);
+            (-sigma * distance).exp() * if stops { sigma } else { 1.0 }
+        };
+        (0..3).map(channel).sum::<f64>() / 3.0
+    }
+
+    /// Whether the vertex at the start or end of a segment is in a medium; light and eye are not.
+    fn in_medium(&self, node: usize) -> bool {
+        self.nodes.get(node).is_some_and(|node| node.scatters.in_medium())
+    }
+
+    /// Flight along segment `j`, from the light to the eye.
+    fn flight(&self, j: usize) -> Flight {
+        let starts = j > 0 && self.in_medium(j - 1);
+        Flight { forward: self.flies(j, self.in_medium(j)) as f32, reverse: self.flies(j, starts) as f32 }
     }
 
     fn strategies(&self) -> Vec<Strategy> {
@@ -150,13 +216,16 @@ impl<'s> Whole<'s> {
         } else {
             (node.to_light, node.to_eye, Transport::Importance)
         };
-        let Shading { frame, ng, bsdf, .. } = node.shading;
+        let Shading { frame, ng, bsdf, .. } = match node.scatters {
+            Scatters::Medium(phase) => return f64::from(phase.pdf_w(from, to)),
+            Scatters::Surface(shading) => shading,
+        };
         f64::from(Shading::new(frame, ng, bsdf, from).pdf(to, transport, LobeSet::ALL))
     }
 
     /// Density per area of node `j` walked to from the light.
     fn light_pdf_a(&self, j: usize) -> f64 {
-        let cos = self.nodes[j].cos[0];
+        let cos = self.nodes[j].cos[0] * self.flies(j, self.in_medium(j));
         match j {
             0 if self.light.infinite => f64::from(self.light.onward) * cos,
             0 => f64::from(self.light.onward) * cos / self.distance2[0],
@@ -167,7 +236,7 @@ impl<'s> Whole<'s> {
     /// Density per area of node `j` walked to from the eye.
     fn eye_pdf_a(&self, j: usize) -> f64 {
         let pdf = if j + 1 == self.nodes.len() { self.camera_pdf_w } else { self.scatters(j + 1, true) };
-        pdf * self.nodes[j].cos[1] / self.distance2[j + 1]
+        pdf * self.nodes[j].cos[1] / self.distance2[j + 1] * self.flies(j + 1, self.in_medium(j))
     }
 
     /// Number of samples times density of the path by a strategy.
@@ -180,14 +249,14 @@ impl<'s> Whole<'s> {
             Strategy::Hit if self.light.delta => 0.0,
             Strategy::Hit => {
                 let measure = if self.light.infinite { 1.0 } else { f64::from(self.light.cos) / self.distance2[0] };
-                self.scatters(0, true) * measure * eye(0)
+                self.scatters(0, true) * measure * self.flies(0, false) * eye(0)
             }
             Strategy::NextEvent if smooth(0) => light(0) * eye(0),
             Strategy::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
             Strategy::Camera if smooth(k - 1) => light_paths * light(k),
             Strategy::Merge(m) => {
                 let (from_light, from_eye) = (m as u32 + 1, (k - m) as u32);
-                if !smooth(m) || !which.light_merges(from_light) || !which.eye_merges(from_eye) {
+                if !smooth(m) || self.in_medium(m) || !which.light_merges(from_light) || !which.eye_merges(from_eye) {
                     return 0.0;
                 }
                 f64::from(eta.0) * light(m + 1) * eye(m)
@@ -205,6 +274,10 @@ impl<'s> Whole<'s> {
     fn recursive(&self, which: &Strategies, light_paths: f64, eta: Eta, bug: Option<Bug>) -> Vec<f64> {
         let k = self.nodes.len();
         let cosine = |c: f64| if bug == Some(Bug::Cosine) { 1.0 } else { c as f32 };
+        let flight = |j: usize, eye_side: bool| {
+            let Flight { forward, reverse } = if bug == Some(Bug::Flight) { Flight::FREE } else { self.flight(j) };
+            if eye_side { Flight { forward: reverse, reverse: forward } } else { Flight { forward, reverse } }
+        };
         let go = |mis: MisState, j: usize, to_light: bool, merges: bool| {
             let cos = self.nodes[j].cos[usize::from(!to_light)] as f32;
             let cos = if to_light { self.nodes[j].cos[0] as f32 } else { cos };
@@ -221,17 +294,18 @@ impl<'s> Whole<'s> {
         let mut mis = MisState::light(&self.light);
         for j in 0..k {
             let distance2 = if j == 0 && self.light.infinite { 1.0 } else { self.distance2[j] as f32 };
-            mis = mis.arrive(distance2, cosine(self.nodes[j].cos[0]));
+            mis = mis.arrive(distance2, cosine(self.nodes[j].cos[0])).fly(flight(j, false));
             lights.push(mis);
             let from = if bug == Some(Bug::DirectMerged) { 1 } else { j as u32 + 1 };
-            mis = go(mis, j, false, which.light_merges(from) || (bug == Some(Bug::DirectMerged) && which.merge));
+            let merges = which.light_merges(from) || (bug == Some(Bug::DirectMerged) && which.merge);
+            mis = go(mis, j, false, merges && !self.in_medium(j));
         }
         let mut mis = MisState::camera(light_paths as f32, self.camera_pdf_w as f32);
         let mut before_light = mis;
         for j in (0..k).rev() {
-            mis = mis.arrive(self.distance2[j + 1] as f32, cosine(self.nodes[j].cos[1]));
+            mis = mis.arrive(self.distance2[j + 1] as f32, cosine(self.nodes[j].cos[1])).fly(flight(j + 1, true));
             eyes[j] = mis;
-            mis = go(mis, j, true, which.eye_merges((k - j) as u32));
+            mis = go(mis, j, true, which.eye_merges((k - j) as u32) && !self.in_medium(j));
             before_light = mis;
         }
         let possible = |s: Strategy| self.density(s, which, light_paths, eta) > 0.0;
@@ -247,14 +321,15 @@ impl<'s> Whole<'s> {
                     } else {
                         before_light.arrive(self.distance2[0] as f32, self.light.cos)
                     };
-                    mis::hit(&at, &self.light).weight(eta)
+                    mis::hit(&at.fly(flight(0, true)), &self.light).weight(eta)
                 }
                 Strategy::NextEvent => {
                     let d2 = self.distance2[0] as f32;
                     let solid = if self.light.infinite || self.light.delta { 1.0 } else { d2 / self.light.cos };
                     let reach = if self.light.infinite { 1.0 } else { 1.0 / d2 };
-                    let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32;
-                    let pdfs = (reverse(0, true), reverse(0, false));
+                    let Flight { forward, reverse: back } = self.flight(0);
+                    let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32 * forward;
+                    let pdfs = (reverse(0, true) * back, reverse(0, false));
                     mis::next_event(&eyes[0], pdfs, (self.light.direct * solid, arrival), self.light.delta).weight(eta)
                 }
                 Strategy::Connect(s) => {
@@ -262,13 +337,13 @@ impl<'s> Whole<'s> {
                         mis: &lights[s - 1],
                         reverse_pdf_w: reverse(s - 1, true),
                         arrival_pdf_a: self.eye_pdf_a(s - 1) as f32,
-                        merges: which.light_merges(s as u32),
+                        merges: which.light_merges(s as u32) && !self.in_medium(s - 1),
                     };
                     let eye = mis::End {
                         mis: &eyes[s],
                         reverse_pdf_w: reverse(s, false),
                         arrival_pdf_a: self.light_pdf_a(s) as f32,
-                        merges: which.eye_merges((k - s) as u32),
+                        merges: which.eye_merges((k - s) as u32) && !self.in_medium(s),
                     };
                     mis::connect(&light, &eye).weight(eta)
                 }
@@ -293,7 +368,11 @@ enum Bug {
     Reverse,
     /// Merges counted where none are made.
     DirectMerged,
+    /// Flight through media forgotten.
+    Flight,
 }
+
+const BUGS: [Bug; 4] = [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::Flight];
 
 /// What the library has said.
 #[derive(Default)]
@@ -314,9 +393,9 @@ fn passed<'s>(met: &Met<'s>, eye_side: bool) -> Node<'s> {
 
 /// A node whose light side was met as `light` and whose eye side as `eye`, which scatters.
 fn node<'s>(light: &Met<'s>, eye: &Met<'s>, to_light: Vec3, to_eye: Vec3) -> Node<'s> {
-    let cos = |w: Vec3, met: &Met| f64::from(w.dot(met.ng).abs());
+    let cos = |w: Vec3, met: &Met| if met.scatters.in_medium() { 1.0 } else { f64::from(w.dot(met.ng).abs()) };
     Node {
-        shading: eye.shading,
+        scatters: eye.scatters,
         to_light,
         to_eye,
         cos: [cos(to_light, light), cos(to_eye, eye)],
@@ -329,7 +408,9 @@ struct Tally {
     weights: usize,
     techniques: std::collections::BTreeMap<&'static str, usize>,
     sums: usize,
-    bugs: [f64; 3],
+    bugs: [f64; 4],
+    /// Weights of paths with vertices in media.
+    in_media: usize,
 }
 
 /// Compares all that happens on `paths` random pairs of paths.
@@ -344,7 +425,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let eta = Eta::new(radius * radius, 2.0 * pixels);
     // Wider than eta says, so that enough is merged: weights know nothing of distances.
     let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
-    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; 3] };
+    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; 4], in_media: 0 };
     for path in 0..paths {
         let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
         let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
@@ -369,8 +450,13 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
             let density = emitted.as_ref().map(|e| e.density);
             let infinity = EmissionDensity { direct: 0.0, onward: 0.0, cos: 1.0, infinite: true, delta: false };
-            let mut whole =
-                Whole { light: density.unwrap_or(infinity), nodes: vec![], distance2: vec![], camera_pdf_w };
+            let mut whole = Whole {
+                light: density.unwrap_or(infinity),
+                nodes: vec![],
+                distance2: vec![],
+                media: vec![],
+                camera_pdf_w,
+            };
             let (name, strategy) = match technique {
                 Technique::Hit { eye: 1 } => continue,
                 Technique::Hit { eye: 0 } => {
@@ -381,14 +467,14 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let met = from_eye[from_eye.len() - 1];
                     whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
                     scene.lights.escape(direction, |_, pdf| whole.light.direct = pdf);
-                    whole.distance2.push(1.0);
+                    whole.segment(1.0, None);
                     whole.append(from_eye[..from_eye.len()].iter().rev(), true);
                     ("hit", Strategy::Hit)
                 }
                 Technique::Hit { eye: t } => {
                     let t = t as usize;
                     whole.light = from_eye[t - 1].emitted.expect("a lamp");
-                    whole.distance2.push(square(from_eye[t - 1].distance));
+                    whole.segment(square(from_eye[t - 1].distance), from_eye[t - 1].medium);
                     whole.append(from_eye[..t - 1].iter().rev(), true);
                     ("hit", Strategy::Hit)
                 }
@@ -427,7 +513,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                         }
                     };
                     assert_eq!(from, sample.target.unwrap_or(sample.wi));
-                    whole.distance2.push(distance2);
+                    whole.segment(distance2, scene.medium);
                     whole.append(from_eye[..t as usize].iter().rev(), true);
                     whole.nodes[0] = node(met, met, sample.wi, met.wo);
                     ("next event", Strategy::NextEvent)
@@ -438,7 +524,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let d = (b.p - a.p).normalize();
                     whole.append(from_light[..s].iter(), false);
                     whole.nodes[s - 1] = node(a, a, a.wo, d);
-                    whole.distance2.push(f64::from(b.p.distance_squared(a.p)));
+                    whole.segment(f64::from(b.p.distance_squared(a.p)), scene.medium);
                     whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s] = node(b, b, -d, b.wo);
                     ("connect", Strategy::Connect(s))
@@ -449,7 +535,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let d = (from - met.p).normalize();
                     whole.append(from_light[..s].iter(), false);
                     whole.nodes[s - 1] = node(met, met, met.wo, d);
-                    whole.distance2.push(f64::from(from.distance_squared(met.p)));
+                    whole.segment(f64::from(from.distance_squared(met.p)), scene.medium);
                     whole.camera_pdf_w = f64::from(camera.pdf_w(-d) * pixels);
                     ("camera", Strategy::Camera)
                 }
@@ -476,25 +562,28 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                 "{what}, path {path}, {technique:?}: {found} by recursion, {expected} by densities"
             );
             tally.weights += 1;
+            tally.in_media += usize::from(whole.nodes.iter().any(|node| node.scatters.in_medium()));
             *tally.techniques.entry(name).or_default() += 1;
             if strategy != Strategy::Hit || whole.strategies().len() > 2 {
                 let sum = |bug| whole.recursive(&strategies, f64::from(pixels), eta, bug).iter().sum::<f64>();
                 let error = (sum(None) - 1.0).abs();
                 assert!(error <= TOLERANCE, "{what}, path {path}, {technique:?}: the weights sum to 1 + {error}");
                 tally.sums += 1;
-                for (bug, worst) in [Bug::Cosine, Bug::Reverse, Bug::DirectMerged].into_iter().zip(&mut tally.bugs) {
+                for (bug, worst) in BUGS.into_iter().zip(&mut tally.bugs) {
                     *worst = worst.max((sum(Some(bug)) - 1.0).abs());
                 }
             }
         }
     }
     println!(
-        "{what}: {} weights, {} sums, {:?}; planted bugs {:?}",
-        tally.weights, tally.sums, tally.techniques, tally.bugs
+        "{what}: {} weights, {} with media, {} sums, {:?}; planted bugs {:?}",
+        tally.weights, tally.in_media, tally.sums, tally.techniques, tally.bugs
     );
     assert!(tally.techniques.len() >= 4 && tally.weights > 1000, "{what}: too little happened");
-    for worst in tally.bugs {
-        assert!(worst > 100.0 * TOLERANCE, "{what}: a planted bug goes unnoticed ({worst})");
+    let media = scene.survey.scattering;
+    assert_eq!(tally.in_media > tally.weights / 4, media, "{what}: {} paths through media", tally.in_media);
+    for (bug, worst) in BUGS.into_iter().zip(tally.bugs).filter(|(bug, _)| *bug != Bug::Flight || media) {
+        assert!(worst > 100.0 * TOLERANCE, "{what}: {bug:?} goes unnoticed ({worst})");
     }
 }
 
@@ -546,4 +635,27 @@ fn under_an_environment() {
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.4, 0.0), 40.0));
     check("environment", &build(description), 0.1, 4000);
+}
+
+/// Coloured fog in a room with a mirror and a ball of clear glass: vertices in the medium, segments through it, and nothing in the ball.
+#[test]
+fn lamp_in_fog() {
+    let mut description = room();
+    let lamp = quad(Vec3::new(-0.4, 1.9, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.2, 8.0) });
+    add(&mut description, "mirror", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), mirror());
+    add(&mut description, "glass", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), glass(1.4));
+    let (sigma_a, sigma_s) = (Rgb::new(0.02, 0.1, 0.3), Rgb::new(0.9, 0.5, 0.3));
+    description.medium = Some(MediumParameters { sigma_a, sigma_s, g: 0.5 });
+    check("fog", &build(description), 0.1, 2000);
+}
+
+/// The same without a size of the lamp.
+#[test]
+fn point_light_in_fog() {
+    let mut description = room();
+    add(&mut description, "mirror", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), mirror());
+    description.lights.push(point_light(DVec3::new(0.1, 1.7, 0.2), 3.0));
+    description.medium = Some(MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::splat(0.8), g: -0.3 });
+    check("point light in fog", &build(description), 0.1, 2000);
 }

@@ -6,9 +6,9 @@
 //! gets the median of the others (or, with no others, the cap at the scene's size).
 
 use crate::camera::{Camera, band, par_pixels};
-use crate::photon::{Nearest, PhotonMap};
-use crate::random::{Domain, Streams};
-use crate::transport::{Eye, GatherPoint};
+use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
+use crate::random::{Domain, Stream, Streams};
+use crate::transport::{Eye, GatherPoint, PathStart};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -39,6 +39,26 @@ pub fn span(camera: &Camera, length: f32) -> f32 {
 
 /// Largest initial bandwidth of every pixel, row by row.
 pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilot: &PhotonMap) -> Vec<f32> {
+    bandwidths(eye, rule, seed, pilot, |arena, start| eye.gather_point(arena, start))
+}
+
+/// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path, in three dimensions.
+pub fn initial_volume_bandwidths(
+    eye: &Eye<'_>,
+    rule: InitialBandwidth,
+    seed: u64,
+    pilot: &PhotonMap<VolumePhoton>,
+) -> Vec<f32> {
+    bandwidths(eye, rule, seed, pilot, |arena, start| eye.volume_point(arena, start))
+}
+
+fn bandwidths<P: Located>(
+    eye: &Eye<'_>,
+    rule: InitialBandwidth,
+    seed: u64,
+    pilot: &PhotonMap<P>,
+    find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
+) -> Vec<f32> {
     let (scene, camera) = (eye.scene, eye.camera);
     let (width, height) = camera.size();
     let pixels = width as usize * height as usize;
@@ -46,7 +66,7 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
         return vec![r; pixels];
     }
     let least = LEAST * scene.lights.sky().radius;
-    let of_point = |nearest: &mut Nearest, point: &GatherPoint| {
+    let of_point = |nearest: &mut Nearest<P>, point: &GatherPoint| {
         let span = span(camera, point.length);
         let cap = SCREEN_CAP * span;
         let r = match rule {
@@ -62,11 +82,11 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
     par_pixels(
         found.par_chunks_mut(band(width)),
         (width, height),
-        <(Bump, Nearest)>::default,
+        <(Bump, Nearest<P>)>::default,
         |(arena, nearest), found, places| {
             let starts = eye.starts(places, streams);
             for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                found[place.at] = eye.gather_point(arena, start).map(|point| of_point(nearest, &point));
+                found[place.at] = find(arena, start).map(|point| of_point(nearest, &point));
                 arena.reset();
             }
         },

@@ -14,8 +14,10 @@ pub struct Parts {
     pub direct: DVec3,
     /// Caustics.
     pub caustic: DVec3,
-    /// Everything else.
+    /// Everything else from surfaces.
     pub indirect: DVec3,
+    /// Light scattered by media on its way to the eye.
+    pub volume: DVec3,
 }
 
 /// Statistics of one pixel over the iterations so far.
@@ -46,6 +48,8 @@ pub struct Pixel {
     pub rejected: u32,
     /// Largest initial bandwidth (scene units).
     pub bandwidth: f32,
+    /// The same for photons in media; 0 where there are none.
+    pub volume_bandwidth: f32,
     /// Camera depth of the first visible hit of the first iteration; 1e10 where there is none.
     pub z: f32,
     /// Its position.
@@ -96,6 +100,7 @@ impl Pixel {
         self.parts.direct += measure.direct.as_dvec3();
         self.parts.caustic += measure.caustic_photons[level].as_dvec3();
         self.parts.indirect += (measure.indirect + measure.indirect_photons[level]).as_dvec3();
+        self.parts.volume += (measure.volume + measure.volume_photons[level]).as_dvec3();
         for measure in std::iter::once(independent).chain(correlated) {
             self.coverage.add(measure.first.map(|first| first.instance));
             let features = measure.features;

@@ -71,7 +71,7 @@ pub fn describe(name: &str) -> Option<Description> {
         "Indirect" => is("RGB", RADIANCE, "light after several bounces, caustics excepted"),
         "Caustic" => is("RGB", RADIANCE, "light from a rough surface that mirrors or glass sent there"),
         "Emission" => is("RGB", RADIANCE, "light that reaches the camera from its source without a rough bounce"),
-        "Volume" => is("RGB", RADIANCE, "light scattered by media"),
+        "Volume" => is("RGB", RADIANCE, "light scattered to the camera by media"),
         "Error" => is("RGB", RADIANCE, "estimated standard error of the uncombined image (Noisy), bias included"),
         "albedo" => is("RGB", "1", "reflectance at the first hit that is not a mirror or clear glass"),
         "normal" => is("XYZ", "1", "world-space unit normal at that hit"),

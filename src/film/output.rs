@@ -4,8 +4,9 @@
 //!   of the estimate's own size, which is finite and says that nothing is known. The file's header says `"variance_known": false`.
 //! - `Error` is the estimated standard error of the uncombined image, the layer `Noisy`; the combined picture has no estimate of its own.
 //!   The file's header says `"error_of": "Noisy"`.
-//! - `A` is the fraction of eye paths that hit a surface; where an environment shines the background is part of the picture,
+//! - `A` is the fraction of eye paths that hit a surface or are taken by a medium in a mesh; where an environment shines the background is part of the picture,
 //!   and it is 1.
+//! - `Volume` is there only where media scatter.
 //! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and `normal` are zero there.
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
@@ -34,6 +35,8 @@ pub struct Shape {
     pub radius2_factor: f64,
     /// Whether an environment light can be seen.
     pub environment: bool,
+    /// Whether media scatter.
+    pub volume: bool,
 }
 
 /// Values of one layer at one pixel, as many as it has components.
@@ -71,7 +74,7 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, bandwidths, radius2_factor, environment } = *shape;
+    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, volume } = *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
@@ -99,6 +102,11 @@ fn columns(shape: &Shape) -> Vec<Column> {
         Column::rgb("Indirect", |p| mean(p.parts.indirect, p.iterations)),
         Column::rgb("Caustic", |p| mean(p.parts.caustic, p.iterations)),
         Column::rgb("Emission", |p| mean(p.parts.emission, p.iterations)),
+    ]);
+    if volume {
+        columns.push(Column::rgb("Volume", |p| mean(p.parts.volume, p.iterations)));
+    }
+    columns.extend([
         Column::rgb("Error", move |p| match SquaredError::of(p, own, compared) {
             Some(error) => error.root(),
             None => p.levels[own].mean.abs(),
@@ -179,8 +187,15 @@ mod tests {
     use crate::math::Rgb;
     use crate::transport::{EyeMeasure, Features, FirstHit};
 
-    const SHAPE: Shape =
-        Shape { levels: 5, compared: 5, own: 3, bandwidths: true, radius2_factor: 0.25, environment: false };
+    const SHAPE: Shape = Shape {
+        levels: 5,
+        compared: 5,
+        own: 3,
+        bandwidths: true,
+        radius2_factor: 0.25,
+        environment: false,
+        volume: true,
+    };
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
     fn measure(x: f32, hit: bool) -> EyeMeasure {
@@ -191,6 +206,8 @@ mod tests {
             indirect: Rgb::splat(0.5 * x),
             caustic_photons: photons,
             indirect_photons: photons,
+            volume: Rgb::splat(0.3 * x),
+            volume_photons: photons.map(|light| light * 0.7),
             features: if hit {
                 Features { albedo: Rgb::splat(0.5), normal: Vec3::Y, depth: 4.0 }
             } else {
@@ -213,7 +230,7 @@ mod tests {
         }
         let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
         for c in ["R", "G", "B"] {
-            let parts = ["Direct", "Indirect", "Caustic", "Emission"];
+            let parts = ["Direct", "Indirect", "Caustic", "Emission", "Volume"];
             let sum: f32 = parts.iter().map(|part| value(&set, part, c)).sum();
             assert!((sum / value(&set, "Noisy", c) - 1.0).abs() < 1e-6);
             assert_eq!(value(&set, "Noisy", c), value(&set, "Level4", c));
@@ -227,6 +244,8 @@ mod tests {
         assert_eq!(value(&set, "", "A"), 0.9);
         assert!((value(&set, "albedo", "R") - 0.45).abs() < 1e-6);
         assert_eq!((value(&set, "depth", "Z"), value(&set, "normal", "Y")), (4.0, 1.0));
+        let clear = Shape { volume: false, ..SHAPE };
+        assert_eq!(names(&clear).len() + 1, names(&SHAPE).len());
         assert_eq!(names(&SHAPE), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
     }
 

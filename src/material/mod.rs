@@ -4,6 +4,7 @@ mod evaluate;
 mod library;
 mod scattering;
 
+pub use crate::medium::MediumParameters;
 pub use library::Materials;
 pub use scattering::Scattering;
 
@@ -20,17 +21,6 @@ pub enum Alpha {
     Mask(f32),
     /// A hit counts with probability alpha.
     Blend,
-}
-
-/// A homogeneous medium (1/m).
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct MediumParameters {
-    /// Absorption coefficient.
-    pub sigma_a: Rgb,
-    /// Scattering coefficient.
-    pub sigma_s: Rgb,
-    /// Henyey-Greenstein asymmetry, in (-1, 1).
-    pub g: f32,
 }
 
 /// A glTF material. Factors multiply their textures.

@@ -4,8 +4,10 @@ pub mod kernel;
 mod map;
 mod near;
 mod nearest;
+mod volume;
 
 pub use kernel::Kernel;
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
 pub use near::{Near, same_surface};
 pub use nearest::{MAX_NEIGHBOURS, Nearest};
+pub use volume::{NO_NORMAL, VolumePhoton};

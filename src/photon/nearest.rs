@@ -1,5 +1,6 @@
 //! k-th nearest neighbour, for initial bandwidths.
 
+use super::map::Located;
 use super::near::{Near, same_surface};
 use super::{Photon, PhotonMap};
 use crate::math::Vec3;
@@ -12,18 +13,23 @@ const GUESS: f32 = 1.3;
 
 /// Searches for the k-th nearest photon; one per worker and map. A search that follows another nearby begins with its
 /// result, which changes the effort, never the outcome.
-#[derive(Default)]
-pub struct Nearest {
-    near: Near<Photon>,
+pub struct Nearest<P = Photon> {
+    near: Near<P>,
     distances2: Vec<f32>,
     /// Squared distance that the last search found.
     last2: f32,
 }
 
-impl Nearest {
+impl<P> Default for Nearest<P> {
+    fn default() -> Self {
+        Nearest { near: Near::default(), distances2: Vec::new(), last2: 0.0 }
+    }
+}
+
+impl<P: Located> Nearest<P> {
     /// Squared distance from `p` to its `k`-th nearest photon among those whose surface is that of normal `ng` and that lie nearer than
     /// `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
-    pub fn radius2(&mut self, map: &PhotonMap, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
+    pub fn radius2(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
         let guess2 = (self.last2 * (GUESS * GUESS)).min(limit2);
         let mut found = None;
         if guess2 > 0.0 {
@@ -42,14 +48,14 @@ impl Nearest {
     }
 
     /// Without a guess.
-    fn search(&mut self, map: &PhotonMap, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
+    fn search(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
         // A sorted run of the best distances: k is small, and an insertion moves half of it.
         let best = &mut self.distances2;
         best.clear();
         // The neighbourhood along the curve bounds the distance, so that the search proper starts small.
         let mut bound = limit2;
         for photon in map.around(p, 2 * k) {
-            let distance2 = photon.p.distance_squared(p);
+            let distance2 = photon.position().distance_squared(p);
             if distance2 < bound && same_surface(photon, ng) {
                 bound = insert(best, k, distance2, bound);
             }
@@ -101,7 +107,7 @@ mod tests {
             })
             .collect();
         let map = PhotonMap::build(photons.clone());
-        let mut nearest = Nearest::default();
+        let mut nearest = Nearest::<Photon>::default();
         for q in 0..200 {
             let k = [1, 10, 20, 500][q as usize % 4];
             // Some near the one before, some far.

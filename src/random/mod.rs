@@ -166,6 +166,12 @@ pub struct Draws {
 }
 
 impl Draws {
+    /// Draws for the `n`-th of several like decisions at this vertex.
+    #[inline]
+    pub fn nth(self, n: u32) -> Draws {
+        Draws { key: mix(self.key ^ (u64::from(n) + 1).wrapping_mul(0xa076_1d64_78bd_642f)), ..self }
+    }
+
     /// 64 random bits for `purpose`.
     #[inline]
     pub fn bits(self, purpose: Purpose) -> u64 {

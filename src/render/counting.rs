@@ -1,6 +1,8 @@
 //! The methods whose bandwidths follow from the photons found: the passes of stochastic progressive photon mapping with a state of its own for every
 //! pixel and level, and a [`CountingRule`] that says what becomes of it.
 //!
+//! In media the rules are not defined, and bandwidths follow the memoryless rule of volumes.
+//!
 //! An iteration depends on all before it, so shards cannot share them out.
 
 use super::control::cpu_seconds;
@@ -9,6 +11,7 @@ use super::method::Method;
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::{Sppm, keep_first_hit};
+use super::volume::Maps;
 use crate::camera::{band, par_pixels};
 use crate::estimator::rule::CountingRule;
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -44,7 +47,7 @@ impl<'a, R: CountingRule> Counter<'a, R> {
         self.order.into_iter().take(self.bandwidths.len())
     }
 
-    /// Puts the levels of a measure, which are in the order of bandwidths, where they belong.
+    /// Puts the levels of photons on surfaces, which are in the order of bandwidths, where they belong.
     #[inline]
     fn by_level(&self, measure: &mut EyeMeasure) {
         if self.order.is_sorted() {
@@ -114,7 +117,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     }
 
     /// `maps` holds the photons, or those of each channel.
-    fn eye_pass(&mut self, i: u64, maps: &[PhotonMap], pixels: &mut [Pixel]) {
+    fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &mut [Pixel]) {
         let [independent, correlated] =
             [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
         let Counting { sppm, settings, rule, kernel, bandwidths, tallies, .. } = self;
@@ -136,17 +139,20 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             let correlated = levels.two_paths.then(|| eye.starts(places, correlated));
             for (k, place) in places.iter().enumerate() {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
+                let pixel = &mut pixels[place.at];
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
-                let mut measure = |start: &(PathStart, _), levels: Range<usize>| {
+                let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
                     let mut channel = |channel: usize| {
+                        let volume = maps[channel].volume(pixel, levels.clone());
                         let levels = channel * count + levels.start..channel * count + levels.end;
                         let tallies = &mut tallies[levels.start * each..levels.end * each];
                         let bandwidths = &mut bandwidths[levels];
                         let mut counter = Counter::new(rule, bandwidths, tallies);
                         let scratch = &mut scratches[channel];
-                        let mut measure = eye.measure(scratch, start, &maps[channel], &mut counter, kernel);
+                        let photons = &maps[channel].surface;
+                        let mut measure = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
                         counter.by_level(&mut measure);
                         rule.update(i, bandwidths, tallies);
                         measure
@@ -158,16 +164,15 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                     }
                     all
                 };
-                let pixel = &mut pixels[place.at];
                 match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                     Some(correlated) => {
-                        let first = measure(start, 0..1);
-                        let others = measure(correlated, 1..count);
+                        let first = measure(pixel, start, 0..1);
+                        let others = measure(pixel, correlated, 1..count);
                         keep_first_hit(&eye, pixel, &first);
                         pixel.add(&first, Some(&others), count, levels.own());
                     }
                     None => {
-                        let all = measure(start, 0..count);
+                        let all = measure(pixel, start, 0..count);
                         keep_first_hit(&eye, pixel, &all);
                         pixel.add(&all, None, count, levels.own());
                     }
@@ -179,8 +184,9 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
 
 /// Adds what photons brought to another measure of the same path.
 fn add_photons(all: &mut EyeMeasure, measure: &EyeMeasure) {
-    let sums = all.caustic_photons.iter_mut().chain(&mut all.indirect_photons);
-    for (sum, light) in sums.zip(measure.caustic_photons.iter().chain(&measure.indirect_photons)) {
+    let sums = all.caustic_photons.iter_mut().chain(&mut all.indirect_photons).chain(&mut all.volume_photons);
+    let photons = measure.caustic_photons.iter().chain(&measure.indirect_photons).chain(&measure.volume_photons);
+    for (sum, light) in sums.zip(photons) {
         *sum += *light;
     }
 }

@@ -14,6 +14,7 @@ mod settings;
 mod sppm;
 mod techniques;
 mod tiles;
+mod volume;
 
 pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
 pub use drive::render;

@@ -8,10 +8,27 @@ use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::film::{LayerSet, output};
+use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
-/// What the layers of a render with these settings depend on after `iterations` of them; `environment` tells whether one shines.
-pub fn shape(settings: &Settings, iterations: u64, environment: bool) -> output::Shape {
+/// What of a scene decides which layers there are.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Present {
+    /// An environment shines.
+    pub environment: bool,
+    /// Media scatter.
+    pub volume: bool,
+}
+
+impl Present {
+    /// In `scene`.
+    pub fn of(scene: &Scene) -> Present {
+        Present { environment: scene.lights.sky().environment.is_some(), volume: scene.survey.scattering }
+    }
+}
+
+/// What the layers of a render with these settings depend on after `iterations` of them.
+pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::Shape {
     // Iterations count from 1; a shard renders every `count`-th.
     let last = settings.shard.index + iterations.saturating_sub(1) * settings.shard.count + 1;
     output::Shape {
@@ -20,7 +37,8 @@ pub fn shape(settings: &Settings, iterations: u64, environment: bool) -> output:
         own: settings.levels.own(),
         bandwidths: settings.method.has_bandwidths(),
         radius2_factor: radius2_factor(last, settings.alpha),
-        environment,
+        environment: present.environment,
+        volume: present.volume,
     }
 }
 
@@ -48,8 +66,8 @@ impl Rendered {
     ///
     /// # Errors
     /// None for a render of ours: its pixels are as many as its size says.
-    pub fn layers(&self, environment: bool, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let shape = shape(&self.settings, self.iterations, environment);
+    pub fn layers(&self, present: Present, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
+        let shape = shape(&self.settings, self.iterations, present);
         layers((self.width, self.height), &self.pixels, &self.radii, &shape, wanted)
     }
 

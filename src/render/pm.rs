@@ -5,6 +5,8 @@
 //! own blurred and blotched one, never to the truth: only more photons help, and memory bounds their number. The
 //! estimated error, which is told from differences between iterations, does not know of it.
 //!
+//! Of light in media it has single scattering alone, no photons: not for scenes whose media scatter.
+//!
 //! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the number of paths that were
 //! traced.
 
@@ -20,7 +22,7 @@ use crate::math::Vec3;
 use crate::photon::{MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Scratch, Surroundings, light_path};
+use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -31,11 +33,11 @@ pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
 /// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by it.
 fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (Vec<Photon>, u32) {
-    let (mut photons, mut traced) = (Vec::new(), 0);
+    let (mut photons, mut traced): (Vec<Photon>, _) = (Vec::new(), 0);
     while traced < pass.paths() {
         let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
         let end = paths.end;
-        let batch = trace_some(scene, surroundings, pass, paths);
+        let batch = trace_some(scene, surroundings, pass, paths).surface;
         if photons.len() + batch.len() > most {
             break;
         }
@@ -44,14 +46,15 @@ fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usi
     }
     // The memory ends within a batch: path by path.
     let mut arena = Bump::new();
+    let mut path = Photons::default();
     while traced < pass.paths() {
-        let before = photons.len();
-        light_path(scene, &arena, surroundings, pass, traced, &mut photons);
+        light_path(scene, &arena, surroundings, pass, traced, &mut path);
         arena.reset();
-        if photons.len() > most {
-            photons.truncate(before);
+        if photons.len() + path.surface.len() > most {
             break;
         }
+        photons.append(&mut path.surface);
+        path.volume.clear();
         traced += 1;
     }
     let more = pass.paths() as f32 / traced.max(1) as f32;
@@ -135,7 +138,7 @@ impl Iterate for Pm<'_> {
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let pixel = &mut pixels[place.at];
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    let measure = eye.measure(scratch, start, &map, neighbours, kernel::Box);
+                    let measure = eye.measure(scratch, start, &map, None, neighbours, kernel::Box);
                     keep_first_hit(eye, pixel, &measure);
                     pixel.add(&measure, None, 1, 0);
                 }

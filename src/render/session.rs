@@ -201,8 +201,8 @@ impl<'a> Session<'a> {
     /// # Errors
     /// None: its pixels are as many as its size says.
     pub fn layers(&mut self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let environment = self.stage.scene.lights.sky().environment.is_some();
-        let shape = output::shape(&self.stage.settings, self.done, environment);
+        let present = output::Present::of(self.stage.scene);
+        let shape = output::shape(&self.stage.settings, self.done, present);
         output::layers(self.stage.camera.size(), &self.pixels, &self.passes.radii(), &shape, wanted)
     }
 

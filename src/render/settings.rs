@@ -3,7 +3,7 @@
 use super::method::Method;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
-use crate::estimator::rule::memoryless;
+use crate::estimator::rule::{memoryless, volume};
 #[cfg(doc)]
 use crate::photon::kernel;
 use crate::transport::MAX_LEVELS;
@@ -93,6 +93,8 @@ pub struct Settings {
     pub initial: InitialBandwidth,
     /// Reduction rate of the memoryless rule and that of local statistics, in (0, 1].
     pub alpha: f64,
+    /// The same for photons in media.
+    pub volume_alpha: f64,
     /// Rule of [`Method::Sppm`].
     pub radius_rule: RadiusRule,
     /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]; the other methods have the box kernel.
@@ -122,6 +124,7 @@ impl Default for Settings {
             techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             alpha: memoryless::ALPHA,
+            volume_alpha: volume::ALPHA,
             radius_rule: RadiusRule::Memoryless,
             kernel: KernelChoice::Box,
             chi_squared: ChiSquaredSettings::default(),

@@ -7,14 +7,15 @@ use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
+use super::volume::{Maps, VolumeMap};
 use crate::camera::{Camera, band, par_pixels};
-use crate::estimator::bandwidth::initial_bandwidths;
+use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths};
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::photon::{Kernel, Photon, PhotonMap, kernel};
+use crate::photon::{Kernel, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{EqualFlux, Eye, EyeMeasure, LevelRadii, LightPass, Scratch, Surroundings, light_path};
+use crate::transport::{EqualFlux, Eye, EyeMeasure, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,27 +24,23 @@ use std::ops::Range;
 const CHUNK: u32 = 1024;
 
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
-pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Vec<Photon> {
+pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Photons {
     trace_some(scene, surroundings, pass, 0..pass.paths())
 }
 
 /// Traces some of the light paths of a pass.
-pub(super) fn trace_some(
-    scene: &Scene,
-    surroundings: &Surroundings,
-    pass: &LightPass,
-    paths: Range<u32>,
-) -> Vec<Photon> {
+pub(super) fn trace_some(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, paths: Range<u32>) -> Photons {
     trace_by(paths, |arena, index, photons| light_path(scene, arena, surroundings, pass, index, photons))
 }
 
 /// Calls `light_path` for some paths; photons are in the order of paths.
-fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Vec<Photon>) + Sync) -> Vec<Photon> {
-    let parts: Vec<Vec<Photon>> = (0..paths.len() as u32)
+fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync) -> Photons {
+    let parts: Vec<Photons> = (0..paths.len() as u32)
         .into_par_iter()
         .step_by(CHUNK as usize)
         .map_init(Bump::new, |arena, first| {
-            let mut photons = Vec::with_capacity(CHUNK as usize * 2);
+            let surface = Vec::with_capacity(CHUNK as usize * 2);
+            let mut photons = Photons { surface, ..Photons::default() };
             let first = paths.start + first;
             for index in first..paths.end.min(first.saturating_add(CHUNK)) {
                 light_path(arena, index, &mut photons);
@@ -52,18 +49,13 @@ fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Vec<Phot
             photons
         })
         .collect();
-    parts.concat()
+    let (surface, volume): (Vec<_>, Vec<_>) = parts.into_iter().map(|part| (part.surface, part.volume)).unzip();
+    Photons { surface: surface.concat(), volume: volume.concat() }
 }
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
-fn eye_pass(
-    eye: &Eye<'_>,
-    settings: &Settings,
-    i: u64,
-    photons: &PhotonMap,
-    pixels: &mut [Pixel],
-    kernel: impl Kernel,
-) {
+fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, maps: &Maps, pixels: &mut [Pixel], kernel: impl Kernel) {
+    let photons = &maps.surface;
     let size = eye.camera.size();
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
@@ -83,14 +75,17 @@ fn eye_pass(
             let all = LevelRadii::new((0..levels.count).map(radius2));
             match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                 Some(correlated) => {
-                    let independent = eye.measure(scratch, start, photons, &all.part(0..1), kernel);
-                    let others = if levels.count > 1 { all.part(1..levels.count) } else { all };
-                    let correlated = eye.measure(scratch, correlated, photons, &others, kernel);
+                    let volume = maps.volume(pixel, 0..1);
+                    let independent = eye.measure(scratch, start, photons, volume, &all.part(0..1), kernel);
+                    let (from, others) = if levels.count > 1 { (1, all.part(1..levels.count)) } else { (0, all) };
+                    let volume = maps.volume(pixel, from..levels.count);
+                    let correlated = eye.measure(scratch, correlated, photons, volume, &others, kernel);
                     keep_first_hit(eye, pixel, &independent);
                     pixel.add(&independent, Some(&correlated), levels.count, levels.own());
                 }
                 None => {
-                    let all = eye.measure(scratch, start, photons, &all, kernel);
+                    let volume = maps.volume(pixel, 0..levels.count);
+                    let all = eye.measure(scratch, start, photons, volume, &all, kernel);
                     keep_first_hit(eye, pixel, &all);
                     pixel.add(&all, None, levels.count, levels.own());
                 }
@@ -131,7 +126,7 @@ impl<'a> Sppm<'a> {
     }
 
     /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
-    pub fn channel_maps(&self, i: u64, flux: &[Option<EqualFlux>; 3], phases: &mut Phases) -> ([PhotonMap; 3], Work) {
+    pub fn channel_maps(&self, i: u64, flux: &[Option<EqualFlux>; 3], phases: &mut Phases) -> ([Maps; 3], Work) {
         let mut work = Work { light_paths: 0, photons: 0 };
         let each = (self.settings.photons / 3).max(1);
         let Settings { seed, max_depth, .. } = *self.settings;
@@ -139,18 +134,18 @@ impl<'a> Sppm<'a> {
             let start = cpu_seconds();
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
-            let photons = flux[channel].map_or(Vec::new(), |flux| {
+            let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(0..each, |arena, index, photons| {
                     flux.light_path(self.eye.scene, arena, self.surroundings, &pass, index, photons);
                 })
             });
             let traced = cpu_seconds();
-            let map = PhotonMap::build(photons);
+            let maps = self.build(photons, i);
             phases.light += traced - start;
             phases.map += cpu_seconds() - traced;
             work.light_paths += u64::from(each);
-            work.photons += map.photons().len();
-            map
+            work.photons += maps.len();
+            maps
         });
         (maps, work)
     }
@@ -161,15 +156,22 @@ impl<'a> Sppm<'a> {
     }
 
     /// The photons of an iteration.
-    pub fn map(&self, i: u64, phases: &mut Phases) -> (PhotonMap, Work) {
+    pub fn map(&self, i: u64, phases: &mut Phases) -> (Maps, Work) {
         let t0 = cpu_seconds();
         let photons = trace_photons(self.eye.scene, self.surroundings, &self.light_pass(i, Domain::Light));
         let t1 = cpu_seconds();
-        let map = PhotonMap::build(photons);
+        let maps = self.build(photons, i);
         phases.light += t1 - t0;
         phases.map += cpu_seconds() - t1;
-        let photons = map.photons().len();
-        (map, Work { light_paths: u64::from(self.settings.photons), photons })
+        let photons = maps.len();
+        (maps, Work { light_paths: u64::from(self.settings.photons), photons })
+    }
+
+    /// Maps of the photons of iteration `i`.
+    fn build(&self, photons: Photons, i: u64) -> Maps {
+        let scatters = self.eye.scene.survey.scattering;
+        let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
+        Maps { surface: PhotonMap::build(photons.surface), volume }
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass {
@@ -184,19 +186,27 @@ impl Iterate for Sppm<'_> {
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
             trace_photons(self.eye.scene, self.surroundings, &self.light_pass(0, Domain::PilotLight))
         } else {
-            Vec::new()
+            Photons::default()
         };
-        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &PhotonMap::build(pilot));
-        bandwidths.into_iter().map(Pixel::new).collect()
+        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &PhotonMap::build(pilot.surface));
+        let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
+        if self.eye.scene.survey.scattering {
+            let pilot = PhotonMap::build(pilot.volume);
+            let bandwidths = initial_volume_bandwidths(&self.eye, initial, seed, &pilot);
+            for (pixel, bandwidth) in pixels.iter_mut().zip(bandwidths) {
+                pixel.volume_bandwidth = bandwidth;
+            }
+        }
+        pixels
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let (map, work) = self.map(i, phases);
+        let (maps, work) = self.map(i, phases);
         let start = cpu_seconds();
         match self.settings.kernel {
-            KernelChoice::Box => eye_pass(&self.eye, self.settings, i, &map, pixels, kernel::Box),
-            KernelChoice::Epanechnikov => eye_pass(&self.eye, self.settings, i, &map, pixels, kernel::Epanechnikov),
-            KernelChoice::Gaussian => eye_pass(&self.eye, self.settings, i, &map, pixels, kernel::Gaussian),
+            KernelChoice::Box => eye_pass(&self.eye, self.settings, i, &maps, pixels, kernel::Box),
+            KernelChoice::Epanechnikov => eye_pass(&self.eye, self.settings, i, &maps, pixels, kernel::Epanechnikov),
+            KernelChoice::Gaussian => eye_pass(&self.eye, self.settings, i, &maps, pixels, kernel::Gaussian),
         }
         phases.eye += cpu_seconds() - start;
         work

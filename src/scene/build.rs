@@ -32,19 +32,11 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     }
     for placed in &description.instances {
         let material = &description.materials[placed.material as usize];
-        let scatters = material.medium.is_some_and(|m| m.sigma_s.max_element() > 0.0);
-        for (present, what) in [
-            (material.dispersion > 0.0, "its dispersion is not simulated: all colours refract alike"),
-            (scatters, "scattering in its medium is not simulated: it only absorbs"),
-        ] {
-            let warning = format!("material \"{}\": {what}", material.name);
-            if present && !warnings.contains(&warning) {
-                warnings.push(warning);
-            }
+        let warning =
+            format!("material \"{}\": its dispersion is not simulated: all colours refract alike", material.name);
+        if material.dispersion > 0.0 && !warnings.contains(&warning) {
+            warnings.push(warning);
         }
-    }
-    if description.medium.is_some_and(|m| m.sigma_s.max_element() > 0.0) {
-        warnings.push("scene medium: its scattering is not simulated: it only absorbs".into());
     }
     add_lamps(&mut description);
     let (low, high) = bounds(&description);
@@ -81,6 +73,12 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     }
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
+    }
+    let opaque = description.medium.is_some_and(|medium| medium.transmittance(f32::INFINITY) == Rgb::ZERO);
+    if opaque && lights.emitters().iter().any(Emitter::is_infinite) {
+        warnings.push(
+            "the scene's medium has no end: no light of suns and environments gets through it (give a mesh around the scene the medium instead)".into(),
+        );
     }
     let scattering = Scattering::new(&materials.list);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);

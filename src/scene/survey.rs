@@ -15,6 +15,8 @@ pub struct Survey {
     pub null_boundaries: bool,
     /// Something absorbs or scatters between surfaces.
     pub media: bool,
+    /// Something scatters between surfaces.
+    pub scattering: bool,
     /// Some light cannot be hit by a ray.
     pub delta_lights: bool,
     /// Light comes from infinity.
@@ -24,7 +26,8 @@ pub struct Survey {
 impl Survey {
     /// Looks through the scene.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
-        let mut survey = Survey { media: medium.is_some(), ..Survey::default() };
+        let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());
+        let mut survey = Survey { media: medium.is_some(), scattering: scatters(&medium), ..Survey::default() };
         let mut worn = vec![0usize; materials.list.len()];
         for instance in &shapes.instances {
             worn[instance.material as usize] += 1;
@@ -38,6 +41,7 @@ impl Survey {
             if material.is_solid_glass() {
                 solids += worn;
                 survey.media |= material.medium.is_some();
+                survey.scattering |= scatters(&material.medium);
                 survey.null_boundaries |= material.ior == 1.0;
             }
         }

@@ -5,11 +5,12 @@
 //! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
 
 use super::eye::Eye;
-use super::interior::{Interior, Surroundings};
+use super::interior::Surroundings;
 use super::mis::{Eta, MisState, Ratios};
-use crate::bsdf::{LobeSet, Shading};
+use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
+use crate::medium::HenyeyGreenstein;
 
 /// Which strategies take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,25 +129,86 @@ pub trait Record {
 
 impl Record for () {}
 
+/// How a light path's vertex scatters.
+// Boxing the large variant would allocate once per vertex.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug)]
+pub enum Scatterer<'s> {
+    /// A surface.
+    Surface(Surface, Shading<'s>),
+    /// A point of a medium.
+    Medium(Vec3, HenyeyGreenstein),
+}
+
 /// A light path's vertex that eye vertices can be connected to.
 #[derive(Clone, Copy, Debug)]
 pub struct LightVertex<'s> {
-    /// The surface.
-    pub surface: Surface,
-    /// How it scatters.
-    pub shading: Shading<'s>,
+    /// Where and how it scatters.
+    pub scatterer: Scatterer<'s>,
     /// Unit direction towards where the light came from.
     pub wo: Vec3,
     /// Flux (W) of the path as if it were the only one.
     pub throughput: Rgb,
     /// Number of segments up to here.
     pub depth: u32,
-    /// The solids on the side of `wo`.
-    pub interior: Interior,
-    /// The solids behind the surface.
-    pub interior_behind: Interior,
     /// Partial sums of the weights.
     pub mis: MisState,
+}
+
+impl LightVertex<'_> {
+    /// World position.
+    #[inline]
+    pub fn p(&self) -> Vec3 {
+        match &self.scatterer {
+            Scatterer::Surface(surface, _) => surface.p,
+            Scatterer::Medium(p, _) => *p,
+        }
+    }
+
+    /// Whether it is in a medium.
+    #[inline]
+    pub fn in_medium(&self) -> bool {
+        matches!(self.scatterer, Scatterer::Medium(..))
+    }
+
+    /// Where a shadow ray that comes against `w` ends.
+    #[inline]
+    pub fn spawn(&self, w: Vec3) -> Vec3 {
+        match &self.scatterer {
+            Scatterer::Surface(surface, _) => surface.spawn(w),
+            Scatterer::Medium(p, _) => *p,
+        }
+    }
+
+    /// Geometric cosine of a direction; 1 in a medium.
+    #[inline]
+    pub fn cos(&self, w: Vec3) -> f32 {
+        match &self.scatterer {
+            Scatterer::Surface(surface, _) => w.dot(surface.ng).abs(),
+            Scatterer::Medium(..) => 1.0,
+        }
+    }
+
+    /// Scattering of its light into `wi` times the cosine, and the density of drawing `wi`.
+    #[inline]
+    pub fn evaluate_cos(&self, wi: Vec3) -> (Rgb, f32) {
+        match &self.scatterer {
+            Scatterer::Surface(_, shading) => shading.evaluate_cos(wi, Transport::Importance, LobeSet::ALL),
+            Scatterer::Medium(_, phase) => {
+                let f = phase.pdf_w(self.wo, wi);
+                (Rgb::splat(f), f)
+            }
+        }
+    }
+
+    /// Density with which an eye path that comes along `wi` would go back along the light path.
+    #[inline]
+    pub fn reverse_pdf(&self, wi: Vec3) -> f32 {
+        match &self.scatterer {
+            Scatterer::Surface(_, shading) => shading.reverse_pdf(wi, Transport::Radiance, LobeSet::ALL),
+            Scatterer::Medium(_, phase) => phase.pdf_w(self.wo, wi),
+        }
+    }
 }
 
 /// Part of the picture that some light belongs to.
@@ -158,8 +220,10 @@ pub enum Part {
     Direct,
     /// Light focused by mirrors and glass on to that vertex.
     Caustic,
-    /// Everything else.
+    /// Everything else from surfaces.
     Indirect,
+    /// Light whose first vertex that is not clear, seen from the eye, is in a medium.
+    Volume,
 }
 
 /// Where on its way an eye path is.
@@ -181,12 +245,14 @@ pub(super) struct Trail {
     pub length: f32,
     /// The first vertex that is not clear scattered broadly, all later ones did not.
     focus: bool,
+    /// The first vertex that is not clear is in a medium.
+    volume: bool,
     /// All vertices scattered by delta lobes.
     pub delta: bool,
 }
 
 impl Trail {
-    pub const START: Trail = Trail { stage: Stage::Clear, length: 0.0, focus: false, delta: true };
+    pub const START: Trail = Trail { stage: Stage::Clear, length: 0.0, focus: false, volume: false, delta: true };
 
     /// The last vertex sent the path on by `lobe`.
     #[inline]
@@ -204,6 +270,7 @@ impl Trail {
     pub fn hit(&self, lobe: Option<LobeSet>) -> Part {
         match (self.stage, lobe) {
             (Stage::Clear, _) => Part::Emission,
+            _ if self.volume => Part::Volume,
             (Stage::First, Some(lobe)) if lobe != LobeSet::DELTA => Part::Direct,
             (Stage::Later, _) if self.focus => Part::Caustic,
             _ => Part::Indirect,
@@ -212,8 +279,14 @@ impl Trail {
 
     /// Light at this vertex straight from a light.
     #[inline]
-    pub fn next_event(&self) -> Part {
-        if self.stage == Stage::Clear { Part::Direct } else { Part::Indirect }
+    pub fn next_event(&self, in_medium: bool) -> Part {
+        if self.stage == Stage::Clear && !in_medium { Part::Direct } else { self.connect(in_medium) }
+    }
+
+    /// Light at this vertex from vertices of light paths.
+    #[inline]
+    pub fn connect(&self, in_medium: bool) -> Part {
+        if self.volume || (in_medium && self.stage == Stage::Clear) { Part::Volume } else { Part::Indirect }
     }
 
     /// No vertex before this one scatters but by mirrors and clear glass.
@@ -230,6 +303,13 @@ impl Trail {
             Stage::Clear => Stage::First,
             _ => Stage::Later,
         };
+    }
+
+    /// Leaves a vertex in a medium.
+    #[inline]
+    pub fn leave_medium(&mut self) {
+        self.volume |= self.stage == Stage::Clear;
+        self.leave(true);
     }
 }
 

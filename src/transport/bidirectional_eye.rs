@@ -5,14 +5,14 @@ use super::bidirectional_light::{add, scatter};
 use super::eye::{EyeMeasure, Features, FirstHit};
 use super::mis::{self, End, MisState, Ratios};
 use super::photon_merge::{MergePhoton, merge_photons};
-use super::segment::transmittance;
+use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3, is_lit};
+use crate::medium::Flight;
 use crate::photon::PhotonMap;
 use crate::random::{Purpose, Stream, mix};
-use crate::scene::Scene;
 use bumpalo::Bump;
 
 /// What an eye path meets.
@@ -57,21 +57,22 @@ pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_, '_>, scattered: Option
     }
 }
 
-/// Light left on the way from `vertex` along `wi` to `target` (`None`: out of the scene).
+/// As [`look`], in a medium.
 #[inline]
-pub(super) fn visible(scene: &Scene, vertex: &Vertex<'_, '_>, wi: Vec3, target: Option<Vec3>, token: u32) -> Rgb {
-    let origin = vertex.surface.spawn(wi);
-    let (direction, tmax) = match target {
-        None => (wi, f32::INFINITY),
-        Some(target) => {
-            let to = target - origin;
-            let distance = to.length();
-            (to / distance, distance)
-        }
-    };
-    let crosses = wi.dot(vertex.surface.ng) * vertex.wo.dot(vertex.surface.ng) < 0.0;
-    let interior = if crosses { vertex.interior_behind } else { vertex.interior };
-    transmittance(scene, origin, direction, tmax, interior, token)
+pub(super) fn look_in_medium(
+    trail: &mut Trail,
+    vertex: &MediumVertex,
+    scattered: Option<Scattered>,
+    measure: &mut EyeMeasure,
+) {
+    match scattered {
+        None => measure.first = vertex.met.first,
+        Some(scattered) => trail.scattered(scattered.lobe),
+    }
+    trail.length += vertex.met.distance;
+    if trail.is_clear() {
+        measure.features = Features { albedo: vertex.albedo(), normal: vertex.wo, depth: trail.length };
+    }
 }
 
 impl<R: Record> EyeWalk<'_, R> {
@@ -98,64 +99,80 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn next_event(&mut self, vertex: &Vertex<'_, '_>) {
+    fn next_event<S: Site>(&mut self, vertex: &S) {
         let scene = self.shared.eye.scene;
-        let Vertex { surface, shading, draws, .. } = vertex;
+        let draws = vertex.draws();
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
+        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, vertex.p(), choice, point) else {
             return;
         };
-        let (f, pdf) = shading.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
-        let value = vertex.throughput * f * light.radiance / light.pdf_w;
+        let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
+        let value = vertex.throughput() * f * light.radiance / light.pdf_w;
         if !is_lit(value) {
             return;
         }
-        let reverse = shading.reverse_pdf(light.wi, Transport::Importance, LobeSet::ALL);
-        let arrival_pdf_a = light.arrival_pdf_a * light.wi.dot(surface.ng).abs();
-        let ratios = mis::next_event(&self.mis, (pdf, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
-        let at = light.target.unwrap_or(light.wi);
-        self.record.contribution(Technique::NextEvent { eye: vertex.depth }, value, at, ratios);
-        let token = draws.token(Purpose::ShadowAlpha);
-        let value = value * visible(scene, vertex, light.wi, light.target, token);
-        self.add(Technique::NextEvent { eye: vertex.depth }, self.trail.next_event(), value, ratios);
+        let way = vertex.way(scene, light.wi, light.target, draws.token(Purpose::ShadowAlpha), false);
+        if !is_lit(way.left) {
+            return;
+        }
+        let reverse = vertex.reverse_pdf(light.wi, Transport::Importance);
+        let arrival_pdf_a = light.arrival_pdf_a * vertex.cos(light.wi) * way.flight.reverse;
+        let onward = pdf * way.flight.forward;
+        let ratios = mis::next_event(&self.mis, (onward, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
+        let (technique, at) = (Technique::NextEvent { eye: vertex.depth() }, light.target.unwrap_or(light.wi));
+        self.record.contribution(technique, value, at, ratios);
+        self.add(technique, self.trail.next_event(S::IN_MEDIUM), value * way.left, ratios);
     }
 
     #[inline]
-    fn connect(&mut self, vertex: &Vertex<'_, '_>, light: &LightVertex<'_>) {
+    fn connect<S: Site>(&mut self, vertex: &S, light: &LightVertex<'_>) {
         let Bidirectional { eye, strategies, .. } = self.shared;
-        let to = light.surface.p - vertex.surface.p;
+        let to = light.p() - vertex.p();
         let distance2 = to.length_squared();
         let d = to / distance2.sqrt();
-        let (f_eye, pdf_eye) = vertex.shading.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
+        let (f_eye, pdf_eye) = vertex.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
         if !is_lit(f_eye) {
             return;
         }
-        let (f_light, pdf_light) = light.shading.evaluate_cos(-d, Transport::Importance, LobeSet::ALL);
-        let value = vertex.throughput * f_eye * f_light * light.throughput / distance2;
+        let (f_light, pdf_light) = light.evaluate_cos(-d);
+        let value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
         if !is_lit(value) {
             return;
         }
-        let (cos_eye, cos_light) = (d.dot(vertex.surface.ng).abs(), d.dot(light.surface.ng).abs());
+        // Every pair of vertices has its own decisions at cut-outs.
+        let token = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
+        let way = vertex.way(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium());
+        if !is_lit(way.left) {
+            return;
+        }
+        let (cos_eye, cos_light) = (vertex.cos(d), light.cos(d));
         let ratios = mis::connect(
             &End {
                 mis: &light.mis,
-                reverse_pdf_w: light.shading.reverse_pdf(-d, Transport::Radiance, LobeSet::ALL),
-                arrival_pdf_a: pdf_eye * cos_light / distance2,
-                merges: strategies.light_merges(light.depth),
+                reverse_pdf_w: light.reverse_pdf(-d),
+                arrival_pdf_a: pdf_eye * cos_light / distance2 * way.flight.forward,
+                merges: strategies.light_merges(light.depth) && !light.in_medium(),
             },
             &End {
                 mis: &self.mis,
-                reverse_pdf_w: vertex.shading.reverse_pdf(d, Transport::Importance, LobeSet::ALL),
-                arrival_pdf_a: pdf_light * cos_eye / distance2,
-                merges: strategies.eye_merges(vertex.depth),
+                reverse_pdf_w: vertex.reverse_pdf(d, Transport::Importance),
+                arrival_pdf_a: pdf_light * cos_eye / distance2 * way.flight.reverse,
+                merges: strategies.eye_merges(vertex.depth()) && !S::IN_MEDIUM,
             },
         );
-        let technique = Technique::Connect { light: light.depth, eye: vertex.depth };
-        self.record.contribution(technique, value, light.surface.p, ratios);
-        // Every pair of vertices has its own decisions at cut-outs.
-        let token = mix(vertex.draws.bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
-        let value = value * visible(eye.scene, vertex, d, Some(light.surface.spawn(-d)), token);
-        self.add(technique, Part::Indirect, value, ratios);
+        let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
+        self.record.contribution(technique, value, light.p(), ratios);
+        self.add(technique, self.trail.connect(S::IN_MEDIUM), value * way.left, ratios);
+    }
+
+    /// Next-event estimation and connections.
+    #[inline]
+    fn connect_all(&mut self, vertex: &impl Site) {
+        self.next_event(vertex);
+        let longest = self.shared.eye.max_depth - vertex.depth();
+        for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {
+            self.connect(vertex, light);
+        }
     }
 }
 
@@ -166,24 +183,23 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         look(&mut self.trail, vertex, scattered, &mut self.measure);
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
-        self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos);
+        self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos).fly(vertex.flight);
         if let Some((radiance, density)) = eye.scene.lights.emitted(&eye.scene.materials, vertex.surface, vertex.wo) {
             self.run_into(vertex.throughput * radiance, vertex.depth, vertex.surface.p, scattered, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
         if smooth && vertex.depth < eye.max_depth {
             if strategies.connect {
-                self.next_event(vertex);
-                let longest = eye.max_depth - vertex.depth;
-                for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {
-                    self.connect(vertex, light);
-                }
+                self.connect_all(vertex);
             }
             if let (true, Some(photons)) = (strategies.eye_merges(vertex.depth), self.meets.photons) {
                 let (measure, clear) = (&mut self.measure, self.trail.is_clear());
+                let volume = self.trail.connect(false) == Part::Volume;
                 let longest = eye.max_depth - vertex.depth;
                 let add = |photon: &MergePhoton, level: usize, radiance: Rgb| {
-                    if clear && photon.depth == 1 {
+                    if volume {
+                        measure.volume_photons[level] += radiance;
+                    } else if clear && photon.depth == 1 {
                         // Only where all is merged, which has one level.
                         measure.direct += radiance;
                     } else if photon.caustic {
@@ -208,11 +224,32 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        let Bidirectional { eye, strategies, .. } = self.shared;
+        look_in_medium(&mut self.trail, vertex, scattered, &mut self.measure);
+        self.depth = vertex.depth;
+        self.mis = self.mis.arrive(vertex.met.distance * vertex.met.distance, 1.0).fly(vertex.flight);
+        if strategies.connect && vertex.depth < eye.max_depth {
+            self.connect_all(vertex);
+        }
+        self.trail.leave_medium();
+        self.last = vertex.met.p;
+        // As on surfaces: only mirrors and clear glass show what light tracing does not find.
+        if strategies.connect || strategies.merge { Next::Continue(LobeSet::ALL) } else { Next::Stop }
+    }
+
+    #[inline]
+    fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
+        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, false);
+    }
+
+    #[inline]
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }
         self.depth += 1;
+        self.mis = self.mis.fly(flight);
         let lights = &self.shared.eye.scene.lights;
         let onward = lights.entry_pdf_a(self.last, direction);
         lights.escape(direction, |radiance, direct| {

@@ -1,14 +1,15 @@
 //! Light paths of the bidirectional methods: what one leaves behind.
 
-use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Technique};
-use super::bidirectional_eye::visible;
+use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Scatterer, Technique};
 use super::eye::EyeMeasure;
 use super::light::LightPass;
 use super::mis::{self, MisState, Ratios};
 use super::photon_merge::MergePhoton;
+use super::site::{MediumVertex, Site};
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
+use crate::medium::Flight;
 use crate::random::Purpose;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
@@ -43,6 +44,7 @@ pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, part: Part, va
         Part::Direct => return measure.direct += value * ratios.weight(levels.eta()[0]),
         Part::Caustic => &mut measure.caustic_photons,
         Part::Indirect => &mut measure.indirect_photons,
+        Part::Volume => &mut measure.volume_photons,
     };
     for (into, &eta) in into.iter_mut().zip(levels.eta()) {
         *into += value * ratios.weight(eta);
@@ -73,36 +75,48 @@ struct LightWalk<'a, 's, R> {
 }
 
 impl<R: Record> LightWalk<'_, '_, R> {
-    fn connect_camera(&mut self, vertex: &Vertex<'_, '_>) {
+    #[inline]
+    fn arrive(&mut self, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
+        let first_from_infinity = scattered.is_none() && self.infinite;
+        let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
+        self.mis = self.mis.arrive(distance2, cos).fly(flight);
+    }
+
+    fn connect_camera<S: Site>(&mut self, vertex: &S) {
         let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
-        let Vertex { surface, shading, draws, .. } = vertex;
-        let Some(sample) = eye.camera.sample(surface.p, draws.two(Purpose::Lens)) else { return };
-        let f = shading.eval_cos(sample.wi, Transport::Importance, LobeSet::ALL);
+        let draws = vertex.draws();
+        let Some(sample) = eye.camera.sample(vertex.p(), draws.two(Purpose::Lens)) else { return };
+        let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Importance, LobeSet::ALL);
         // Density of the rays of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();
-        let value = vertex.throughput * f * (pdf_a / light_paths);
+        let value = vertex.throughput() * f * (pdf_a / light_paths);
         // Written so that NaN is dropped here, before it costs a ray.
         if !is_lit(value) {
             return;
         }
+        let way = vertex.way(eye.scene, sample.wi, Some(sample.lens), draws.token(Purpose::ShadowAlpha), false);
+        if !is_lit(way.left) {
+            return;
+        }
         let ratios = if strategies.connect {
-            let reverse = shading.reverse_pdf(sample.wi, Transport::Radiance, LobeSet::ALL);
-            mis::camera(&self.mis, pdf_a * sample.wi.dot(surface.ng).abs(), *light_paths, reverse)
+            let reverse = vertex.reverse_pdf(sample.wi, Transport::Radiance);
+            let arrival = pdf_a * vertex.cos(sample.wi) * way.flight.reverse;
+            mis::camera(&self.mis, arrival, *light_paths, reverse)
         } else {
             Ratios::ALONE
         };
-        self.record.contribution(Technique::Camera { light: vertex.depth }, value, sample.lens, ratios);
-        let token = draws.token(Purpose::ShadowAlpha);
-        let value = value * visible(eye.scene, vertex, sample.wi, Some(sample.lens), token);
+        self.record.contribution(Technique::Camera { light: vertex.depth() }, value, sample.lens, ratios);
+        let value = value * way.left;
         if value.max_element() > 0.0 {
             let (width, height) = eye.camera.size();
             let (x, y) = ((sample.film.x as u32).min(width - 1), (sample.film.y as u32).min(height - 1));
-            let part = match (vertex.depth, self.caustic) {
+            let part = match (vertex.depth(), self.caustic) {
+                _ if S::IN_MEDIUM => Part::Volume,
                 (1, _) => Part::Direct,
                 (_, true) => Part::Caustic,
                 _ => Part::Indirect,
             };
-            self.left.splats.push(Splat { pixel: y * width + x, light: vertex.depth, part, value, ratios });
+            self.left.splats.push(Splat { pixel: y * width + x, light: vertex.depth(), part, value, ratios });
         }
     }
 }
@@ -114,9 +128,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         if let Some(scattered) = scattered {
             self.caustic &= scattered.lobe != LobeSet::BROAD;
         }
-        let first_from_infinity = scattered.is_none() && self.infinite;
-        let distance2 = if first_from_infinity { 1.0 } else { vertex.distance * vertex.distance };
-        self.mis = self.mis.arrive(distance2, vertex.wo.dot(vertex.surface.ng).abs());
+        self.arrive(vertex.distance, vertex.wo.dot(vertex.surface.ng).abs(), vertex.flight, scattered);
         let lobes = vertex.shading.bsdf.lobes();
         // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders of materials.
         if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
@@ -126,13 +138,10 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
                 self.vertices.push(LightVertex {
-                    surface: *vertex.surface,
-                    shading: *vertex.shading,
+                    scatterer: Scatterer::Surface(*vertex.surface, *vertex.shading),
                     wo: vertex.wo,
                     throughput: vertex.throughput,
                     depth: vertex.depth,
-                    interior: vertex.interior,
-                    interior_behind: vertex.interior_behind,
                     mis: self.mis,
                 });
             }
@@ -141,6 +150,34 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
             }
         }
         Next::Continue(LobeSet::ALL)
+    }
+
+    #[inline]
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        let Bidirectional { eye, strategies, .. } = self.shared;
+        // What has come through a medium is no caustic's any more.
+        self.caustic = false;
+        self.arrive(vertex.met.distance, 1.0, vertex.flight, scattered);
+        if !self.photons_only && vertex.depth < eye.max_depth {
+            if strategies.connect {
+                self.vertices.push(LightVertex {
+                    scatterer: Scatterer::Medium(vertex.met.p, vertex.phase()),
+                    wo: vertex.wo,
+                    throughput: vertex.throughput,
+                    depth: vertex.depth,
+                    mis: self.mis,
+                });
+            }
+            if strategies.camera {
+                self.connect_camera(vertex);
+            }
+        }
+        Next::Continue(LobeSet::ALL)
+    }
+
+    #[inline]
+    fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
+        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, false);
     }
 
     #[inline]

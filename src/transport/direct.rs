@@ -5,8 +5,8 @@
 //! a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the path itself, which
 //! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
 
-use super::segment::{End, Known, next_surface, transmittance};
-use super::walk::Vertex;
+use super::segment::{End, Known, next_surface};
+use super::site::Site;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
@@ -32,23 +32,23 @@ pub fn balance(pdf: f32, other: f32) -> f32 {
 /// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival` is the
 /// probability of going on with `onward`.
 #[inline]
-pub fn direct_light(scene: &Scene, vertex: &Vertex<'_, '_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+pub fn direct_light(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
     if scene.lights.is_empty() {
         return Rgb::ZERO;
     }
     let mut light = next_event(scene, vertex, gather, onward, survival);
-    if !gather.is_empty() && vertex.draws.one(Purpose::SecondStrategy) < SECOND_STRATEGY {
+    if !gather.is_empty() && vertex.draws().one(Purpose::SecondStrategy) < SECOND_STRATEGY {
         light += second_strategy(scene, vertex, gather);
     }
     light
 }
 
 #[inline]
-fn next_event(scene: &Scene, vertex: &Vertex<'_, '_>, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
-    let Vertex { surface, shading, wo, draws, .. } = vertex;
+fn next_event(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+    let draws = vertex.draws();
     let choice = draws.one(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
-    let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
+    let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, vertex.p(), choice, point) else {
         return Rgb::ZERO;
     };
     let mut scattered = Rgb::ZERO;
@@ -57,7 +57,7 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_, '_>, gather: LobeSet, onward: L
         if !set.has(LobeSet::SMOOTH) {
             continue;
         }
-        let (f, pdf) = shading.evaluate_cos(sample.wi, Transport::Radiance, set);
+        let (f, pdf) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
         scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
     let arriving = scattered * sample.radiance / sample.pdf_w;
@@ -65,38 +65,26 @@ fn next_event(scene: &Scene, vertex: &Vertex<'_, '_>, gather: LobeSet, onward: L
     if !is_lit(arriving) {
         return Rgb::ZERO;
     }
-    let origin = surface.spawn(sample.wi);
-    let (direction, tmax) = match sample.target {
-        None => (sample.wi, f32::INFINITY),
-        Some(target) => {
-            let to = target - origin;
-            let distance = to.length();
-            // Both ends are off their surfaces already.
-            (to / distance, distance)
-        }
-    };
-    let crosses = sample.wi.dot(surface.ng) * wo.dot(surface.ng) < 0.0;
-    let interior = if crosses { vertex.interior_behind } else { vertex.interior };
-    arriving * transmittance(scene, origin, direction, tmax, interior, draws.token(Purpose::ShadowAlpha))
+    arriving * vertex.way(scene, sample.wi, sample.target, draws.token(Purpose::ShadowAlpha), false).left
 }
 
 #[inline]
-fn second_strategy(scene: &Scene, vertex: &Vertex<'_, '_>, set: LobeSet) -> Rgb {
-    let Vertex { surface, shading, draws, .. } = vertex;
+fn second_strategy(scene: &Scene, vertex: &impl Site, set: LobeSet) -> Rgb {
+    let draws = vertex.draws();
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
-    let Some(sample) = shading.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
-    let interior = if sample.transmitted { vertex.interior_behind } else { vertex.interior };
-    let origin = surface.spawn(sample.wi);
+    let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
+    let interior = vertex.interiors()[usize::from(sample.transmitted)];
+    let origin = vertex.spawn(sample.wi);
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
     let mut light = Rgb::ZERO;
     match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha), &Known::Unknown) {
         End::Surface(arrival) => {
-            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, surface.p, &arrival.surface) {
+            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, vertex.p(), &arrival.surface) {
                 light = radiance * arrival.transmittance * weight(pdf);
             }
         }
         End::Escaped(left) => scene.lights.escape(sample.wi, |radiance, pdf| light += radiance * left * weight(pdf)),
-        End::Lost => {}
+        End::Medium(_) | End::Lost => {}
     }
     sample.weight * light
 }

@@ -4,16 +4,22 @@
 //! - a light, then X: next-event estimation at X and its second strategy ([`direct_light`]), whatever the lobes of X;
 //! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself, which goes on;
 //! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light.
+//!
+//! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
+//! ([`super::flight`]).
 
 use super::direct::{balance, direct_light};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::segment::Known;
+use super::site::MediumVertex;
+use super::volume::Volume;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::math::{Rgb, Vec2, Vec3};
-use crate::photon::{Kernel, Near, Photon, PhotonMap};
+use crate::medium::Flight;
+use crate::photon::{Kernel, NO_NORMAL, Near, Photon, PhotonMap, VolumePhoton};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::trace::Ray;
@@ -137,6 +143,10 @@ pub struct EyeMeasure {
     pub caustic_photons: [Rgb; MAX_LEVELS],
     /// All other photons, per level.
     pub indirect_photons: [Rgb; MAX_LEVELS],
+    /// Light whose first vertex that is not clear is in a medium, found without photons.
+    pub volume: Rgb,
+    /// The same, found with photons or depending on their bandwidth, per level.
+    pub volume_photons: [Rgb; MAX_LEVELS],
     /// G-buffer.
     pub features: Features,
     /// First visible hit.
@@ -147,7 +157,9 @@ impl EyeMeasure {
     /// The radiance estimate of a level.
     #[inline]
     pub fn radiance(&self, level: usize) -> Rgb {
-        self.emission + self.direct + self.indirect + self.caustic_photons[level] + self.indirect_photons[level]
+        let surfaces =
+            self.emission + self.direct + self.indirect + self.caustic_photons[level] + self.indirect_photons[level];
+        surfaces + (self.volume + self.volume_photons[level])
     }
 }
 
@@ -167,6 +179,8 @@ struct Gather<'a, B, K> {
     scene: &'a Scene,
     photons: &'a PhotonMap,
     near: &'a mut Near<Photon>,
+    volume: Option<Volume<'a>>,
+    near_volume: &'a mut Near<VolumePhoton>,
     bandwidths: B,
     max_depth: u32,
     measure: EyeMeasure,
@@ -223,11 +237,13 @@ impl<B: Bandwidths, K: Kernel> Gather<'_, B, K> {
 }
 
 impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
+    const SPLITS: bool = true;
+
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let (surface, shading) = (vertex.surface, vertex.shading);
         if scattered.is_none() {
-            self.measure.first = Some(FirstHit { p: surface.p, instance: surface.instance });
+            self.measure.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
             self.last = vertex.from;
         }
         self.length += vertex.distance;
@@ -264,8 +280,33 @@ impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
         Next::Continue(onward)
     }
 
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        // A medium hides what is behind it as often as it takes the light.
+        if scattered.is_none() && self.measure.first.is_none() && vertex.draws.one(Purpose::Roulette) < vertex.opacity {
+            self.measure.first = vertex.met.first;
+        }
+        if vertex.depth < self.max_depth {
+            let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
+            let longest = self.max_depth - vertex.depth;
+            let medium = vertex.medium_id(self.scene);
+            let gathered = self.volume.map(|volume| volume.gather(self.near_volume, vertex, medium, longest));
+            let clear = self.stage == Stage::Clear;
+            let measure = &mut self.measure;
+            let (light, photons) = if clear {
+                (&mut measure.volume, &mut measure.volume_photons)
+            } else {
+                (&mut measure.indirect, &mut measure.indirect_photons)
+            };
+            *light += direct;
+            for (sum, gathered) in photons.iter_mut().zip(gathered.into_iter().flatten()) {
+                *sum += gathered;
+            }
+        }
+        Next::Stop
+    }
+
     #[inline]
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
         let scene = self.scene;
         scene.lights.escape(direction, |radiance, pdf| self.run_into(radiance, throughput, pdf, scattered));
     }
@@ -297,6 +338,7 @@ impl Eye<'_> {
             throughput: Rgb::ONE,
             interior: self.interior,
             first: Known::Unknown,
+            far: false,
             channel: None,
         }
     }
@@ -332,13 +374,15 @@ impl Eye<'_> {
         starts
     }
 
-    /// Traces one eye path and measures all levels of `bandwidths` with `kernel`. `scratch` has served no other photons.
+    /// Traces one eye path and measures all levels of `bandwidths`, and of `volume` where media scatter, with `kernel`. `scratch` has served no other
+    /// photons.
     #[inline]
     pub fn measure(
         &self,
         scratch: &mut Scratch,
         (start, stream): &(PathStart, Stream),
         photons: &PhotonMap,
+        volume: Option<Volume<'_>>,
         bandwidths: impl Bandwidths,
         kernel: impl Kernel,
     ) -> EyeMeasure {
@@ -347,6 +391,8 @@ impl Eye<'_> {
             scene: self.scene,
             photons,
             near: &mut scratch.near,
+            volume,
+            near_volume: &mut scratch.near_volume,
             bandwidths,
             max_depth: self.max_depth,
             measure: EyeMeasure::default(),
@@ -366,6 +412,13 @@ impl Eye<'_> {
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
+
+    /// The first vertex of an eye path in a medium that scatters.
+    pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
+        let mut find = FindVolumePoint { found: None, length: 0.0 };
+        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
+        find.found
+    }
 }
 
 /// Where an eye path would gather photons first.
@@ -373,7 +426,7 @@ impl Eye<'_> {
 pub struct GatherPoint {
     /// World position.
     pub p: Vec3,
-    /// Unit geometric normal.
+    /// Unit geometric normal; [`NO_NORMAL`] in a medium.
     pub ng: Vec3,
     /// Length of the eye path.
     pub length: f32,
@@ -385,6 +438,8 @@ struct FindGatherPoint {
 }
 
 impl<'a> Visitor<'a> for FindGatherPoint {
+    const SPLITS: bool = true;
+
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         self.length += vertex.distance;
         let lobes = vertex.shading.bsdf.lobes();
@@ -393,5 +448,26 @@ impl<'a> Visitor<'a> for FindGatherPoint {
             return Next::Stop;
         }
         Next::Continue(lobes)
+    }
+}
+
+struct FindVolumePoint {
+    found: Option<GatherPoint>,
+    length: f32,
+}
+
+impl<'a> Visitor<'a> for FindVolumePoint {
+    const SPLITS: bool = true;
+
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
+        self.length += vertex.distance;
+        let lobes = vertex.shading.bsdf.lobes();
+        if self.found.is_some() || lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
+    }
+
+    fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {
+        let length = self.length + vertex.met.distance;
+        self.found.get_or_insert(GatherPoint { p: vertex.met.p, ng: NO_NORMAL, length });
+        Next::Stop
     }
 }

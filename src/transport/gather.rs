@@ -4,7 +4,7 @@ use super::eye::{Bandwidths, Found, MAX_LEVELS};
 use super::walk::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3, Vec3A};
-use crate::photon::{Kernel, Near, Photon, PhotonFlags};
+use crate::photon::{Kernel, Near, Photon, PhotonFlags, VolumePhoton};
 use bumpalo::Bump;
 use wide::{CmpEq, f32x8};
 
@@ -15,6 +15,8 @@ pub struct Scratch {
     pub(super) arena: Bump,
     /// Photons near the last vertices.
     pub(super) near: Near<Photon>,
+    /// Photons in media near the last vertices there.
+    pub(super) near_volume: Near<VolumePhoton>,
 }
 
 /// Bins of a kind of photon: one per level, and one for those beyond the largest bandwidth, which are only counted.
@@ -106,10 +108,10 @@ impl<'a, K: Kernel> Batch<'a, K> {
     fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
         let f = self.gathering.eight(self.wi.map(f32x8::from));
         let found: [f32x8; 3] = std::array::from_fn(|c| f[c] * f32x8::from(self.flux[c]));
-        let light = found.map(f32x8::to_array);
+        let [r, g, b] = found.map(f32x8::to_array);
         for k in 0..self.count {
             let bin = usize::from(self.bin[k]);
-            self.add(bin / BINS, bin % BINS, Vec3A::new(light[0][k], light[1][k], light[2][k]), self.distance2[k]);
+            self.add(bin / BINS, bin % BINS, Vec3A::new(r[k], g[k], b[k]), self.distance2[k]);
         }
         if B::COUNTS {
             // What is left of the last eight is not there, nor are photons that bring nothing [CPPM 2020, 7.2].

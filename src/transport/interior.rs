@@ -83,6 +83,15 @@ impl Interior {
         self.entries().iter().map(material).max_by_key(|&m| scene.materials.list[m as usize].priority)
     }
 
+    /// The instance whose material fills the space here; `None` is the open space.
+    #[inline]
+    pub fn host(&self, scene: &Scene) -> Option<u32> {
+        let priority = |&&instance: &&u32| {
+            scene.materials.list[scene.shapes.instances[instance as usize].material as usize].priority
+        };
+        self.entries().iter().max_by_key(priority).copied()
+    }
+
     /// Absorption and scattering here.
     #[inline]
     pub fn medium(&self, scene: &Scene) -> Option<MediumParameters> {

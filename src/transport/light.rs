@@ -2,11 +2,12 @@
 
 use super::interior::Surroundings;
 use super::segment::Known;
+use super::site::MediumVertex;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec2};
-use crate::photon::{Photon, PhotonFlags};
+use crate::photon::{Photon, PhotonFlags, VolumePhoton};
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -70,7 +71,7 @@ impl LightPass {
             && let Some(medium) = scene.medium
         {
             // It has come through the medium that fills all space, from infinity.
-            flux *= Rgb::select(medium.sigma_a.cmpgt(Rgb::ZERO), Rgb::ZERO, Rgb::ONE);
+            flux *= medium.transmittance(f32::INFINITY);
         }
         Some(Emitted {
             start: PathStart {
@@ -79,6 +80,7 @@ impl LightPass {
                 throughput: flux,
                 interior: surroundings.light(emission.light),
                 first: Known::Unknown,
+                far: emission.infinite,
                 channel: None,
             },
             stream: self.stream(u64::from(index)),
@@ -89,9 +91,19 @@ impl LightPass {
     }
 }
 
+/// Photons of some light paths, in the order of paths and vertices.
+#[derive(Default)]
+pub struct Photons {
+    /// On surfaces.
+    pub surface: Vec<Photon>,
+    /// In media.
+    pub volume: Vec<VolumePhoton>,
+}
+
 /// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or clear glass.
 struct Deposit<'a> {
-    photons: &'a mut Vec<Photon>,
+    scene: &'a Scene,
+    photons: &'a mut Photons,
     caustic: bool,
     unreachable: bool,
 }
@@ -109,12 +121,27 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         if scattered.is_some() && gathers {
             let flags = (u8::from(self.caustic) * PhotonFlags::CAUSTIC)
                 | (u8::from(self.unreachable) * PhotonFlags::UNREACHABLE);
-            self.photons.push(Photon {
+            self.photons.surface.push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,
                 ng: vertex.surface.ng,
                 flux: vertex.throughput,
                 flags: PhotonFlags(flags),
+                depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+            });
+        }
+        Next::Continue(LobeSet::ALL)
+    }
+
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        // A medium focuses nothing.
+        (self.caustic, self.unreachable) = (false, false);
+        if scattered.is_some() {
+            self.photons.volume.push(VolumePhoton {
+                p: vertex.met.p,
+                wi: vertex.wo,
+                flux: vertex.arriving,
+                medium: vertex.medium_id(self.scene),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             });
         }
@@ -130,10 +157,10 @@ pub fn light_path(
     surroundings: &Surroundings,
     pass: &LightPass,
     index: u32,
-    photons: &mut Vec<Photon>,
+    photons: &mut Photons,
 ) {
     let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
-    let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
+    let mut deposit = Deposit { scene, photons, caustic: true, unreachable: emitted.delta };
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
 }
 
@@ -167,7 +194,7 @@ impl EqualFlux {
         surroundings: &Surroundings,
         pass: &LightPass,
         index: u32,
-        photons: &mut Vec<Photon>,
+        photons: &mut Photons,
     ) {
         let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
         let flux = self.flux / pass.paths as f32;
@@ -178,7 +205,7 @@ impl EqualFlux {
         let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
         for copy in 0..copies {
             let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
-            let mut deposit = Deposit { photons, caustic: true, unreachable: emitted.delta };
+            let mut deposit = Deposit { scene, photons, caustic: true, unreachable: emitted.delta };
             walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
             arena.reset();
         }

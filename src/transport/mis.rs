@@ -9,10 +9,14 @@
 //! An eye path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at its last vertex must not
 //! count when it is: [`MisState::last`] keeps that term apart for one more vertex.
 //!
+//! A vertex in a medium is one whose cosine is 1, whose densities are per volume, and where nothing is merged; flight through media
+//! multiplies the densities of both its ends ([`MisState::fly`]).
+//!
 //! Roulette is left out of all densities: weights need only sum to one. Delta lobes count as if their forward and reverse densities
 //! were equal \[(53) to (55)\], which neglects n^2 ratios, the same for all strategies.
 
 use crate::light::EmissionDensity;
+use crate::medium::Flight;
 
 /// Directions nearer to a surface (cosine) than this count as if they were this far from it.
 const LEAST_COSINE: f32 = 1e-6;
@@ -90,8 +94,8 @@ impl MisState {
         MisState { d_vcm, ..MisState::default() }
     }
 
-    /// Arrival at a surface \[(31) to (33), the conversion of measures\]: distance squared (1 on the first segment of light from infinity) and the
-    /// cosine there.
+    /// Arrival at a vertex \[(31) to (33), the conversion of measures\]: distance squared (1 on the first segment of light from infinity) and the
+    /// cosine there, 1 in a medium.
     #[must_use]
     #[inline]
     pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
@@ -102,6 +106,21 @@ impl MisState {
             plain: self.plain * inverse,
             merged: self.merged * inverse,
             last: self.last * inverse,
+        }
+    }
+
+    /// Flight through media to where the path has arrived: densities per length, or probabilities, that all it takes besides direction has in
+    /// both ways. They belong to the densities per area (per volume) of the vertices at both ends \[Georgiev (2), with the flight's factor as in Lafortune
+    /// and Willems 1996\].
+    #[must_use]
+    #[inline]
+    pub fn fly(self, flight: Flight) -> MisState {
+        let ratio = flight.reverse / flight.forward;
+        MisState {
+            d_vcm: self.d_vcm / flight.forward,
+            plain: self.plain * ratio,
+            merged: self.merged * ratio,
+            last: self.last * ratio,
         }
     }
 

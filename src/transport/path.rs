@@ -4,11 +4,13 @@
 //! (`direct_light` splits them), so that the two check each other.
 
 use super::bidirectional::{Part, Record, Technique, Trail};
-use super::bidirectional_eye::{look, visible};
+use super::bidirectional_eye::{look, look_in_medium};
 use super::eye::{Eye, EyeMeasure};
+use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
+use crate::medium::Flight;
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -34,21 +36,29 @@ impl<R: Record> PathTracer<'_, R> {
     }
 
     /// Light straight from a light, weighted, and its weight.
-    fn next_event(&self, vertex: &Vertex<'_, '_>) -> (Rgb, f32) {
-        let (scene, surface, draws) = (self.scene, vertex.surface, vertex.draws);
+    fn next_event(&self, vertex: &impl Site) -> (Rgb, f32) {
+        let (scene, draws) = (self.scene, vertex.draws());
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, surface.p, choice, point) else {
+        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, vertex.p(), choice, point) else {
             return (Rgb::ZERO, 1.0);
         };
-        let (f, pdf) = vertex.shading.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
-        let pdf = pdf * vertex.survival(LobeSet::ALL);
-        let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
-        let arriving = f * light.radiance * (weight / light.pdf_w);
-        if arriving.max_element() <= 0.0 {
+        let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
+        if (f * light.radiance).max_element() <= 0.0 {
             return (Rgb::ZERO, 1.0);
         }
-        let token = draws.token(Purpose::ShadowAlpha);
-        (arriving * visible(scene, vertex, light.wi, light.target, token), weight)
+        let way = vertex.way(scene, light.wi, light.target, draws.token(Purpose::ShadowAlpha), false);
+        let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
+        let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
+        (f * light.radiance * (weight / light.pdf_w) * way.left, weight)
+    }
+
+    /// Light straight from a light at a vertex.
+    fn lit<S: Site>(&mut self, vertex: &S) {
+        if vertex.depth() < self.max_depth {
+            let (light, weight) = self.next_event(vertex);
+            let technique = Technique::NextEvent { eye: self.depth };
+            self.add(technique, self.trail.next_event(S::IN_MEDIUM), vertex.throughput() * light, weight);
+        }
     }
 
     /// Adds weighted light.
@@ -62,6 +72,7 @@ impl<R: Record> PathTracer<'_, R> {
             Part::Direct => &mut measure.direct,
             Part::Caustic => &mut measure.caustic_photons[0],
             Part::Indirect => &mut measure.indirect,
+            Part::Volume => &mut measure.volume,
         } += light;
     }
 }
@@ -77,16 +88,21 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
             self.add(Technique::Hit { eye: self.depth }, part, vertex.throughput * radiance * weight, weight);
         }
         self.last = vertex.surface.p;
-        if vertex.depth < self.max_depth {
-            let (light, weight) = self.next_event(vertex);
-            let technique = Technique::NextEvent { eye: self.depth };
-            self.add(technique, self.trail.next_event(), vertex.throughput * light, weight);
-        }
+        self.lit(vertex);
         self.trail.leave(vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH));
         Next::Continue(LobeSet::ALL)
     }
 
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        look_in_medium(&mut self.trail, vertex, scattered, &mut self.measure);
+        self.depth = vertex.depth;
+        self.last = vertex.met.p;
+        self.lit(vertex);
+        self.trail.leave_medium();
+        Next::Continue(LobeSet::ALL)
+    }
+
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }

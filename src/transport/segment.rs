@@ -1,8 +1,11 @@
 //! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
 
+use super::eye::FirstHit;
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
+use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
+use crate::medium::Flight;
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
@@ -25,6 +28,22 @@ pub struct Arrival {
     pub distance: f32,
 }
 
+/// A vertex of a medium on a ray.
+pub struct MediumArrival {
+    /// World position.
+    pub p: Vec3,
+    /// The medium.
+    pub medium: MediumParameters,
+    /// The solids around it.
+    pub interior: Interior,
+    /// Transmittance up to here over the density per length of this point.
+    pub weight: Rgb,
+    /// Length of the way.
+    pub distance: f32,
+    /// What it shows as a first hit.
+    pub first: Option<FirstHit>,
+}
+
 /// What a ray meets, if that is known before it is followed.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum Known {
@@ -43,22 +62,67 @@ pub enum Known {
 pub enum End {
     /// At a surface.
     Surface(Arrival),
+    /// In a medium.
+    Medium(MediumArrival),
     /// It left the scene, with this transmittance.
     Escaped(Rgb),
     /// In a numerical trap.
     Lost,
 }
 
-/// Beer-Lambert over `distance`; an infinite way through anything that absorbs leaves nothing.
-#[inline]
-fn absorb(scene: &Scene, interior: &Interior, distance: f32) -> Rgb {
-    match interior.medium(scene) {
-        None => Rgb::ONE,
-        Some(medium) => {
-            let through = |sigma: f32| if sigma > 0.0 { (-sigma * distance).exp() } else { 1.0 };
-            let sigma = medium.sigma_a;
-            Rgb::new(through(sigma.x), through(sigma.y), through(sigma.z))
+/// A part of a ray's way that lies in one medium.
+pub(super) struct Span<'s> {
+    /// The medium.
+    pub medium: &'s MediumParameters,
+    /// The solids here.
+    pub interior: &'s Interior,
+    /// Where it begins.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Its length, maybe infinite.
+    pub distance: f32,
+    /// Length of the way before it.
+    pub before: f32,
+    /// What the way before it has left.
+    pub left: Rgb,
+    /// Parts before it, in media or not.
+    pub crossed: u32,
+    /// The surface at its end.
+    pub beyond: Option<&'s Surface>,
+}
+
+impl Span<'_> {
+    /// What a vertex in here shows as a first hit: the object that holds the medium, or what lies behind a medium that fills the scene.
+    pub fn first_hit(&self, scene: &Scene, p: Vec3) -> Option<FirstHit> {
+        match self.interior.host(scene) {
+            Some(instance) => Some(FirstHit { p, instance }),
+            None => self.beyond.map(|surface| FirstHit { p: surface.p, instance: surface.instance }),
         }
+    }
+}
+
+/// What media do to a ray.
+pub(super) trait Through {
+    /// On its way through `span`.
+    fn pass(&mut self, span: &Span<'_>) -> Passage;
+}
+
+/// Outcome of [`Through::pass`].
+pub(super) enum Passage {
+    /// What is left at the end of the span.
+    Left(Rgb),
+    /// A vertex of the medium.
+    Ended(MediumArrival),
+}
+
+/// Light is attenuated, no more \[Beer-Lambert\].
+pub(super) struct Attenuate;
+
+impl Through for Attenuate {
+    #[inline]
+    fn pass(&mut self, span: &Span<'_>) -> Passage {
+        Passage::Left(span.medium.transmittance(span.distance))
     }
 }
 
@@ -95,7 +159,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     Boundary::Scattering(eta, Some(crossing))
 }
 
-/// Follows a ray from inside `interior` to the next surface that scatters.
+/// Follows a ray from inside `interior` to the next surface that scatters; media on the way attenuate.
 #[inline(always)]
 pub fn next_surface(
     scene: &Scene,
@@ -104,6 +168,20 @@ pub fn next_surface(
     interior: Interior,
     token: u32,
     known: &Known,
+) -> End {
+    next_vertex(scene, origin, direction, interior, token, known, &mut Attenuate)
+}
+
+/// Follows a ray from inside `interior` to the next surface that scatters, `through` whatever media.
+#[inline(always)]
+pub(super) fn next_vertex(
+    scene: &Scene,
+    origin: Vec3,
+    direction: Vec3,
+    interior: Interior,
+    token: u32,
+    known: &Known,
+    through: &mut impl Through,
 ) -> End {
     let mut ray = Ray { origin, direction, tmax: f32::INFINITY, token };
     let mut interior = interior;
@@ -115,19 +193,28 @@ pub fn next_surface(
             Known::Hit(hit) if crossed == 0 => Some(*hit),
             _ => scene.tracer.intersect(&ray),
         };
-        let Some(hit) = met else {
-            if scene.survey.media {
-                transmittance *= absorb(scene, &interior, f32::INFINITY);
+        let surface = match met {
+            None => None,
+            Some(hit) => match scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) {
+                None => return End::Lost,
+                surface => surface,
+            },
+        };
+        let t = met.map_or(f32::INFINITY, |hit| hit.t);
+        if scene.survey.media
+            && let Some(medium) = interior.medium(scene)
+        {
+            let (origin, left, beyond) = (ray.origin, transmittance, surface.as_ref());
+            let (medium, interior) = (&medium, &interior);
+            let span =
+                Span { medium, interior, origin, direction, distance: t, before: distance, left, crossed, beyond };
+            match through.pass(&span) {
+                Passage::Left(left) => transmittance *= left,
+                Passage::Ended(arrival) => return End::Medium(arrival),
             }
-            return End::Escaped(transmittance);
-        };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
-            return End::Lost;
-        };
-        distance += hit.t;
-        if scene.survey.media {
-            transmittance *= absorb(scene, &interior, hit.t);
         }
+        let Some(surface) = surface else { return End::Escaped(transmittance) };
+        distance += t;
         match boundary(scene, &surface, &interior, direction) {
             Boundary::Scattering(eta, crossing) => {
                 return End::Surface(Arrival { surface, eta, crossing, interior, transmittance, distance });
@@ -142,42 +229,84 @@ pub fn next_surface(
     End::Lost
 }
 
+/// A way between two points that light may have taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// What is left of the light.
+    pub left: Rgb,
+    /// Densities of flying it both ways.
+    pub flight: Flight,
+}
+
+impl Way {
+    const BLOCKED: Way = Way { left: Rgb::ZERO, flight: Flight::FREE };
+
+    /// Goes on through `distance` of what fills the space.
+    #[inline]
+    fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
+        if scene.survey.media
+            && let Some(medium) = interior.medium(scene)
+        {
+            self.left *= medium.transmittance(distance);
+            if scene.survey.scattering {
+                self.flight = self.flight.through(&medium, distance, starts, ends);
+            }
+        }
+    }
+}
+
 /// What is left of light between `origin` and the point `tmax` away along the unit `direction`: zero if anything scatters
 /// there, else absorption and tints.
 #[inline]
 pub fn transmittance(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, interior: Interior, token: u32) -> Rgb {
+    way(scene, origin, direction, tmax, interior, token, [false; 2]).left
+}
+
+/// [`transmittance`], and the densities of flight; `in_medium`: whether the way starts and ends at a vertex of a medium.
+#[inline]
+pub fn way(
+    scene: &Scene,
+    origin: Vec3,
+    direction: Vec3,
+    tmax: f32,
+    interior: Interior,
+    token: u32,
+    in_medium: [bool; 2],
+) -> Way {
     let mut ray = Ray { origin, direction, tmax, token };
+    let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
+    let [mut starts, ends] = in_medium;
     if !scene.survey.null_boundaries {
         if scene.tracer.occluded(&ray) {
-            return Rgb::ZERO;
+            return Way::BLOCKED;
         }
-        return if scene.survey.media { absorb(scene, &interior, tmax) } else { Rgb::ONE };
+        way.pass(scene, &interior, tmax, starts, ends);
+        return way;
     }
     let mut interior = interior;
-    let mut left = Rgb::ONE;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some(hit) = scene.tracer.intersect(&ray) else {
-            return if scene.survey.media { left * absorb(scene, &interior, ray.tmax) } else { left };
+            way.pass(scene, &interior, ray.tmax, starts, ends);
+            return way;
         };
         let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
-            return Rgb::ZERO;
+            return Way::BLOCKED;
         };
-        if scene.survey.media {
-            left *= absorb(scene, &interior, hit.t);
-        }
+        way.pass(scene, &interior, hit.t, starts, false);
+        starts = false;
         match boundary(scene, &surface, &interior, direction) {
-            Boundary::Scattering(..) => return Rgb::ZERO,
+            Boundary::Scattering(..) => return Way::BLOCKED,
             Boundary::None(tint, behind) => {
-                left *= tint;
+                way.left *= tint;
                 interior = behind;
                 let next = surface.spawn(direction);
                 ray.tmax -= (next - ray.origin).dot(direction);
                 ray.origin = next;
                 if ray.tmax <= 0.0 {
-                    return left;
+                    return way;
                 }
             }
         }
     }
-    Rgb::ZERO
+    Way::BLOCKED
 }

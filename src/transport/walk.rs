@@ -1,11 +1,14 @@
 //! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm is a
 //! [`Visitor`].
 
+use super::flight::{Fly, Split};
 use super::interior::Interior;
-use super::segment::{Arrival, End, Known, next_surface};
+use super::segment::{Arrival, Attenuate, End, Known, next_vertex};
+use super::site::{MediumVertex, Site};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, is_lit};
+use crate::medium::Flight;
 use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -31,6 +34,8 @@ pub struct PathStart {
     pub interior: Interior,
     /// What the first ray meets, if it has been traced already.
     pub first: Known,
+    /// It has come from infinity.
+    pub far: bool,
     /// The one channel of a path that keeps its weight: what it would lose is the probability that it ends.
     pub channel: Option<usize>,
 }
@@ -57,6 +62,8 @@ pub struct Vertex<'v, 'a> {
     pub interior_behind: Interior,
     /// Random numbers of this vertex.
     pub draws: Draws,
+    /// Densities of the last segment's flight through media.
+    pub flight: Flight,
     survival_scale: f32,
 }
 
@@ -65,7 +72,8 @@ pub struct Vertex<'v, 'a> {
 pub struct Scattered {
     /// Class of the lobe.
     pub lobe: LobeSet,
-    /// Density per solid angle of the direction, times the probability that the path went on; for a delta lobe meaningless.
+    /// Density per solid angle of the direction, times the probability that the path went on and was not scattered by a medium on its way; for a
+    /// delta lobe meaningless.
     pub pdf_w: f32,
 }
 
@@ -80,16 +88,28 @@ pub enum Next {
 
 /// Receives the vertices of a walk.
 pub trait Visitor<'a> {
+    /// The walk takes media by splitting ([`super::flight`]) and does not scatter at their vertices.
+    const SPLITS: bool = false;
     /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
+    /// As [`Visitor::surface`], in a medium that scatters. A walk that splits goes on whatever the answer.
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        let _ = (vertex, scattered);
+        Next::Stop
+    }
     /// `sample` is drawn at `vertex`, and the path goes on.
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let _ = (vertex, sample);
     }
-    /// The path leaves the scene along `direction` with weight `throughput`; `from` is its last vertex.
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>) {
-        let _ = (direction, throughput, scattered);
+    /// As [`Visitor::scatter`], in a medium.
+    #[inline]
+    fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
+        let _ = (vertex, sample);
+    }
+    /// The path leaves the scene along `direction` with weight `throughput`; `flight`: densities of its way to infinity.
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {
+        let _ = (direction, throughput, scattered, flight);
     }
 }
 
@@ -99,11 +119,16 @@ impl Vertex<'_, '_> {
     #[inline]
     pub fn survival(&self, set: LobeSet) -> f32 {
         let albedo = self.shading.albedo(set);
-        let expected = (self.throughput * albedo).max_element() * self.survival_scale;
-        // Written so that NaN ends the path.
-        let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
-        if self.depth > LATE { survival.min(LATE_SURVIVAL) } else { survival }
+        survival((self.throughput * albedo).max_element() * self.survival_scale, self.depth)
     }
+}
+
+/// Probability of going on where a path of `depth` keeps a share `expected` of its weight.
+#[inline]
+pub(super) fn survival(expected: f32, depth: u32) -> f32 {
+    // Written so that NaN ends the path.
+    let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
+    if depth > LATE { survival.min(LATE_SURVIVAL) } else { survival }
 }
 
 /// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond the scene is
@@ -118,27 +143,95 @@ pub fn walk<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, channel } = *start;
+    // Scenes without scattering media walk as if there were none in the world.
+    if scene.survey.scattering {
+        walk_in::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
+    } else {
+        walk_in::<V, false>(scene, arena, start, stream, transport, max_depth, visitor);
+    }
+}
+
+#[inline(always)]
+fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
+    scene: &'a Scene,
+    arena: &'a Bump,
+    start: &PathStart,
+    stream: Stream,
+    transport: Transport,
+    max_depth: u32,
+    visitor: &mut V,
+) {
+    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, far, channel } = *start;
     let weight = channel.map_or(1.0, |channel| throughput[channel]);
     let mut known = first;
     let mut survival_scale = 1.0 / throughput.max_element();
     if !survival_scale.is_finite() {
         return;
     }
-    let mut scattered = None;
+    let mut scattered: Option<Scattered> = None;
+    let mut in_medium = false;
     for depth in 1..=max_depth {
-        let token = stream.vertex(depth - 1).token(Purpose::Alpha);
-        let arrival = match next_surface(
-            scene,
-            origin,
-            direction,
-            interior,
-            token,
-            std::mem::replace(&mut known, &Known::Unknown),
-        ) {
+        let last = stream.vertex(depth - 1);
+        let token = last.token(Purpose::Alpha);
+        let met = std::mem::replace(&mut known, &Known::Unknown);
+        let mut flight = Flight::FREE;
+        let end = if !MEDIA {
+            next_vertex(scene, origin, direction, interior, token, met, &mut Attenuate)
+        } else if V::SPLITS {
+            let from = origin;
+            let mut split = Split { scene, visitor, throughput, draws: last, depth, scattered, from, survival_scale };
+            next_vertex(scene, origin, direction, interior, token, met, &mut split)
+        } else {
+            let (from_medium, from_infinity) = (in_medium, far && depth == 1);
+            let mut fly = Fly { scene, throughput, draws: last, from_medium, from_infinity, flight };
+            let end = next_vertex(scene, origin, direction, interior, token, met, &mut fly);
+            flight = fly.flight;
+            end
+        };
+        if MEDIA && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut scattered) {
+            scattered.pdf_w *= flight.forward;
+        }
+        let arrival = match end {
             End::Surface(arrival) => arrival,
+            End::Medium(met) => {
+                let wo = -direction;
+                let arriving = throughput * met.weight;
+                let sigma_s = met.medium.sigma_s;
+                let draws = stream.vertex(depth);
+                let vertex = MediumVertex {
+                    met,
+                    wo,
+                    throughput: arriving * sigma_s,
+                    arriving,
+                    depth,
+                    from: origin,
+                    draws,
+                    flight,
+                    opacity: 1.0,
+                    survival_scale,
+                };
+                // Where the channel that has brought it here scatters nothing, it carries nothing.
+                if !is_lit(vertex.throughput) {
+                    return;
+                }
+                let set = match visitor.medium(&vertex, scattered) {
+                    Next::Stop => return,
+                    Next::Continue(set) => set & LobeSet::BROAD,
+                };
+                let survival = vertex.survival(set);
+                if set.is_empty() || depth == max_depth || draws.one(Purpose::Roulette) >= survival {
+                    return;
+                }
+                let Some(sample) = vertex.sample(transport, set, 0.0, draws.two(Purpose::Phase)) else { return };
+                visitor.scatter_medium(&vertex, &sample);
+                throughput = vertex.throughput * sample.weight / survival;
+                scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
+                (origin, direction) = (vertex.met.p, sample.wi);
+                (interior, in_medium) = (vertex.met.interior, true);
+                continue;
+            }
             End::Escaped(left) => {
-                visitor.escape(direction, throughput * left, scattered);
+                visitor.escape(direction, throughput * left, scattered, flight);
                 return;
             }
             End::Lost => return,
@@ -171,6 +264,7 @@ pub fn walk<'a, V: Visitor<'a>>(
             interior: here,
             interior_behind: behind,
             draws,
+            flight,
             survival_scale,
         };
         let set = match visitor.surface(&vertex, scattered) {
@@ -207,6 +301,7 @@ pub fn walk<'a, V: Visitor<'a>>(
         }
         direction = sample.wi;
         origin = surface.spawn(direction);
+        in_medium = false;
         interior = if sample.transmitted { behind } else { here };
     }
 }

@@ -170,7 +170,7 @@ fn main() {
         let map = PhotonMap::build(points.iter().map(photon).collect());
         let build_tree = t.elapsed();
         // Neighbouring pixels see neighbouring places: queries follow the map's own order in runs.
-        let mut nearest = Nearest::default();
+        let mut nearest = Nearest::<Photon>::default();
         let queries: Vec<(Vec3, f32)> = (0..QUERIES)
             .map(|i| {
                 let p = map.photons()[i * map.photons().len() / QUERIES].p;

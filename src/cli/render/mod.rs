@@ -17,7 +17,7 @@ use caustique::estimator::Pixel;
 use caustique::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use caustique::film::{Layer, LayerSet, Selection, describe, output as film};
 use caustique::image::exr::{self, Attributes};
-use caustique::render::output::shape;
+use caustique::render::output::{Present, shape};
 use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory};
 use caustique::scene::Scene;
 use rayon::prelude::*;
@@ -32,7 +32,8 @@ const COMBINED_LAYERS: [&str; 5] = ["Level", "Variance", "albedo", "normal", "de
 /// Renders: everything that can be wrong is found before the first light path.
 pub fn run(args: &RenderArgs) -> Result<()> {
     let settings = args.settings()?;
-    let selection = selection(args, &settings)?;
+    // Whether media scatter is not known yet.
+    let selection = selection(args, &settings, true)?;
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     techniques::prepare(args)?;
@@ -44,7 +45,10 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let scene = scene::read(&args.scene, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.view())?;
-    memory::check(settings, camera.size(), channels(settings))?;
+    plan::check_media(args, &scene)?;
+    let present = Present::of(&scene);
+    self::selection(args, settings, present.volume)?;
+    memory::check(settings, camera.size(), channels(settings, present))?;
     let plan = plan::plan(args, &scene, &camera);
     let mut network = network(args, settings.levels.count)?;
     let talk = args.progress.for_people();
@@ -64,8 +68,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let combined_layer = |name: &str| COMBINED_LAYERS.iter().any(|stem| name.starts_with(stem));
     let wanted = |name: &str| selection.wants(name) || name.is_empty() || (network.is_some() && combined_layer(name));
-    let environment = scene.lights.sky().environment.is_some();
-    let mut set = rendered.layers(environment, wanted)?;
+    let mut set = rendered.layers(present, wanted)?;
     let mut attributes = cryptomattes(&scene, &rendered, args, selection, &mut set)?;
     let summary = Summary::of(&rendered);
     let (size, pictures) = ((set.width, set.height), std::mem::take(&mut rendered.techniques));
@@ -131,8 +134,8 @@ fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Result<(
 }
 
 /// Channels that a render with these settings can have.
-fn channels(settings: &Settings) -> usize {
-    let mut names = film::names(&shape(settings, 1, false));
+fn channels(settings: &Settings, present: Present) -> usize {
+    let mut names = film::names(&shape(settings, 1, present));
     names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
     names.iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
@@ -179,10 +182,10 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
     (0..RANKS / 2).map(move |index| format!("{kind}{index:02}"))
 }
 
-/// `--layers`, checked against what this render will have.
-fn selection(args: &RenderArgs, settings: &Settings) -> Result<Selection> {
+/// `--layers`, checked against what this render will have, where media scatter (`volume`) or not.
+fn selection(args: &RenderArgs, settings: &Settings, volume: bool) -> Result<Selection> {
     let selection = Selection::parse(&args.layers)?;
-    let mut names = film::names(&shape(settings, 1, false));
+    let mut names = film::names(&shape(settings, 1, Present { volume, ..Present::default() }));
     names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
     let layers = names.into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;

@@ -7,6 +7,7 @@ use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
+use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
@@ -406,6 +407,7 @@ impl RenderArgs {
             techniques: self.debug_techniques.is_some(),
             initial,
             alpha: self.alpha.unwrap_or(method.alpha()),
+            volume_alpha: self.alpha.unwrap_or(VOLUME_ALPHA),
             radius_rule,
             kernel: match self.kernel {
                 None | Some(Kernel::Box) => KernelChoice::Box,

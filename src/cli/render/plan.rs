@@ -3,8 +3,9 @@
 use super::options::{Method, RenderArgs};
 use crate::cli::say;
 use caustique::camera::Camera;
+use caustique::error::{Error, Kind, Result};
 use caustique::light::Emitter;
-use caustique::material::{Material, MediumParameters};
+use caustique::material::Material;
 use caustique::render;
 use caustique::scene::Scene;
 use serde_json::{Value, json};
@@ -31,8 +32,6 @@ pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
     let caustic = lit(by_material(focuses));
     let media =
         when(scene.medium.is_some(), "the scene's medium").into_iter().chain(by_material(|m| m.medium.is_some()));
-    let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.sigma_s.max_element() > 0.0);
-    let scattering = scatters(&scene.medium) || worn.iter().any(|material| scatters(&material.medium));
 
     let method = args.method.chosen();
     // Segments of the shortest path that shows it; `--max-depth` cuts longer ones.
@@ -45,8 +44,7 @@ pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
         ("glossy", lit(by_material(narrow)), deep(2)),
         ("caustic", caustic.clone(), deep(3) && reaches(method, "caustic", scene)),
         ("sds", caustic, deep(4) && reaches(method, "sds", scene)),
-        // Media absorb; what they scatter is lost.
-        ("volume", media.collect(), !scattering),
+        ("volume", media.collect(), deep(if scene.survey.scattering { 2 } else { 1 })),
         ("dispersion", by_material(|m| m.transmission > 0.0 && m.dispersion > 0.0), false),
         ("depth_of_field", when(camera.has_lens(), "the camera has an aperture"), true),
         ("environment", when(environment, "light comes from all around"), true),
@@ -76,6 +74,20 @@ fn reaches(method: render::Method, effect: &str, scene: &Scene) -> bool {
         (render::Method::Bdpt, "sds") => !sizeless,
         _ => true,
     }
+}
+
+/// Whether the method can do without what media scatter, or finds it.
+///
+/// # Errors
+/// Media scatter, and the method gathers photons on surfaces only.
+pub fn check_media(args: &RenderArgs, scene: &Scene) -> Result<()> {
+    let method = args.method.chosen();
+    if !scene.survey.scattering || !matches!(method, render::Method::Pm | render::Method::Bpm) {
+        return Ok(());
+    }
+    let cause = format!("--method {} does not render media that scatter light", method.name());
+    let error = Error::new(Kind::Usage, args.scene.path.display(), cause);
+    Err(error.hint("choose --method sppm, cppm, vcm, bdpt or path"))
 }
 
 /// Warns of effects that the scene calls for and the method chosen does not find.

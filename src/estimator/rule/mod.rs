@@ -4,6 +4,7 @@ pub mod adaptive;
 pub mod chi_squared;
 pub mod local;
 pub mod memoryless;
+pub mod volume;
 
 use crate::math::Frame;
 use crate::transport::Found;

@@ -1,0 +1,235 @@
+//! Free flight: where on a ray a medium scatters, drawn with all three channels in mind.
+//!
+//! One channel is drawn and its distance of flight sampled; the density is that of the mixture over the channels, so every channel has a share
+//! in every sample \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4; "spectral MIS"\]. Channels are drawn in proportion to what
+//! they have to lose: then no weight makes the sum over channels of a path's throughput grow, however often and however differently they
+//! scatter, and none can be starved, for a sample's density is at least the channel's own.
+//!
+//! MIS between whole paths must know the densities of paths it has not walked, and cannot ask for the throughput they would have had. It
+//! takes the even mixture of the channels in its place ([`Flight`]): the weights still sum to one, which is all that they must.
+
+use super::MediumParameters;
+use crate::math::{Rgb, Vec2};
+
+/// A point on a ray at which a medium scatters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collision {
+    /// Distance from the origin.
+    pub distance: f32,
+    /// Transmittance up to there, over the density per length of the point.
+    pub weight: Rgb,
+}
+
+/// How a ray fares in a medium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fate {
+    /// It gets to the end, and what it carries is multiplied by this: transmittance over the probability of getting there.
+    Passed(Rgb),
+    /// It collides.
+    Collided(Collision),
+}
+
+/// Least and strictly positive uniform number: no flight has length zero.
+const HALF_STEP: f32 = 0.5 / 16_777_216.0;
+
+impl MediumParameters {
+    /// Draws how a ray of `throughput` fares on the next `distance` (maybe infinite). `u` is uniform on the unit square.
+    #[inline]
+    pub fn fly(&self, throughput: Rgb, distance: f32, u: Vec2) -> Fate {
+        let sigma = self.sigma_t();
+        let share = shares(throughput);
+        let drawn = pick(sigma, share, u.x);
+        let t = if drawn > 0.0 { -(1.0 - (u.y + HALF_STEP)).ln() / drawn } else { f32::INFINITY };
+        if t < distance {
+            let left = self.transmittance(t);
+            Fate::Collided(Collision { distance: t, weight: left / (share * sigma * left).element_sum() })
+        } else {
+            let left = self.transmittance(distance);
+            Fate::Passed(left / (share * left).element_sum())
+        }
+    }
+
+    /// Draws a point of the next `distance` (maybe infinite) at which a ray of `throughput` is scattered, as if it had to be. `None` where
+    /// nothing is scattered.
+    #[inline]
+    pub fn collide(&self, throughput: Rgb, distance: f32, u: Vec2) -> Option<Collision> {
+        let sigma = self.sigma_t();
+        // Share of each channel that is scattered on the way; -expm1 keeps thin media exact.
+        let lost = -(-sigma * distance).map(exp_m1);
+        let lost = Rgb::select(sigma.cmpgt(Rgb::ZERO), lost, Rgb::ZERO);
+        let albedo = Rgb::select(sigma.cmpgt(Rgb::ZERO), self.sigma_s / sigma, Rgb::ZERO);
+        let share = shares(throughput * albedo * lost);
+        if !(share.max_element() > 0.0) {
+            return None;
+        }
+        let drawn = pick(sigma, share, u.x);
+        let within = pick(lost, share, u.x);
+        let t = -(-(u.y + HALF_STEP) * within).ln_1p() / drawn;
+        let t = t.min(distance);
+        let left = self.transmittance(t);
+        // Densities of the channels, each cut off at the end of the ray.
+        let density = Rgb::select(lost.cmpgt(Rgb::ZERO), sigma * left / lost, Rgb::ZERO);
+        let weight = left / (share * density).element_sum();
+        (t.is_finite() && weight.is_finite()).then_some(Collision { distance: t, weight })
+    }
+}
+
+fn exp_m1(x: f32) -> f32 {
+    x.exp_m1()
+}
+
+/// Probabilities of the channels in proportion to `of`; even where there is nothing to go by.
+#[inline]
+fn shares(of: Rgb) -> Rgb {
+    let sum = of.element_sum();
+    if sum > 0.0 && sum.is_finite() { of / sum } else { Rgb::splat(1.0 / 3.0) }
+}
+
+/// The channel's entry in `of` that `u` draws.
+#[inline]
+fn pick(of: Rgb, share: Rgb, u: f32) -> f32 {
+    // The last channel that can be drawn takes what rounding leaves.
+    if u < share.x || share.y + share.z <= 0.0 {
+        of.x
+    } else if u < share.x + share.y || share.z <= 0.0 {
+        of.y
+    } else {
+        of.z
+    }
+}
+
+/// Densities of flight along one segment, both ways, with the even mixture of the channels: per length where the end it flies to lies in a
+/// scattering medium, else the probability of getting there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flight {
+    /// From the start to the end.
+    pub forward: f32,
+    /// From the end to the start.
+    pub reverse: f32,
+}
+
+impl Flight {
+    /// Nothing on the way scatters.
+    pub const FREE: Flight = Flight { forward: 1.0, reverse: 1.0 };
+
+    /// Goes on through `distance` of `medium`. `starts`, `ends`: the segment starts or ends in here, at a vertex of the medium.
+    #[must_use]
+    #[inline]
+    pub fn through(self, medium: &MediumParameters, distance: f32, starts: bool, ends: bool) -> Flight {
+        if !medium.scatters() {
+            return self;
+        }
+        let left = medium.transmittance(distance);
+        let pass = left.element_sum() / 3.0;
+        let stop = (medium.sigma_t() * left).element_sum() / 3.0;
+        Flight {
+            forward: self.forward * if ends { stop } else { pass },
+            reverse: self.reverse * if starts { stop } else { pass },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Domain, Purpose, Stream};
+
+    const DRAWS: u64 = 400_000;
+
+    fn media() -> [MediumParameters; 3] {
+        let medium = |a: [f32; 3], s: [f32; 3]| MediumParameters { sigma_a: a.into(), sigma_s: s.into(), g: 0.0 };
+        [
+            medium([0.1; 3], [0.9; 3]),
+            // One channel flies freely, one is opaque.
+            medium([0.0, 0.0, 30.0], [0.3, 0.0, 10.0]),
+            medium([0.5, 1e-3, 0.0], [4.0, 0.0, 1e-3]),
+        ]
+    }
+
+    /// Means over draws of both outcomes of a flight against their closed forms, per channel: passing gives the transmittance, colliding (with
+    /// `f(t) = t`, so that distances count) the integral of `t T(t)`. Returns the largest deviation in standard errors.
+    fn flight_error(bug: impl Fn(Collision, Rgb) -> Rgb) -> f64 {
+        let mut worst = 0.0f64;
+        for (at, medium) in media().into_iter().enumerate() {
+            for (distance, throughput) in [(0.7f32, Rgb::ONE), (2.0, Rgb::new(1.0, 5.0, 0.2))] {
+                let mut sums = [[[0.0f64; 2]; 3]; 3];
+                for i in 0..DRAWS {
+                    let draws = Stream::new(31, at as u64, Domain::Test, i).vertex(0);
+                    let mut values = [Rgb::ZERO; 3];
+                    match medium.fly(throughput, distance, draws.two(Purpose::Flight)) {
+                        Fate::Passed(weight) => values[0] = weight,
+                        Fate::Collided(hit) => {
+                            assert!(hit.distance > 0.0 && hit.distance < distance);
+                            values[1] = bug(hit, medium.sigma_t()) * hit.distance;
+                        }
+                    }
+                    if let Some(hit) = medium.collide(throughput, distance, draws.two(Purpose::Phase)) {
+                        values[2] = bug(hit, medium.sigma_t()) * hit.distance;
+                    }
+                    for (sums, value) in sums.iter_mut().zip(values) {
+                        for (sum, x) in sums.iter_mut().zip(value.to_array()) {
+                            sum[0] += f64::from(x);
+                            sum[1] += f64::from(x) * f64::from(x);
+                        }
+                    }
+                }
+                for c in 0..3 {
+                    let (sigma, d) = (f64::from(medium.sigma_t()[c]), f64::from(distance));
+                    let left = (-sigma * d).exp();
+                    let integral =
+                        if sigma > 0.0 { (1.0 - left * (1.0 + sigma * d)) / (sigma * sigma) } else { 0.5 * d * d };
+                    let scatters = medium.sigma_s[c] > 0.0;
+                    for (kind, expected) in [left, integral, integral].into_iter().enumerate() {
+                        // A channel that is not scattered need not be drawn: its weight is multiplied by zero.
+                        if kind > 0 && !scatters {
+                            continue;
+                        }
+                        let n = DRAWS as f64;
+                        let mean = sums[kind][c][0] / n;
+                        let error = ((sums[kind][c][1] / n - mean * mean) / n).sqrt();
+                        worst = worst.max((mean - expected).abs() / (error + 1e-5 * expected));
+                    }
+                }
+            }
+        }
+        worst
+    }
+
+    /// 5 sigma over 45 checks: false alarms below 3e-5. A density of the drawn channel alone is found.
+    #[test]
+    fn flights_are_unbiased_in_every_channel() {
+        let right = flight_error(|hit, _| hit.weight);
+        assert!(right < 5.0, "{right}");
+        let wrong = flight_error(|hit, sigma| hit.weight * (1.0 + 0.02 * sigma * hit.distance));
+        assert!(wrong > 5.0, "{wrong}");
+    }
+
+    /// However long a path and however different its channels, flights do not make the sum of its throughput grow.
+    #[test]
+    fn no_channel_runs_away() {
+        let medium = MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::new(0.5, 2.0, 8.0), g: 0.0 };
+        for i in 0..200 {
+            let mut throughput = Rgb::ONE;
+            for vertex in 0..50 {
+                let u = Stream::new(2, 0, Domain::Test, i).vertex(vertex).two(Purpose::Flight);
+                throughput *= match medium.fly(throughput, 0.3, u) {
+                    Fate::Passed(weight) => weight,
+                    Fate::Collided(hit) => hit.weight * medium.sigma_s,
+                };
+                assert!(throughput.element_sum() < 3.001, "path {i}, vertex {vertex}: {throughput}");
+            }
+        }
+    }
+
+    #[test]
+    fn densities_of_flight_compose() {
+        let medium = media()[0];
+        let whole = Flight::FREE.through(&medium, 1.5, false, true);
+        let parts = Flight::FREE.through(&medium, 0.5, false, false).through(&medium, 1.0, false, true);
+        assert!((whole.forward / parts.forward - 1.0).abs() < 1e-5);
+        // Grey: T to a surface, sigma T to a vertex of the medium.
+        assert!((whole.reverse - (-1.5f32).exp()).abs() < 1e-6 && (whole.forward - whole.reverse).abs() < 1e-6);
+        let clear = MediumParameters { sigma_a: Rgb::ONE, ..MediumParameters::default() };
+        assert_eq!(Flight::FREE.through(&clear, 2.0, false, false), Flight::FREE);
+    }
+}

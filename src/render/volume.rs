@@ -1,0 +1,46 @@
+//! What media add to the passes of photon mapping: photons of their own, and bandwidths of their own.
+
+use super::settings::Settings;
+use crate::estimator::Pixel;
+use crate::estimator::rule::volume::{level_factor, radius_factor};
+use crate::photon::{PhotonMap, VolumePhoton};
+use crate::transport::Volume;
+
+/// Photons of an iteration.
+pub(super) struct Maps {
+    /// On surfaces.
+    pub surface: PhotonMap,
+    /// In media, if any scatter.
+    pub volume: Option<VolumeMap>,
+}
+
+impl Maps {
+    /// Number of photons.
+    pub fn len(&self) -> usize {
+        self.surface.photons().len() + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
+    }
+
+    /// The photons in media for some of the levels of `pixel`.
+    #[inline]
+    pub fn volume(&self, pixel: &Pixel, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
+        let VolumeMap { map, factor, levels: count } = self.volume.as_ref()?;
+        let radius = |level| pixel.volume_bandwidth * factor * level_factor(level, *count);
+        Some(Volume::new(map, levels.map(radius)))
+    }
+}
+
+/// Photons in media, and how far bandwidths have shrunk.
+pub(super) struct VolumeMap {
+    map: PhotonMap<VolumePhoton>,
+    /// Radius over the initial one.
+    factor: f32,
+    levels: usize,
+}
+
+impl VolumeMap {
+    /// Those of iteration `i`.
+    pub fn new(photons: Vec<VolumePhoton>, i: u64, settings: &Settings) -> VolumeMap {
+        let factor = radius_factor(i, settings.volume_alpha) as f32;
+        VolumeMap { map: PhotonMap::build(photons), factor, levels: settings.levels.count }
+    }
+}

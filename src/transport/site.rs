@@ -1,0 +1,240 @@
+//! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
+
+use super::interior::Interior;
+use super::segment::{MediumArrival, Way, way};
+use super::walk::Vertex;
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::medium::{Flight, HenyeyGreenstein};
+use crate::random::Draws;
+use crate::scene::Scene;
+
+/// A vertex of a path in a medium.
+pub struct MediumVertex {
+    /// What the walk has met.
+    pub met: MediumArrival,
+    /// Unit direction back along the path.
+    pub wo: Vec3,
+    /// Weight of the path up to here, the scattering coefficient included: what is left is to multiply by the phase function.
+    pub throughput: Rgb,
+    /// The same without the scattering coefficient: radiance that arrives, or flux times length for light paths.
+    pub arriving: Rgb,
+    /// Number of segments up to here.
+    pub depth: u32,
+    /// Origin of the last segment.
+    pub from: Vec3,
+    /// Random numbers of this vertex.
+    pub draws: Draws,
+    /// Densities of the last segment's flight.
+    pub flight: Flight,
+    /// Share of the light that the medium takes from rays through all of it; 1 where chance has brought the path here.
+    pub opacity: f32,
+    pub(super) survival_scale: f32,
+}
+
+impl MediumVertex {
+    /// Where it scatters to.
+    #[inline]
+    pub fn phase(&self) -> HenyeyGreenstein {
+        self.met.medium.phase()
+    }
+
+    /// Share of light that is scattered, not absorbed.
+    pub fn albedo(&self) -> Rgb {
+        let sigma_t = self.met.medium.sigma_t();
+        Rgb::select(sigma_t.cmpgt(Rgb::ZERO), self.met.medium.sigma_s / sigma_t, Rgb::ZERO)
+    }
+
+    /// Which medium this is: the index of its material, or `u32::MAX` for the one that fills the scene.
+    #[inline]
+    pub fn medium_id(&self, scene: &Scene) -> u32 {
+        self.met.interior.material(scene).unwrap_or(u32::MAX)
+    }
+}
+
+/// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is broad.
+pub trait Site {
+    /// Whether it is in a medium.
+    const IN_MEDIUM: bool;
+    /// World position.
+    fn p(&self) -> Vec3;
+    /// Weight of the path before it scatters.
+    fn throughput(&self) -> Rgb;
+    /// Number of segments up to here.
+    fn depth(&self) -> u32;
+    /// Random numbers of the vertex.
+    fn draws(&self) -> Draws;
+    /// Scattering from `wi` times its cosine, and the density of drawing `wi` ([`crate::bsdf::Shading::evaluate_cos`]).
+    fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
+    /// Density of the way back ([`crate::bsdf::Shading::reverse_pdf`]).
+    fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32;
+    /// Draws an onward direction ([`crate::bsdf::Shading::sample`]).
+    fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample>;
+    /// Geometric cosine of a direction.
+    fn cos(&self, w: Vec3) -> f32;
+    /// Where a ray towards `w` starts.
+    fn spawn(&self, w: Vec3) -> Vec3;
+    /// The solids on the side of `wo`, and behind.
+    fn interiors(&self) -> [Interior; 2];
+    /// Whether `w` is on the other side than `wo`.
+    fn crosses(&self, w: Vec3) -> bool;
+    /// See [`Vertex::survival`].
+    fn survival(&self, set: LobeSet) -> f32;
+
+    /// What is left of light on the way along `wi` to `target` (`None`: out of the scene), a vertex of a medium or not.
+    #[inline]
+    fn way(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32, to_medium: bool) -> Way {
+        let origin = self.spawn(wi);
+        let (direction, tmax) = match target {
+            None => (wi, f32::INFINITY),
+            Some(target) => {
+                // Both ends are off their surfaces already.
+                let to = target - origin;
+                let distance = to.length();
+                (to / distance, distance)
+            }
+        };
+        let interior = self.interiors()[usize::from(self.crosses(wi))];
+        way(scene, origin, direction, tmax, interior, token, [Self::IN_MEDIUM, to_medium])
+    }
+}
+
+impl Site for Vertex<'_, '_> {
+    const IN_MEDIUM: bool = false;
+
+    #[inline]
+    fn p(&self) -> Vec3 {
+        self.surface.p
+    }
+
+    #[inline]
+    fn throughput(&self) -> Rgb {
+        self.throughput
+    }
+
+    #[inline]
+    fn depth(&self) -> u32 {
+        self.depth
+    }
+
+    #[inline]
+    fn draws(&self) -> Draws {
+        self.draws
+    }
+
+    #[inline]
+    fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        self.shading.evaluate_cos(wi, transport, set)
+    }
+
+    #[inline]
+    fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32 {
+        self.shading.reverse_pdf(wi, transport, LobeSet::ALL)
+    }
+
+    #[inline]
+    fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        self.shading.sample(transport, set, u_lobe, u)
+    }
+
+    #[inline]
+    fn cos(&self, w: Vec3) -> f32 {
+        w.dot(self.surface.ng).abs()
+    }
+
+    #[inline]
+    fn spawn(&self, w: Vec3) -> Vec3 {
+        self.surface.spawn(w)
+    }
+
+    #[inline]
+    fn interiors(&self) -> [Interior; 2] {
+        [self.interior, self.interior_behind]
+    }
+
+    #[inline]
+    fn crosses(&self, w: Vec3) -> bool {
+        w.dot(self.surface.ng) * self.wo.dot(self.surface.ng) < 0.0
+    }
+
+    #[inline]
+    fn survival(&self, set: LobeSet) -> f32 {
+        Vertex::survival(self, set)
+    }
+}
+
+/// A direction drawn from a phase function, whose weight is 1.
+#[inline]
+pub(super) fn phase_sample(phase: &HenyeyGreenstein, wo: Vec3, u: Vec2) -> BsdfSample {
+    let wi = phase.sample(wo, u);
+    BsdfSample { wi, weight: Rgb::ONE, pdf_w: phase.pdf_w(wo, wi), lobe: LobeSet::BROAD, transmitted: false }
+}
+
+impl Site for MediumVertex {
+    const IN_MEDIUM: bool = true;
+
+    #[inline]
+    fn p(&self) -> Vec3 {
+        self.met.p
+    }
+
+    #[inline]
+    fn throughput(&self) -> Rgb {
+        self.throughput
+    }
+
+    #[inline]
+    fn depth(&self) -> u32 {
+        self.depth
+    }
+
+    #[inline]
+    fn draws(&self) -> Draws {
+        self.draws
+    }
+
+    #[inline]
+    fn evaluate_cos(&self, wi: Vec3, _: Transport, set: LobeSet) -> (Rgb, f32) {
+        if !set.has(LobeSet::BROAD) {
+            return (Rgb::ZERO, 0.0);
+        }
+        let f = self.phase().pdf_w(self.wo, wi);
+        (Rgb::splat(f), f)
+    }
+
+    #[inline]
+    fn reverse_pdf(&self, wi: Vec3, _: Transport) -> f32 {
+        self.phase().pdf_w(self.wo, wi)
+    }
+
+    #[inline]
+    fn sample(&self, _: Transport, _: LobeSet, _: f32, u: Vec2) -> Option<BsdfSample> {
+        Some(phase_sample(&self.phase(), self.wo, u))
+    }
+
+    #[inline]
+    fn cos(&self, _: Vec3) -> f32 {
+        1.0
+    }
+
+    #[inline]
+    fn spawn(&self, _: Vec3) -> Vec3 {
+        self.met.p
+    }
+
+    #[inline]
+    fn interiors(&self) -> [Interior; 2] {
+        [self.met.interior; 2]
+    }
+
+    #[inline]
+    fn crosses(&self, _: Vec3) -> bool {
+        false
+    }
+
+    #[inline]
+    fn survival(&self, set: LobeSet) -> f32 {
+        let expected = if set.has(LobeSet::BROAD) { self.throughput.max_element() * self.survival_scale } else { 0.0 };
+        super::walk::survival(expected, self.depth)
+    }
+}

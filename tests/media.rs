@@ -1,0 +1,417 @@
+//! Participating media: against closed forms, and methods against each other.
+//!
+//! Closed forms are t tests over independent seeds and tiles Welch's t tests, at a family-wise error rate of 0.1 % for each test (Sidak over its
+//! checks), plus the stated bias of closed form or kernel. Every check has to reject a planted error of a stated size.
+
+mod support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::{Material, MediumParameters};
+use caustique::math::{DVec3, Rgb, Vec2, Vec3};
+use caustique::medium::HenyeyGreenstein;
+use caustique::random::{Domain, Purpose, Stream};
+use caustique::render::{Control, Levels, Method, Rendered, Settings};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
+use support::stats::{chi_squared_p, mean_and_error, sidak, t_critical};
+
+const ERROR_RATE: f64 = 1e-3;
+
+// ---------------------------------------------------------------- phase function
+
+/// P-values of chi-squared tests of drawn cosines against the density's integrals, for several asymmetries; and the largest deviation of the mean
+/// cosine from g. `bent` plants a bug: cosines drawn for another asymmetry.
+fn phase_tests(bent: f32) -> (f64, f64) {
+    const CELLS: usize = 64;
+    const DRAWS: u64 = 200_000;
+    let (mut least, mut worst) = (1.0f64, 0.0f64);
+    let wo = Vec3::new(0.3, -0.5, 0.8).normalize();
+    for g in [-0.7f32, 0.0, 1e-4, 0.4, 0.9] {
+        let phase = HenyeyGreenstein { g };
+        let drawn = HenyeyGreenstein { g: g + bent };
+        let mut counts = vec![0.0; CELLS];
+        let mut mean = 0.0;
+        for i in 0..DRAWS {
+            let u = Stream::new(11, 0, Domain::Test, i).vertex(0).two(Purpose::Phase);
+            let cos = f64::from(-wo.dot(drawn.sample(wo, u)));
+            counts[(((cos + 1.0) * 0.5 * CELLS as f64) as usize).min(CELLS - 1)] += 1.0;
+            mean += cos / DRAWS as f64;
+        }
+        // Simpson's rule over each cell.
+        let density = |cos: f64| {
+            let side = wo.cross(Vec3::X).normalize();
+            let wi = -wo * cos as f32 + side * (1.0 - cos * cos).max(0.0).sqrt() as f32;
+            f64::from(phase.pdf_w(wo, wi)) * std::f64::consts::TAU
+        };
+        let integral = |a: f64, b: f64| {
+            let n = 64;
+            let h = (b - a) / f64::from(n);
+            let f = |i: i32| density(a + h * f64::from(i));
+            (0..n).step_by(2).map(|i| f(i) + 4.0 * f(i + 1) + f(i + 2)).sum::<f64>() * h / 3.0
+        };
+        let edge = |i: usize| 2.0 * i as f64 / CELLS as f64 - 1.0;
+        let expected: Vec<f64> = (0..CELLS).map(|i| integral(edge(i), edge(i + 1)) * DRAWS as f64).collect();
+        let total = expected.iter().sum::<f64>() / DRAWS as f64;
+        assert!((total - 1.0).abs() < 1e-3, "g {g}: the density integrates to {total}");
+        least = least.min(chi_squared_p(&counts, &expected));
+        // The variance of the cosine is at most 1.
+        worst = worst.max((mean - f64::from(g)).abs() * (DRAWS as f64).sqrt());
+    }
+    (least, worst)
+}
+
+#[test]
+fn phase_function_is_sampled_normalised_and_symmetric() {
+    let (p, deviation) = phase_tests(0.0);
+    assert!(p > sidak(ERROR_RATE, 5), "p {p}");
+    assert!(deviation < 4.0, "mean cosine off by {deviation} standard errors");
+    let (p, deviation) = phase_tests(0.02);
+    assert!(p < sidak(ERROR_RATE, 5) && deviation > 4.0, "a bent phase function goes unnoticed: {p}, {deviation}");
+    let phase = HenyeyGreenstein { g: 0.6 };
+    let (a, b) = (Vec3::new(0.6, 0.8, 0.0), phase.sample(Vec3::Y, Vec2::new(0.3, 0.4)));
+    assert!((phase.pdf_w(a, b) - phase.pdf_w(b, a)).abs() < 1e-6);
+    // Forward is where it came from not.
+    assert!(phase.pdf_w(a, -a) > 10.0 * phase.pdf_w(a, a));
+}
+
+// ---------------------------------------------------------------- scenes and renders
+
+fn fog(sigma_a: impl Into<[f32; 3]>, sigma_s: impl Into<[f32; 3]>, g: f32) -> MediumParameters {
+    MediumParameters { sigma_a: Rgb::from(sigma_a.into()), sigma_s: Rgb::from(sigma_s.into()), g }
+}
+
+/// A mesh of this holds a medium and nothing else: light passes its surface unbent.
+fn holds(medium: MediumParameters) -> Material {
+    Material { medium: Some(medium), ..glass(1.0) }
+}
+
+fn settings(iterations: u64, seed: u64) -> Settings {
+    Settings { seed, levels: Levels::new(1), iterations: Some(iterations), ..Settings::default() }
+}
+
+/// With bandwidth levels for methods that gather photons in media.
+fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
+    let initial = InitialBandwidth::Fixed(radius);
+    Settings { photons, initial, levels: Levels::new(5), ..settings(iterations, seed) }
+}
+
+fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
+    let camera = scene.camera(&square(size)).expect("a camera");
+    let settings = Settings { method, ..settings.clone() };
+    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
+    assert_eq!(rendered.rejected(), 0, "{method:?}");
+    rendered
+}
+
+/// Mean over the picture of every channel, for each seed.
+fn means(scene: &Scene, method: Method, size: u32, seeds: u64, of: impl Fn(u64) -> Settings) -> [Vec<f64>; 3] {
+    let mut means: [Vec<f64>; 3] = Default::default();
+    for seed in 0..seeds {
+        let settings = of(seed);
+        let rendered = render(scene, method, size, &settings);
+        let own = rendered.settings.levels.own();
+        for (c, means) in means.iter_mut().enumerate() {
+            let sum = rendered.pixels.iter().map(|p| p.levels[own].mean[c]).sum::<f64>();
+            means.push(sum / rendered.pixels.len() as f64);
+        }
+    }
+    means
+}
+
+struct Check {
+    expected: [f64; 3],
+    bias: f64,
+    /// Relative shift of the expectation that must be rejected.
+    detects: f64,
+}
+
+impl Check {
+    fn run(&self, what: &str, values: &[Vec<f64>; 3]) {
+        for (c, values) in values.iter().enumerate() {
+            let (mean, error) = mean_and_error(values);
+            let critical = t_critical(ERROR_RATE, 12, values.len() as f64 - 1.0);
+            let passes = |expected: f64| (mean - expected).abs() <= critical * error + (self.bias + 1e-5) * expected;
+            let expected = self.expected[c];
+            println!("{what}, channel {c}: {mean:.6} +- {error:.6}, expected {expected:.6}");
+            assert!(passes(expected), "{what}, channel {c}: {mean} +- {error}, expected {expected}");
+            for shift in [1.0 - self.detects, 1.0 + self.detects] {
+                assert!(!passes(expected * shift), "{what}, channel {c}: cannot tell {shift} ({mean} +- {error})");
+            }
+        }
+    }
+}
+
+/// Methods that follow paths through media by chance.
+const WHOLE_PATHS: [Method; 3] = [Method::Path, Method::Bdpt, Method::Vcm];
+
+// ---------------------------------------------------------------- closed forms
+
+/// A lamp seen through fog in the open and through fog in a mesh: exp(-sigma d).
+#[test]
+fn beer_lambert() {
+    let (sigma_a, sigma_s) = ([0.1, 0.5, 0.0], [0.2, 0.5, 0.3]);
+    for inside in [false, true] {
+        let mut description = Description::default();
+        add(
+            &mut description,
+            "lamp",
+            quad(Vec3::new(-9.0, 0.0, -9.0), Vec3::Z * 18.0, Vec3::X * 18.0),
+            matte(0.0, 5.0),
+        );
+        let medium = fog(sigma_a, sigma_s, 0.3);
+        let length = if inside { 1.5 } else { 4.0 };
+        if inside {
+            let slab = cuboid(Vec3::new(-8.0, 1.0, -8.0), Vec3::new(8.0, 2.5, 8.0), false);
+            add(&mut description, "slab", slab, holds(medium));
+        } else {
+            description.medium = Some(medium);
+        }
+        description.cameras.push(look_at(DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, 1.0));
+        let scene = build(description);
+        let expected = std::array::from_fn(|c| 5.0 * (-f64::from(sigma_a[c] + sigma_s[c]) * length).exp());
+        let check = Check { expected, bias: 1e-4, detects: 0.1 };
+        for method in WHOLE_PATHS.into_iter().chain([Method::Light]) {
+            let one = |seed| Settings { max_depth: 1, ..settings(300, seed) };
+            check.run(&format!("lamp behind fog, {method:?}"), &means(&scene, method, 4, 8, one));
+        }
+        let one = |seed| Settings { max_depth: 1, ..photons(0, 0.1, 4, seed) };
+        let check = Check { detects: 1e-3, ..check };
+        check.run("lamp behind fog, sppm", &means(&scene, Method::Sppm, 4, 4, one));
+    }
+}
+
+/// A medium that absorbs nothing under a uniform sky cannot be seen, whatever its phase function and however its channels differ.
+#[test]
+fn furnace() {
+    for (sigma_s, g) in [([1.5; 3], 0.0), ([2.5, 1.0, 0.4], 0.7)] {
+        let mut description = Description::default();
+        add(&mut description, "ball", sphere(Vec3::ZERO, 1.0, 32), holds(fog([0.0; 3], sigma_s, g)));
+        add(&mut description, "glass", sphere(Vec3::new(0.2, 0.1, 0.0), 0.3, 32), glass(1.3));
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 36.0));
+        let scene = build(description);
+        for method in WHOLE_PATHS {
+            let check = Check { expected: [1.0; 3], bias: 1e-3, detects: 0.04 };
+            check.run(&format!("furnace, g {g}, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(400, seed)));
+        }
+    }
+}
+
+/// A closed box whose walls give radiance e and reflect rho, full of fog that absorbs nothing: e / (1 - rho) everywhere.
+#[test]
+fn furnace_box_full_of_fog() {
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
+    add(&mut description, "glass", sphere(Vec3::new(0.2, 0.1, 0.6), 0.2, 32), glass(1.3));
+    description.medium = Some(fog([0.0; 3], [1.5, 0.5, 1.0], 0.5));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    let scene = build(description);
+    for method in WHOLE_PATHS {
+        let check = Check { expected: [1.0; 3], bias: 2e-3, detects: 0.03 };
+        check.run(&format!("foggy furnace, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(100, seed)));
+    }
+    for method in [Method::Sppm, Method::Cppm] {
+        // Kernels lose what they would hold behind a wall, where they reach: 3/16 of the light scattered that near.
+        let check = Check { expected: [1.0; 3], bias: 0.012, detects: 0.04 };
+        let means = means(&scene, method, 8, 8, |seed| photons(20_000, 0.04, 8, seed));
+        check.run(&format!("foggy furnace, {method:?}"), &means);
+    }
+}
+
+/// Light of a point scattered once on its way through a medium without end, by Simpson's rule on the airlight integral
+/// `sigma_s int p(cos) I exp(-sigma_t (t + d(t))) / d(t)^2 dt`, the mean over a square picture of half width `slope` at distance 1.
+fn airlight(medium: &MediumParameters, light: DVec3, intensity: f64, slope: f64) -> [f64; 3] {
+    let n = 24;
+    let g = f64::from(medium.g);
+    let at = |i: i32| slope * (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0);
+    let mut sums = [0.0; 3];
+    for i in 0..n * n {
+        let d = DVec3::new(at(i % n), at(i / n), -1.0).normalize();
+        for (c, sum) in sums.iter_mut().enumerate() {
+            let sigma_t = f64::from(medium.sigma_t()[c]);
+            let f = |t: f64| {
+                let to = light - d * t;
+                let cos = to.normalize().dot(d);
+                let phase = (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos).powf(1.5) / (4.0 * std::f64::consts::PI);
+                phase * (-sigma_t * (t + to.length())).exp() / to.length_squared()
+            };
+            let (steps, h) = (2000, 12.0 / 2000.0);
+            let simpson: f64 = (0..steps)
+                .step_by(2)
+                .map(|k| f(f64::from(k) * h) + 4.0 * f(f64::from(k + 1) * h) + f(f64::from(k + 2) * h))
+                .sum();
+            *sum += intensity * f64::from(medium.sigma_s[c]) * simpson * h / 3.0 / f64::from(n * n);
+        }
+    }
+    sums
+}
+
+#[test]
+fn single_scattering_of_a_point_light() {
+    let medium = fog([0.1, 0.3, 0.6], [0.6, 0.8, 0.2], 0.4);
+    let mut description = Description { medium: Some(medium), ..Description::default() };
+    // Far behind the camera: a scene must have a size.
+    add(&mut description, "mark", quad(Vec3::new(-1.0, -1.0, 6.0), Vec3::X * 2.0, Vec3::Y * 2.0), matte(0.0, 0.0));
+    let light = DVec3::new(0.5, 0.3, -2.0);
+    description.lights.push(point_light(light, 7.0));
+    description.cameras.push(look_at(DVec3::ZERO, -DVec3::Z, 20.0));
+    let scene = build(description);
+    let expected = airlight(&medium, light, 7.0, 10f64.to_radians().tan());
+    for method in WHOLE_PATHS.into_iter().chain([Method::Light]) {
+        let check = Check { expected, bias: 2e-3, detects: 0.06 };
+        let one = |seed| Settings { max_depth: 2, ..settings(400, seed) };
+        check.run(&format!("airlight, {method:?}"), &means(&scene, method, 8, 8, one));
+    }
+    // Next-event estimation alone: what has scattered once before is the photons'.
+    let one = |seed| Settings { max_depth: 2, ..photons(1000, 0.1, 60, seed) };
+    let check = Check { expected, bias: 2e-3, detects: 0.06 };
+    check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
+}
+
+// ---------------------------------------------------------------- agreement
+
+const SIZE: u32 = 16;
+const TILE: u32 = 4;
+const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
+
+/// Tile means of every channel.
+fn tiles(rendered: &Rendered) -> Vec<f64> {
+    let own = rendered.settings.levels.own();
+    let mut sums = vec![0.0; 3 * TILES];
+    for (index, pixel) in (0..).zip(&rendered.pixels) {
+        let tile = (index / SIZE / TILE * (SIZE / TILE) + index % SIZE / TILE) as usize;
+        for c in 0..3 {
+            sums[3 * tile + c] += pixel.levels[own].mean[c] / f64::from(TILE * TILE);
+        }
+    }
+    sums
+}
+
+/// Tiles and channels in which two methods differ by more than chance and `bias` allow.
+fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
+    let critical = t_critical(ERROR_RATE, 3 * TILES, (a.len().min(b.len()) - 1) as f64);
+    (0..3 * TILES)
+        .filter_map(|at| {
+            let (mean_a, error_a) = mean_and_error(&a.iter().map(|s| s[at]).collect::<Vec<_>>());
+            let (mean_b, error_b) = mean_and_error(&b.iter().map(|s| s[at]).collect::<Vec<_>>());
+            let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
+            ((mean_a - mean_b).abs() > allowed).then(|| {
+                format!("tile {}, channel {}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}", at / 3, at % 3)
+            })
+        })
+        .collect()
+}
+
+fn seeds(scene: &Scene, method: Method, seeds: u64, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
+    let all: Vec<_> = (0..seeds).map(|seed| tiles(&render(scene, method, SIZE, &of(seed)))).collect();
+    let mean = all.iter().flatten().sum::<f64>() / (all.len() * 3 * TILES) as f64;
+    println!("{method:?}: {mean:.5}");
+    all
+}
+
+/// `b` is the oracle.
+fn agree(what: &str, a: &[Vec<f64>], b: &[Vec<f64>], bias: f64, planted: f64) {
+    let found = disagreeing(a, b, bias);
+    assert!(found.is_empty(), "{what}: {found:#?}");
+    let mut wrong = a.to_vec();
+    for seed in &mut wrong {
+        seed.iter_mut().for_each(|x| *x *= 1.0 + planted);
+    }
+    assert!(!disagreeing(&wrong, b, bias).is_empty(), "{what}: a picture brighter by {planted} goes unnoticed");
+}
+
+/// A lamp shines past a board into fog.
+fn god_rays() -> Scene {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.3, 1.98, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
+    add(&mut description, "lamp", lamp, matte(0.0, 10.0));
+    let board = quad(Vec3::new(-0.9, 1.4, -0.8), Vec3::Z * 1.2, Vec3::X * 0.9);
+    add(&mut description, "board", board, matte(0.3, 0.0));
+    description.medium = Some(fog([0.05; 3], [0.5; 3], 0.5));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.9, 0.0), 55.0));
+    build(description)
+}
+
+#[test]
+fn god_rays_agree() {
+    let scene = god_rays();
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(600, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(80, seed));
+    agree("god rays, bdpt", &bdpt, &path, 2e-3, 0.1);
+    let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(80, seed));
+    agree("god rays, vcm", &vcm, &path, 0.01, 0.12);
+    for method in [Method::Sppm, Method::Cppm] {
+        let by_photons = seeds(&scene, method, 10, |seed| photons(20_000, 0.08, 6, seed));
+        agree(&format!("god rays, {method:?}"), &by_photons, &path, 0.02, 0.15);
+    }
+}
+
+/// A ball of clear glass in fog under a lamp: light through the ball lights the fog behind it.
+#[test]
+fn a_glass_ball_in_fog_agrees() {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.3, 0.0));
+    let lamp = quad(Vec3::new(-0.3, 1.98, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
+    add(&mut description, "lamp", lamp, matte(0.0, 10.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 1.3, 0.0), 0.35, 64), glass(1.5));
+    description.medium = Some(fog([0.1, 0.05, 0.0], [0.6, 0.8, 1.0], 0.3));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.9, 0.0), 55.0));
+    let scene = build(description);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(500, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(100, seed));
+    agree("ball in fog, bdpt", &bdpt, &path, 2e-3, 0.12);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(20_000, 0.06, 6, seed));
+    agree("ball in fog, sppm", &sppm, &path, 0.02, 0.15);
+}
+
+/// A coloured medium that scatters and absorbs, in a block of rough glass and in one whose surface is nothing.
+#[test]
+fn coloured_media_in_meshes_agree() {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    let jade = fog([1.5, 0.2, 0.8], [2.0, 6.0, 3.0], 0.4);
+    let smoke = fog([0.2, 0.6, 1.0], [1.5, 1.0, 0.5], -0.2);
+    let block = cuboid(Vec3::new(-0.8, 0.02, -0.5), Vec3::new(-0.1, 0.9, 0.2), false);
+    add(&mut description, "jade", block, Material { medium: Some(jade), roughness: 0.5, ..glass(1.4) });
+    add(&mut description, "smoke", sphere(Vec3::new(0.45, 0.6, 0.2), 0.45, 48), holds(smoke));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.7, 0.0), 55.0));
+    let scene = build(description);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(400, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(80, seed));
+    agree("coloured media, bdpt", &bdpt, &path, 2e-3, 0.12);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(40_000, 0.04, 6, seed));
+    agree("coloured media, sppm", &sppm, &path, 0.03, 0.15);
+}
+
+/// A point light's caustic in fog, which no eye path can run into: light tracing finds it, and so must photons.
+#[test]
+fn a_volumetric_caustic_agrees() {
+    let mut description = Description::default();
+    let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
+    add(&mut description, "floor", floor, matte(0.4, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 1.2, 0.0), 0.4, 96), glass(1.5));
+    description.lights.push(point_light(DVec3::new(0.3, 2.4, 0.1), 6.0));
+    description.medium = Some(fog([0.02; 3], [0.4, 0.3, 0.2], 0.2));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.7, 0.0), 40.0));
+    let scene = build(description);
+    // Five segments: lamp, into the ball, out of it, fog, camera. Longer paths come back through the ball, which light tracing cannot follow.
+    let four = |settings: Settings| Settings { max_depth: 4, ..settings };
+    let light = seeds(&scene, Method::Light, 10, |seed| four(settings(60, seed)));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| four(settings(40, seed)));
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| four(photons(40_000, 0.04, 6, seed)));
+    // Tiles that show the ball show the fog through it, which connections do not.
+    let without_ball = |seeds: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let keep = |at: usize| !(4..12).contains(&(at / 3)) || !matches!(at / 3 % 4, 1 | 2);
+        seeds.iter().map(|s| (0..3 * TILES).map(|at| if keep(at) { s[at] } else { 1.0 }).collect()).collect()
+    };
+    agree("volumetric caustic, bdpt", &without_ball(&bdpt), &without_ball(&light), 5e-3, 0.15);
+    agree("volumetric caustic, sppm", &without_ball(&sppm), &without_ball(&light), 0.03, 0.2);
+}
