@@ -179,10 +179,10 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     let folder = Folder::new();
     let help = folder.run("render --help");
     assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));
-    for option in ["--photons", "--exr-naming", "--target-error", "--strict", "--reproducible"] {
+    for option in ["--photons", "--kernel", "--cppm-plus", "--exr-naming", "--target-error", "--strict", "--reproducible"] {
         assert!(help.stdout.contains(option), "{option}");
     }
-    for absent in ["--cppm-plus", "--effects", "--checkpoint", "--kernel", "appm"] {
+    for absent in ["--effects", "--checkpoint"] {
         assert!(!help.stdout.contains(absent), "{absent}");
     }
     let commands = folder.run("--help").stdout;

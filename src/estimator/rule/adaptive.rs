@@ -8,7 +8,8 @@
 //!
 //! q is estimated within the bandwidth. D is estimated with a smooth kernel of a bandwidth of its own, which shrinks as
 //! `i^(-1/10)`, the rate of least error for second derivatives in the plane. Both are means over all iterations.
-//! As long as noise rules the estimate of D, it is taken for curvature: bandwidths err on the small side.
+//! A square of an estimate is too large by its variance, which is taken off D^2; else noise would be taken for curvature, and bandwidths in dim light
+//! shrink to nothing.
 //!
 //! Bandwidths may grow, but stay within constant factors of the memoryless rule's, so that the estimate is consistent whatever is found.
 
@@ -50,6 +51,8 @@ pub struct Bandwidth {
     shot: f64,
     /// Sum over iterations of the estimates of D.
     laplacian: f64,
+    /// Sum over iterations of the variances of these estimates.
+    noise: f64,
 }
 
 /// What an iteration finds.
@@ -61,6 +64,8 @@ pub struct Tally {
     squares: f64,
     /// Estimate of D.
     laplacian: f64,
+    /// Sum of the squares of what photons add to it: its variance, for a Poisson process.
+    noise: f64,
 }
 
 impl<K: Kernel> CountingRule for Adaptive<K> {
@@ -70,7 +75,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     fn begin(&self, radius2: f32, _: f32, above: i32) -> Bandwidth {
         let scale = 2f32.powi(above);
         let pilot2 = PILOT * radius2 / scale;
-        Bandwidth { radius2, initial2: radius2, scale, pilot2, photons: 0, shot: 0.0, laplacian: 0.0 }
+        Bandwidth { radius2, initial2: radius2, scale, pilot2, photons: 0, shot: 0.0, laplacian: 0.0, noise: 0.0 }
     }
 
     #[inline]
@@ -92,8 +97,10 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         let s = photons.distance2 / bandwidth.pilot2;
         let near = photons.distance2.cmp_lt(f32x8::splat(bandwidth.pilot2));
         // What is not there is infinitely far away, and its product not a number: masked last.
-        let laplacian = (near & (photons.light * laplacian(s))).reduce_add();
-        tally.laplacian += f64::from(laplacian) / f64::from(bandwidth.pilot2).powi(2);
+        let parts = near & (photons.light * laplacian(s));
+        let scale = f64::from(bandwidth.pilot2).powi(-2);
+        tally.laplacian += f64::from(parts.reduce_add()) * scale;
+        tally.noise += f64::from((parts * parts).reduce_add()) * scale * scale;
     }
 
     fn update(&self, i: u64, bandwidths: &mut [Bandwidth], tallies: &mut [Tally]) {
@@ -102,12 +109,14 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         last.photons = last.photons.saturating_add(found.photons);
         last.shot += found.squares / (PI * f64::from(last.radius2));
         last.laplacian += found.laplacian;
+        last.noise += found.noise;
         let usual2 = f64::from(last.initial2 / last.scale);
         let next = i + 1;
         last.pilot2 = (f64::from(PILOT) * usual2 * (next as f64).powf(-0.2)) as f32;
         let n = i as f64;
         let memoryless2 = usual2 * radius2_factor(next, 2.0 / 3.0);
-        let optimum = optimum2::<K>(last.shot / n, last.laplacian / n, n);
+        let squared = (last.laplacian * last.laplacian - last.noise).max(0.0) / (n * n);
+        let optimum = optimum2::<K>(last.shot / n, squared, n);
         let known = last.photons >= LEAST_PHOTONS && !optimum.is_nan();
         let usual2 = if known { optimum } else { memoryless2 };
         let usual2 = usual2.clamp(BOUNDS.0 * memoryless2, BOUNDS.1 * memoryless2) as f32;
@@ -117,10 +126,10 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     }
 }
 
-/// Squared radius of least error after `n` iterations; not a number where nothing is known.
-fn optimum2<K: Kernel>(shot: f64, laplacian: f64, n: f64) -> f64 {
-    let bias = f64::from(K::SECOND_MOMENT) * laplacian;
-    (2.0 * shot * f64::from(K::ROUGHNESS) / (3.0 * PI * n * bias * bias)).cbrt()
+/// Squared radius of least error after `n` iterations where D^2 is `squared`; not a number where nothing is known.
+fn optimum2<K: Kernel>(shot: f64, squared: f64, n: f64) -> f64 {
+    let bias2 = f64::from(K::SECOND_MOMENT).powi(2) * squared;
+    (2.0 * shot * f64::from(K::ROUGHNESS) / (3.0 * PI * n * bias2)).cbrt()
 }
 
 #[cfg(test)]
@@ -144,7 +153,7 @@ mod tests {
                 }
                 variance + bias * bias
             };
-            let best = optimum2::<K>(q, d, n);
+            let best = optimum2::<K>(q, d * d, n);
             assert!(error(best) < error(best * 1.05) && error(best) < error(best * 0.95));
         }
         check::<Box>();
