@@ -450,8 +450,13 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
             let density = emitted.as_ref().map(|e| e.density);
             let infinity = EmissionDensity { direct: 0.0, onward: 0.0, cos: 1.0, infinite: true, delta: false };
-            let mut whole =
-                Whole { light: density.unwrap_or(infinity), nodes: vec![], distance2: vec![], media: vec![], camera_pdf_w };
+            let mut whole = Whole {
+                light: density.unwrap_or(infinity),
+                nodes: vec![],
+                distance2: vec![],
+                media: vec![],
+                camera_pdf_w,
+            };
             let (name, strategy) = match technique {
                 Technique::Hit { eye: 1 } => continue,
                 Technique::Hit { eye: 0 } => {

@@ -187,8 +187,15 @@ mod tests {
     use crate::math::Rgb;
     use crate::transport::{EyeMeasure, Features, FirstHit};
 
-    const SHAPE: Shape =
-        Shape { levels: 5, compared: 5, own: 3, bandwidths: true, radius2_factor: 0.25, environment: false, volume: true };
+    const SHAPE: Shape = Shape {
+        levels: 5,
+        compared: 5,
+        own: 3,
+        bandwidths: true,
+        radius2_factor: 0.25,
+        environment: false,
+        volume: true,
+    };
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
     fn measure(x: f32, hit: bool) -> EyeMeasure {

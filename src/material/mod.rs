@@ -4,8 +4,8 @@ mod evaluate;
 mod library;
 mod scattering;
 
-pub use library::Materials;
 pub use crate::medium::MediumParameters;
+pub use library::Materials;
 pub use scattering::Scattering;
 
 use crate::math::Rgb;

@@ -29,12 +29,7 @@ pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPas
 }
 
 /// Traces some of the light paths of a pass.
-pub(super) fn trace_some(
-    scene: &Scene,
-    surroundings: &Surroundings,
-    pass: &LightPass,
-    paths: Range<u32>,
-) -> Photons {
+pub(super) fn trace_some(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, paths: Range<u32>) -> Photons {
     let parts: Vec<Photons> = (0..paths.len() as u32)
         .into_par_iter()
         .step_by(CHUNK as usize)

@@ -206,7 +206,8 @@ pub(super) fn next_vertex(
         {
             let (origin, left, beyond) = (ray.origin, transmittance, surface.as_ref());
             let (medium, interior) = (&medium, &interior);
-            let span = Span { medium, interior, origin, direction, distance: t, before: distance, left, crossed, beyond };
+            let span =
+                Span { medium, interior, origin, direction, distance: t, before: distance, left, crossed, beyond };
             match through.pass(&span) {
                 Passage::Left(left) => transmittance *= left,
                 Passage::Ended(arrival) => return End::Medium(arrival),

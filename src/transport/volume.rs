@@ -77,7 +77,13 @@ mod tests {
         let draws = Stream::new(17, 0, Domain::Test, i).vertex(medium);
         let (u, v) = (draws.two(Purpose::Pixel), draws.one(Purpose::Lobe));
         let wi = crate::math::warp::sphere_uniform(draws.two(Purpose::Direction));
-        VolumePhoton { p: Vec3::new(u.x, u.y, v), wi, flux: Rgb::ONE / PHOTONS as f32, medium, depth: 2 + (i % 2) as u16 }
+        VolumePhoton {
+            p: Vec3::new(u.x, u.y, v),
+            wi,
+            flux: Rgb::ONE / PHOTONS as f32,
+            medium,
+            depth: 2 + (i % 2) as u16,
+        }
     }
 
     fn vertex() -> MediumVertex {
@@ -102,7 +108,8 @@ mod tests {
     /// whatever the bandwidth and the order of levels. Errors are below 5 sigma of the Poisson counts; a kernel off by the area's constant is not.
     #[test]
     fn an_even_field_is_measured_without_bias() {
-        let map = PhotonMap::build((0..PHOTONS).map(|i| photon(i, 7)).chain((0..PHOTONS).map(|i| photon(i, 8))).collect());
+        let map =
+            PhotonMap::build((0..PHOTONS).map(|i| photon(i, 7)).chain((0..PHOTONS).map(|i| photon(i, 8))).collect());
         let radii = [0.4f32, 0.1, 0.2, 0.15, 0.3];
         let volume = Volume::new(&map, radii.into_iter());
         for longest in [2, 3] {
@@ -116,7 +123,10 @@ mod tests {
                 let ratio = found[level] * 4.0 * std::f32::consts::PI / (share * vertex().throughput);
                 assert!((ratio - Rgb::ONE).abs().max_element() < 5.0 * error, "radius {radius}: {ratio}");
                 let flat = ratio * (0.75 / radius);
-                assert!((flat - Rgb::ONE).abs().max_element() > 5.0 * error, "radius {radius}: a disc's kernel goes unnoticed");
+                assert!(
+                    (flat - Rgb::ONE).abs().max_element() > 5.0 * error,
+                    "radius {radius}: a disc's kernel goes unnoticed"
+                );
             }
         }
     }

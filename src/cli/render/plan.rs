@@ -3,8 +3,8 @@
 use super::options::{Method, RenderArgs};
 use crate::cli::say;
 use caustique::camera::Camera;
-use caustique::light::Emitter;
 use caustique::error::{Error, Kind, Result};
+use caustique::light::Emitter;
 use caustique::material::Material;
 use caustique::render;
 use caustique::scene::Scene;
