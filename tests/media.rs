@@ -193,8 +193,8 @@ fn furnace() {
         description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 36.0));
         let scene = build(description);
         for method in WHOLE_PATHS {
-            let check = Check { expected: [1.0; 3], bias: 1e-3, detects: 0.04 };
-            check.run(&format!("furnace, g {g}, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(400, seed)));
+            let check = Check { expected: [1.0; 3], bias: 1e-3, detects: 0.05 };
+            check.run(&format!("furnace, g {g}, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(150, seed)));
         }
     }
 }
@@ -206,16 +206,16 @@ fn furnace_box_full_of_fog() {
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
     add(&mut description, "glass", sphere(Vec3::new(0.2, 0.1, 0.6), 0.2, 32), glass(1.3));
     description.medium = Some(fog([0.0; 3], [1.5, 0.5, 1.0], 0.5));
-    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 100.0));
     let scene = build(description);
     for method in WHOLE_PATHS {
-        let check = Check { expected: [1.0; 3], bias: 2e-3, detects: 0.03 };
+        let check = Check { expected: [1.0; 3], bias: 2e-3, detects: 0.08 };
         check.run(&format!("foggy furnace, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(100, seed)));
     }
     for method in [Method::Sppm, Method::Cppm] {
         // Kernels lose what they would hold behind a wall, where they reach: 3/16 of the light scattered that near.
-        let check = Check { expected: [1.0; 3], bias: 0.012, detects: 0.04 };
-        let means = means(&scene, method, 8, 8, |seed| photons(20_000, 0.04, 8, seed));
+        let check = Check { expected: [1.0; 3], bias: 0.015, detects: 0.12 };
+        let means = means(&scene, method, 24, 8, |seed| photons(20_000, 0.06, 8, seed));
         check.run(&format!("foggy furnace, {method:?}"), &means);
     }
 }
@@ -259,13 +259,14 @@ fn single_scattering_of_a_point_light() {
     description.cameras.push(look_at(DVec3::ZERO, -DVec3::Z, 20.0));
     let scene = build(description);
     let expected = airlight(&medium, light, 7.0, 10f64.to_radians().tan());
-    for method in WHOLE_PATHS.into_iter().chain([Method::Light]) {
+    // Light tracing alone has no bound near the camera.
+    for method in WHOLE_PATHS {
         let check = Check { expected, bias: 2e-3, detects: 0.06 };
         let one = |seed| Settings { max_depth: 2, ..settings(400, seed) };
         check.run(&format!("airlight, {method:?}"), &means(&scene, method, 8, 8, one));
     }
     // Next-event estimation alone: what has scattered once before is the photons'.
-    let one = |seed| Settings { max_depth: 2, ..photons(1000, 0.1, 60, seed) };
+    let one = |seed| Settings { max_depth: 2, ..photons(100, 0.1, 400, seed) };
     let check = Check { expected, bias: 2e-3, detects: 0.06 };
     check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
 }
@@ -273,7 +274,7 @@ fn single_scattering_of_a_point_light() {
 // ---------------------------------------------------------------- agreement
 
 const SIZE: u32 = 16;
-const TILE: u32 = 4;
+const TILE: u32 = 8;
 const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
 
 /// Tile means of every channel.
@@ -339,14 +340,14 @@ fn god_rays() -> Scene {
 #[test]
 fn god_rays_agree() {
     let scene = god_rays();
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(600, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(80, seed));
-    agree("god rays, bdpt", &bdpt, &path, 2e-3, 0.1);
-    let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(80, seed));
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(150, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(40, seed));
+    agree("god rays, bdpt", &bdpt, &path, 2e-3, 0.12);
+    let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(40, seed));
     agree("god rays, vcm", &vcm, &path, 0.01, 0.12);
     for method in [Method::Sppm, Method::Cppm] {
-        let by_photons = seeds(&scene, method, 10, |seed| photons(20_000, 0.08, 6, seed));
-        agree(&format!("god rays, {method:?}"), &by_photons, &path, 0.02, 0.15);
+        let by_photons = seeds(&scene, method, 10, |seed| photons(10_000, 0.08, 20, seed));
+        agree(&format!("god rays, {method:?}"), &by_photons, &bdpt, 0.03, 0.3);
     }
 }
 
@@ -362,11 +363,11 @@ fn a_glass_ball_in_fog_agrees() {
     description.medium = Some(fog([0.1, 0.05, 0.0], [0.6, 0.8, 1.0], 0.3));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.9, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(500, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(100, seed));
-    agree("ball in fog, bdpt", &bdpt, &path, 2e-3, 0.12);
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(20_000, 0.06, 6, seed));
-    agree("ball in fog, sppm", &sppm, &path, 0.02, 0.15);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(120, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(30, seed));
+    agree("ball in fog, bdpt", &bdpt, &path, 2e-3, 0.2);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.08, 20, seed));
+    agree("ball in fog, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
 /// A coloured medium that scatters and absorbs, in a block of rough glass and in one whose surface is nothing.
@@ -384,11 +385,11 @@ fn coloured_media_in_meshes_agree() {
     add(&mut description, "smoke", sphere(Vec3::new(0.45, 0.6, 0.2), 0.45, 48), holds(smoke));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.7, 0.0), 55.0));
     let scene = build(description);
-    let path = seeds(&scene, Method::Path, 10, |seed| settings(400, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(80, seed));
-    agree("coloured media, bdpt", &bdpt, &path, 2e-3, 0.12);
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(40_000, 0.04, 6, seed));
-    agree("coloured media, sppm", &sppm, &path, 0.03, 0.15);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(80, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(25, seed));
+    agree("coloured media, bdpt", &bdpt, &path, 2e-3, 0.15);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
+    agree("coloured media, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
 /// A point light's caustic in fog, which no eye path can run into: light tracing finds it, and so must photons.
@@ -400,18 +401,12 @@ fn a_volumetric_caustic_agrees() {
     add(&mut description, "ball", sphere(Vec3::new(0.0, 1.2, 0.0), 0.4, 96), glass(1.5));
     description.lights.push(point_light(DVec3::new(0.3, 2.4, 0.1), 6.0));
     description.medium = Some(fog([0.02; 3], [0.4, 0.3, 0.2], 0.2));
-    description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.7, 0.0), 40.0));
+    // The ball is above the picture: what it shows, no connection finds.
+    description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.15, 0.0), 25.0));
     let scene = build(description);
-    // Five segments: lamp, into the ball, out of it, fog, camera. Longer paths come back through the ball, which light tracing cannot follow.
-    let four = |settings: Settings| Settings { max_depth: 4, ..settings };
-    let light = seeds(&scene, Method::Light, 10, |seed| four(settings(60, seed)));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| four(settings(40, seed)));
-    let sppm = seeds(&scene, Method::Sppm, 10, |seed| four(photons(40_000, 0.04, 6, seed)));
-    // Tiles that show the ball show the fog through it, which connections do not.
-    let without_ball = |seeds: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        let keep = |at: usize| !(4..12).contains(&(at / 3)) || !matches!(at / 3 % 4, 1 | 2);
-        seeds.iter().map(|s| (0..3 * TILES).map(|at| if keep(at) { s[at] } else { 1.0 }).collect()).collect()
-    };
-    agree("volumetric caustic, bdpt", &without_ball(&bdpt), &without_ball(&light), 5e-3, 0.15);
-    agree("volumetric caustic, sppm", &without_ball(&sppm), &without_ball(&light), 0.03, 0.2);
+    let light = seeds(&scene, Method::Light, 10, |seed| settings(24, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(14, seed));
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(8_000, 0.12, 12, seed));
+    agree("volumetric caustic, bdpt", &bdpt, &light, 5e-3, 0.25);
+    agree("volumetric caustic, sppm", &sppm, &bdpt, 0.04, 0.3);
 }

@@ -20,6 +20,9 @@ pub const FOOTPRINT_PIXELS: f32 = 3.0;
 /// Smallest bandwidth over the scene's radius: where photons fall on one point (a perfect focus) the distance is zero.
 pub const LEAST: f32 = 1e-7;
 
+/// Pixels to each side that [`initial_volume_bandwidths`] looks at.
+const NEIGHBOURHOOD: usize = 3;
+
 /// What sets the largest initial bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InitialBandwidth {
@@ -43,13 +46,31 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
 }
 
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path, in three dimensions.
+///
+/// Where on the way that point lies is chance, and what is true near the eye is not true of the whole way: each pixel takes the median of
+/// those around it.
 pub fn initial_volume_bandwidths(
     eye: &Eye<'_>,
     rule: InitialBandwidth,
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    bandwidths(eye, rule, seed, pilot, |arena, start| eye.volume_point(arena, start))
+    let found = bandwidths(eye, rule, seed, pilot, |arena, start| eye.volume_point(arena, start));
+    medians(&found, eye.camera.size().0 as usize)
+}
+
+/// The median of every pixel's neighbourhood, of `2 NEIGHBOURHOOD + 1` pixels squared within the picture.
+fn medians(values: &[f32], width: usize) -> Vec<f32> {
+    let height = values.len() / width.max(1);
+    let around = |at: usize, end: usize| at.saturating_sub(NEIGHBOURHOOD)..(at + NEIGHBOURHOOD + 1).min(end);
+    let median = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let mut near: Vec<f32> =
+            around(y, height).flat_map(|y| around(x, width).map(move |x| values[y * width + x])).collect();
+        let middle = near.len() / 2;
+        *near.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
+    (0..values.len()).into_par_iter().map(median).collect()
 }
 
 fn bandwidths<P: Located>(
@@ -99,4 +120,22 @@ fn bandwidths<P: Located>(
         *known.select_nth_unstable_by(middle, f32::total_cmp).1
     };
     found.into_iter().map(|r| r.unwrap_or(fallback)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_forget_what_is_odd_and_keep_edges() {
+        let (width, height) = (20, 12);
+        let side = |index: usize| if index % width < 10 { 1.0 } else { 2.0 };
+        let values = (0..width * height).map(|i| if i % 7 == 0 { 1e-3 } else { side(i) }).collect::<Vec<f32>>();
+        let found = medians(&values, width);
+        for (index, &value) in found.iter().enumerate().filter(|(index, _)| !(8..12).contains(&(index % width))) {
+            assert_eq!(value, side(index), "pixel {index}");
+        }
+        assert_eq!(medians(&[3.0], 1), [3.0]);
+        assert!(medians(&[], 0).is_empty());
+    }
 }

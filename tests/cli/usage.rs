@@ -179,7 +179,9 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     let folder = Folder::new();
     let help = folder.run("render --help");
     assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));
-    for option in ["--photons", "--kernel", "--cppm-plus", "--exr-naming", "--target-error", "--strict", "--reproducible"] {
+    for option in
+        ["--photons", "--kernel", "--cppm-plus", "--exr-naming", "--target-error", "--strict", "--reproducible"]
+    {
         assert!(help.stdout.contains(option), "{option}");
     }
     for absent in ["--effects", "--checkpoint"] {
