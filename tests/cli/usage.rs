@@ -8,7 +8,7 @@ fn errors_word_for_word() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --no-combine";
     let help = "'--help' explains every option";
-    let cases: [(&str, i32, &str, &str); 29] = [
+    let cases: [(&str, i32, &str, &str); 33] = [
         ("", 2, "command line: a command is missing", "'caustique --help' lists the commands"),
         ("rendr", 2, "command line: unrecognized subcommand 'rendr'", "a similar subcommand exists: 'render'"),
         (
@@ -23,7 +23,31 @@ fn errors_word_for_word() {
             "command line: unexpected argument '--itertions' found",
             "a similar argument exists: '--iterations'",
         ),
-        (&format!("{render} --kernel box"), 2, "command line: unexpected argument '--kernel' found", help),
+        (&format!("{render} --effects -volume"), 2, "command line: unexpected argument '--effects' found", help),
+        (
+            &format!("{render} --method cppm --kernel gaussian"),
+            2,
+            "command line: cppm needs the box kernel",
+            "leave --kernel out, or choose --method sppm with the memoryless rule, or appm",
+        ),
+        (
+            &format!("{render} --radius-rule local --kernel epanechnikov"),
+            2,
+            "command line: the local rule needs the box kernel",
+            "leave --kernel out, or choose --method sppm with the memoryless rule, or appm",
+        ),
+        (
+            &format!("{render} --method vcm --radius-rule local"),
+            2,
+            "command line: --radius-rule has no effect with --method vcm",
+            "leave --radius-rule out, or choose --method sppm",
+        ),
+        (
+            &format!("{render} --method ppm --shard 0/2"),
+            2,
+            "command line: --shard cannot divide --method ppm: its bandwidths depend on all iterations before",
+            "choose --method sppm with the memoryless rule, or render on one machine",
+        ),
         (
             &format!("{render} --initial-bandwidth 1e-10"),
             2,
@@ -75,7 +99,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --method teapot"),
             2,
-            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, sppm, cppm, bpm, vcm]",
+            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, ppm, sppm, appm, cppm, bpm, vcm]",
             help,
         ),
         (
@@ -112,7 +136,7 @@ fn errors_word_for_word() {
             &format!("{render} --method cppm --shard 0/2"),
             2,
             "command line: --shard cannot divide --method cppm: its bandwidths depend on all iterations before",
-            "choose --method sppm, or render on one machine",
+            "choose --method sppm with the memoryless rule, or render on one machine",
         ),
         (
             &format!("{render} --env 1,2"),

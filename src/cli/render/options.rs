@@ -336,7 +336,7 @@ impl RenderArgs {
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !matches!(method, M::Sppm | M::Appm)) {
-            let what = if local { "local statistics" } else { method.name() };
+            let what = if local { "the local rule" } else { method.name() };
             let error = Error::new(Kind::Usage, "command line", format!("{what} needs the box kernel"));
             return Err(error.hint("leave --kernel out, or choose --method sppm with the memoryless rule, or appm"));
         }
