@@ -1,6 +1,6 @@
 //! Bias and variance against iterations on a field of photons in closed form: the memoryless rule beside its exact finite sums, and CPPM whose test always rejects.
 //!
-//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS]`; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
+//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
 //! the variance and the mean squared error (mean over pixels, over the squared truth), each with its standard error, and what is expected.
 
 #[path = "../support/field.rs"]
@@ -13,6 +13,7 @@ use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::render::{Control, Method, Settings, render};
 use field::PixelField;
+use plotters::prelude::*;
 use serde_json::{Value, json};
 
 const RADIUS: f64 = 0.2;
@@ -42,6 +43,7 @@ fn main() {
         ("cppm, forced", None, forced(0.8, 1.2)),
         ("cppm, forced", None, forced(0.8, 1.0 / 0.64)),
     ];
+    let mut all = Vec::new();
     for (name, alpha, chi_squared) in rules {
         let moments: Vec<u64> = (3..64).map(|e| 1u64 << e).take_while(|m| *m <= n).collect();
         let mut found: Vec<Vec<Moment>> = moments.iter().map(|_| Vec::new()).collect();
@@ -74,8 +76,80 @@ fn main() {
             Some(alpha) => json!({"alpha": alpha}),
             None => json!({"k": chi_squared.k, "beta": chi_squared.beta}),
         };
-        println!("{}", json!({"rule": name, "parameters": parameters, "seeds": seeds, "series": series}));
+        let rule = json!({"rule": name, "parameters": parameters, "seeds": seeds, "series": series});
+        println!("{rule}");
+        all.push(rule);
     }
+    if let Some(file) = arguments.get(2) {
+        plot(file, &all).unwrap_or_else(|error| panic!("{file}: {error}"));
+    }
+}
+
+/// What is measured with its standard errors, the finite sums (lines) and the asymptotes (dashed): Knaus and Zwicker's figure.
+fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
+    let root = SVGBackend::new(file, (1000, 460)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let halves = root.split_evenly((1, 2));
+    for (area, (key, sum, title)) in halves.iter().zip([
+        ("bias", "bias_sum", "bias, of the first bandwidth's"),
+        ("variance", "variance_sum", "variance, of the squared truth"),
+    ]) {
+        let number = |value: &Value| value.as_f64().or_else(|| value[0].as_f64()).filter(|x| *x > 0.0);
+        let points = |rule: &Value, key: &str| -> Vec<(f64, f64)> {
+            let series = rule["series"].as_array().into_iter().flatten();
+            series.filter_map(|at| Some((at["iterations"].as_f64()?, number(&at[key])?))).collect()
+        };
+        let every: Vec<(f64, f64)> = rules.iter().flat_map(|rule| points(rule, key)).collect();
+        let fold = |f: fn(f64, f64) -> f64, x: fn(&(f64, f64)) -> f64| every.iter().map(x).reduce(f).unwrap_or(1.0);
+        let (left, right) = (fold(f64::min, |p| p.0) / 1.2, fold(f64::max, |p| p.0) * 1.2);
+        let (low, high) = (fold(f64::min, |p| p.1) / 1.5, fold(f64::max, |p| p.1) * 1.5);
+        let mut chart = ChartBuilder::on(area)
+            .margin(14)
+            .caption(title, ("sans-serif", 16))
+            .x_label_area_size(34)
+            .y_label_area_size(64)
+            .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
+        chart.configure_mesh().x_desc("iterations").light_line_style(TRANSPARENT).draw()?;
+        for (rule, colour) in rules.iter().zip([(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167)]) {
+            let colour = RGBColor(colour.0, colour.1, colour.2);
+            let parameters = &rule["parameters"];
+            let (name, slope) = match parameters["alpha"].as_f64() {
+                Some(alpha) => {
+                    (format!("memoryless, alpha {alpha:.2}"), if key == "bias" { alpha - 1.0 } else { -alpha })
+                }
+                None => {
+                    let (k, beta) =
+                        (parameters["k"].as_f64().unwrap_or(0.8), parameters["beta"].as_f64().unwrap_or(1.2));
+                    // Equations 15 to 17.
+                    let rate = (1.0 / k).ln() / (beta / k).ln();
+                    (format!("CPPM, k {k}, beta {beta:.2}"), if key == "bias" { -rate } else { rate - 1.0 })
+                }
+            };
+            let measured = points(rule, key);
+            let found: Vec<[f64; 3]> = rule["series"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(|at| {
+                    let (x, y, e) = (at["iterations"].as_f64()?, at[key][0].as_f64()?, at[key][1].as_f64()?);
+                    (y > 0.0).then_some([x, y, e])
+                })
+                .collect();
+            let bars = found.iter().map(|[x, y, e]| PathElement::new([(*x, (y - e).max(low)), (*x, y + e)], colour));
+            chart.draw_series(bars)?;
+            let spots = found.iter().map(|[x, y, _]| Circle::new((*x, *y), 4, colour.filled()));
+            chart.draw_series(spots)?.label(name).legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+            chart.draw_series(LineSeries::new(points(rule, sum), colour))?;
+            if let Some(&(x0, y0)) = measured.last() {
+                let from = (x0 / 100.0).max(left);
+                let line = [(from, y0 * (from / x0).powf(slope)), (x0, y0)];
+                chart.draw_series(DashedLineSeries::new(line, 4, 4, colour.stroke_width(1)))?;
+            }
+        }
+        chart.configure_series_labels().position(SeriesLabelPosition::LowerLeft).border_style(BLACK.mix(0.2)).draw()?;
+    }
+    root.present()?;
+    Ok(())
 }
 
 /// Mean and its standard error.
