@@ -29,6 +29,8 @@ const SIZE: u32 = 16;
 const TOLERANCE: f64 = 1e-4;
 
 /// How a vertex scatters.
+// As in the library: no box for each vertex.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy)]
 enum Scatters<'s> {
     Surface(Shading<'s>),

@@ -48,7 +48,7 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path, in three dimensions.
 ///
 /// Where on the way that point lies is chance, and what is true near the eye is not true of the whole way: each pixel takes the median of
-/// those around it.
+/// those around it, and what bounds it is the picture's width at the surface behind.
 pub fn initial_volume_bandwidths(
     eye: &Eye<'_>,
     rule: InitialBandwidth,

@@ -6,6 +6,8 @@
 //! its own Welford statistics tell; what is left estimates the squared bias. It may come out negative where there
 //! is little bias: sums over pixels keep the sign and stay unbiased, a single pixel cuts it off at zero.
 //!
+//! In media squared bandwidths are a factor 2^(2/3) apart; the difference is scaled to tell the bias there, too ([`Pixel::add`]).
+//!
 //! This holds where light varies smoothly over the kernel. At edges narrower than the bandwidth the bias falls
 //! more slowly than that, and the estimate is too small.
 

@@ -5,6 +5,10 @@ use crate::math::{DVec3, Rgb, Vec3};
 use crate::stat::Welford;
 use crate::transport::{EyeMeasure, MAX_LEVELS};
 
+/// What is added to the differences of levels for light gathered in media, relative: bias grows with the radius squared, which from one level to the next
+/// grows by 2^(2/3) there and by 2 on surfaces. With this, a difference is the bias of the smaller level for both: `1 / (2^(2/3) - 1) - 1`.
+const VOLUME_DIFFERENCE: f32 = 0.702_414_4;
+
 /// Sums over iterations of the additive parts of the level that is the method's own image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts {
@@ -26,7 +30,7 @@ pub struct Pixel {
     /// Estimates, level 1 (the smallest bandwidth) first.
     pub levels: [Welford; MAX_LEVELS],
     /// `differences[k]`: level k + 2 minus level k + 1. Neighbours are correlated, so their difference's variance cannot be had
-    /// from theirs.
+    /// from theirs. Where photons are gathered in media, scaled there to tell the bias ([`super::SquaredError`]).
     pub differences: [Welford; MAX_LEVELS - 1],
     /// Sums of the parts.
     pub parts: Parts,
@@ -86,10 +90,18 @@ impl Pixel {
         }
         self.iterations += 1;
         let inverse_count = 1.0 / f64::from(self.iterations);
+        let in_media = |level: usize| match correlated {
+            Some(correlated) if level > 0 => correlated.volume_photons[level - 1],
+            _ => independent.volume_photons[level],
+        };
         for level in 0..count {
             self.levels[level].add(values[level], inverse_count);
             if level + 1 < count {
-                self.differences[level].add(values[level + 1] - values[level], inverse_count);
+                let mut difference = values[level + 1] - values[level];
+                if self.volume_bandwidth > 0.0 {
+                    difference += VOLUME_DIFFERENCE * (in_media(level + 1) - in_media(level));
+                }
+                self.differences[level].add(difference, inverse_count);
             }
         }
         let (measure, level) = match correlated {
@@ -110,6 +122,36 @@ impl Pixel {
                 self.depth += f64::from(features.depth);
                 self.features += 1;
                 self.depths += u32::from(features.depth > 0.0);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bias of r^2 on surfaces and of r^2 in media, whose levels' radii are apart by other factors: differences tell their sum.
+    #[test]
+    fn differences_of_levels_are_the_bias_on_surfaces_and_in_media() {
+        let biases = |level: i32| (0.01 * 2f32.powi(level), 0.02 * (2.0 / 3.0 * level as f32).exp2());
+        let measure = |first: i32| {
+            let mut measure = EyeMeasure { direct: Rgb::ONE, volume: Rgb::ONE, ..EyeMeasure::default() };
+            for level in 0..MAX_LEVELS {
+                let (surface, volume) = biases(first + level as i32);
+                measure.indirect_photons[level] = Rgb::splat(surface);
+                measure.volume_photons[level] = Rgb::splat(volume);
+            }
+            measure
+        };
+        for (two_paths, media) in [(true, true), (false, true), (true, false)] {
+            let mut pixel = Pixel { volume_bandwidth: if media { 0.1 } else { 0.0 }, ..Pixel::new(0.1) };
+            let others = measure(1);
+            pixel.add(&measure(0), two_paths.then_some(&others), 5, 3);
+            for (level, difference) in (0..).zip(&pixel.differences) {
+                let (surface, volume) = biases(level);
+                let expected = f64::from(surface + volume);
+                assert_eq!((difference.mean.x / expected - 1.0).abs() < 1e-4, media, "level {level}");
             }
         }
     }

@@ -9,7 +9,7 @@
 //! takes the even mixture of the channels in its place ([`Flight`]): the weights still sum to one, which is all that they must.
 
 use super::MediumParameters;
-use crate::math::{Rgb, Vec2};
+use crate::math::{Rgb, Vec2, is_lit};
 
 /// A point on a ray at which a medium scatters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,10 +58,11 @@ impl MediumParameters {
         let lost = -(-sigma * distance).map(exp_m1);
         let lost = Rgb::select(sigma.cmpgt(Rgb::ZERO), lost, Rgb::ZERO);
         let albedo = Rgb::select(sigma.cmpgt(Rgb::ZERO), self.sigma_s / sigma, Rgb::ZERO);
-        let share = shares(throughput * albedo * lost);
-        if !(share.max_element() > 0.0) {
+        let scattered = throughput * albedo * lost;
+        if !is_lit(scattered) {
             return None;
         }
+        let share = shares(scattered);
         let drawn = pick(sigma, share, u.x);
         let within = pick(lost, share, u.x);
         let t = -(-(u.y + HALF_STEP) * within).ln_1p() / drawn;
@@ -152,6 +153,7 @@ mod tests {
         let mut worst = 0.0f64;
         for (at, medium) in media().into_iter().enumerate() {
             for (distance, throughput) in [(0.7f32, Rgb::ONE), (2.0, Rgb::new(1.0, 5.0, 0.2))] {
+                // By channel, and by kind of value: the sum, and that of squares.
                 let mut sums = [[[0.0f64; 2]; 3]; 3];
                 for i in 0..DRAWS {
                     let draws = Stream::new(31, at as u64, Domain::Test, i).vertex(0);
@@ -166,27 +168,27 @@ mod tests {
                     if let Some(hit) = medium.collide(throughput, distance, draws.two(Purpose::Phase)) {
                         values[2] = bug(hit, medium.sigma_t()) * hit.distance;
                     }
-                    for (sums, value) in sums.iter_mut().zip(values) {
-                        for (sum, x) in sums.iter_mut().zip(value.to_array()) {
-                            sum[0] += f64::from(x);
-                            sum[1] += f64::from(x) * f64::from(x);
+                    for (c, sums) in sums.iter_mut().enumerate() {
+                        for (sum, value) in sums.iter_mut().zip(values) {
+                            let x = f64::from(value[c]);
+                            *sum = [sum[0] + x, sum[1] + x * x];
                         }
                     }
                 }
-                for c in 0..3 {
+                for (c, sums) in sums.iter().enumerate() {
                     let (sigma, d) = (f64::from(medium.sigma_t()[c]), f64::from(distance));
                     let left = (-sigma * d).exp();
                     let integral =
                         if sigma > 0.0 { (1.0 - left * (1.0 + sigma * d)) / (sigma * sigma) } else { 0.5 * d * d };
                     let scatters = medium.sigma_s[c] > 0.0;
-                    for (kind, expected) in [left, integral, integral].into_iter().enumerate() {
+                    for (kind, (expected, sum)) in [left, integral, integral].into_iter().zip(sums).enumerate() {
                         // A channel that is not scattered need not be drawn: its weight is multiplied by zero.
                         if kind > 0 && !scatters {
                             continue;
                         }
                         let n = DRAWS as f64;
-                        let mean = sums[kind][c][0] / n;
-                        let error = ((sums[kind][c][1] / n - mean * mean) / n).sqrt();
+                        let mean = sum[0] / n;
+                        let error = ((sum[1] / n - mean * mean) / n).sqrt();
                         worst = worst.max((mean - expected).abs() / (error + 1e-5 * expected));
                     }
                 }

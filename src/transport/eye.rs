@@ -413,7 +413,7 @@ impl Eye<'_> {
         find.found
     }
 
-    /// The first vertex of an eye path in a medium that scatters.
+    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind, if there is one.
     pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindVolumePoint { found: None, length: 0.0 };
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
@@ -461,8 +461,12 @@ impl<'a> Visitor<'a> for FindVolumePoint {
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         self.length += vertex.distance;
+        if let Some(found) = &mut self.found {
+            found.length = self.length;
+            return Next::Stop;
+        }
         let lobes = vertex.shading.bsdf.lobes();
-        if self.found.is_some() || lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
+        if lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
     }
 
     fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {
