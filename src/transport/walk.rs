@@ -88,7 +88,7 @@ pub enum Next {
 
 /// Receives the vertices of a walk.
 pub trait Visitor<'a> {
-    /// The walk takes media by splitting ([`super::flight`]) and does not scatter at their vertices.
+    /// The walk takes media by splitting (`flight.rs`) and does not scatter at their vertices.
     const SPLITS: bool = false;
     /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
