@@ -105,15 +105,11 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         Counting { sppm, settings, rule, kernel, channels, bandwidths: Vec::new(), tallies: Vec::new() }
     }
 
-    /// Random numbers of the eye paths of a domain in iteration `i`.
-    fn streams(&self, i: u64, domain: Domain) -> Streams {
-        let seed = self.settings.seed;
-        if self.settings.method == Method::Ppm {
-            // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\].
-            Streams::new(seed, 1, domain).redrawn(i)
-        } else {
-            Streams::new(seed, i, domain)
-        }
+    /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all else.
+    fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
+        // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: what one point of the film sees, all of it if it is by glass.
+        let film = if self.settings.method == Method::Ppm { 1 } else { i };
+        [film, i].map(|pass| Streams::new(self.settings.seed, pass, domain))
     }
 
     /// `maps` holds the photons, or those of each channel.
@@ -135,8 +131,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 pixels[place.at].touch() + f64::from(R::radius2(first))
             });
             std::hint::black_box(waiting.sum::<f64>());
-            let independent = eye.starts(places, independent);
-            let correlated = levels.two_paths.then(|| eye.starts(places, correlated));
+            let independent = eye.starts_through(places, independent[0], independent[1]);
+            let correlated = levels.two_paths.then(|| eye.starts_through(places, correlated[0], correlated[1]));
             for (k, place) in places.iter().enumerate() {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
                 let pixel = &mut pixels[place.at];

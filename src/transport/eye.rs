@@ -344,13 +344,25 @@ impl Eye<'_> {
     }
 
     /// The starts of the eye paths of neighbouring pixels, first rays traced together.
+    #[inline]
     pub fn starts(&self, places: &[Option<Place>; GROUP], streams: Streams) -> [Option<(PathStart, Stream)>; GROUP] {
+        self.starts_through(places, streams, streams)
+    }
+
+    /// The same, through points of pixels and lens that are drawn from `film`.
+    pub fn starts_through(
+        &self,
+        places: &[Option<Place>; GROUP],
+        film: Streams,
+        streams: Streams,
+    ) -> [Option<(PathStart, Stream)>; GROUP] {
         let mut starts = [const { None }; GROUP];
         for (start, place) in starts.iter_mut().zip(places) {
             if let Some(place) = place {
                 let stream = streams.path(place.index);
                 let first = Known::Nothing;
-                *start = Some((PathStart { first, ..self.start(place.pixel, stream) }, stream));
+                let film = film.path(place.index);
+                *start = Some((PathStart { first, ..self.start(place.pixel, film) }, stream));
             }
         }
         let mut hits = [const { None }; GROUP];

@@ -145,10 +145,24 @@ pub fn walk<'a, V: Visitor<'a>>(
 ) {
     // Scenes without scattering media walk as if there were none in the world.
     if scene.survey.scattering {
-        walk_in::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
+        walk_in_media(scene, arena, start, stream, transport, max_depth, visitor);
     } else {
         walk_in::<V, false>(scene, arena, start, stream, transport, max_depth, visitor);
     }
+}
+
+/// Out of the way of the other, which is inlined.
+#[inline(never)]
+fn walk_in_media<'a, V: Visitor<'a>>(
+    scene: &'a Scene,
+    arena: &'a Bump,
+    start: &PathStart,
+    stream: Stream,
+    transport: Transport,
+    max_depth: u32,
+    visitor: &mut V,
+) {
+    walk_in::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
 }
 
 #[inline(always)]
