@@ -19,7 +19,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::Flight;
-use crate::photon::{Kernel, NO_NORMAL, Near, Photon, PhotonMap, VolumePhoton};
+use crate::photon::{Kernel, Near, Photon, PhotonMap, VolumePhoton};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::trace::Ray;
@@ -424,13 +424,6 @@ impl Eye<'_> {
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
-
-    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind, if there is one.
-    pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
-        let mut find = FindVolumePoint { found: None, length: 0.0 };
-        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
-        find.found
-    }
 }
 
 /// Where an eye path would gather photons first.
@@ -438,7 +431,7 @@ impl Eye<'_> {
 pub struct GatherPoint {
     /// World position.
     pub p: Vec3,
-    /// Unit geometric normal; [`NO_NORMAL`] in a medium.
+    /// Unit geometric normal; [`crate::photon::NO_NORMAL`] in a medium.
     pub ng: Vec3,
     /// Length of the eye path.
     pub length: f32,
@@ -460,30 +453,5 @@ impl<'a> Visitor<'a> for FindGatherPoint {
             return Next::Stop;
         }
         Next::Continue(lobes)
-    }
-}
-
-struct FindVolumePoint {
-    found: Option<GatherPoint>,
-    length: f32,
-}
-
-impl<'a> Visitor<'a> for FindVolumePoint {
-    const SPLITS: bool = true;
-
-    fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
-        self.length += vertex.distance;
-        if let Some(found) = &mut self.found {
-            found.length = self.length;
-            return Next::Stop;
-        }
-        let lobes = vertex.shading.bsdf.lobes();
-        if lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
-    }
-
-    fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {
-        let length = self.length + vertex.met.distance;
-        self.found.get_or_insert(GatherPoint { p: vertex.met.p, ng: NO_NORMAL, length });
-        Next::Stop
     }
 }
