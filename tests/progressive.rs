@@ -166,3 +166,39 @@ fn errors_are_the_sums_over_bandwidths() {
         assert!((2.0 * ratio.0 - 1.0).abs() > critical * 2.0 * ratio.1, "twice the variance goes unnoticed");
     }
 }
+
+/// The curves of the first talk: in a uniform field the squared radius at fixed points falls as the product of `(N + alpha M) / (N + M)`, the count grows as
+/// what falls into it, and the error falls. 5 % covers the spread of counts about their means over 64 points.
+#[test]
+fn measurement_points_follow_the_talks_curves() {
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    let scene = build(description);
+    let (radius, alpha) = (0.15f32, 2.0 / 3.0);
+    let at = |n: u64| {
+        let settings = Settings {
+            method: Method::Ppm,
+            levels: Levels::new(1),
+            initial: InitialBandwidth::Fixed(radius),
+            photons: 4000,
+            iterations: Some(n),
+            ..Settings::default()
+        };
+        let rendered = picture(&scene, 8, &settings);
+        let radius2 = rendered.radii.iter().map(|r| f64::from(r * r)).sum::<f64>() / 64.0;
+        let error = rendered.pixels.iter().map(|p| (p.levels[0].mean.x - 1.0).powi(2)).sum::<f64>() / 64.0;
+        (radius2 / f64::from(radius * radius), error.sqrt())
+    };
+    let (mut last_radius2, mut last_error) = (1.0, f64::INFINITY);
+    for n in [1, 8, 64, 512] {
+        let (radius2, error) = at(n);
+        // The first iteration keeps a share alpha of its photons, and its area; from then on it is the memoryless product.
+        let expected = alpha * radius2_factor(n, alpha);
+        println!("{n} iterations: squared radius {radius2:.4}, expected {expected:.4}, error {error:.4}");
+        assert!((radius2 / expected - 1.0).abs() < 0.05, "{n} iterations: {radius2}, {expected}");
+        assert!((radius2 / radius2_factor(n, alpha) - 1.0).abs() > 0.05, "the memoryless rule goes unnoticed");
+        assert!(radius2 < last_radius2 && error < last_error);
+        (last_radius2, last_error) = (radius2, error);
+    }
+}
