@@ -12,7 +12,7 @@ use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{Eye, Interior, path_radiance};
+use caustique::transport::{Eye, Indirect, Interior, path_radiance};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::t_critical;
 use support::tiles::{SIZE, TILES, average, tiles};
@@ -21,13 +21,25 @@ fn mean(c: Rgb) -> f64 {
     f64::from(c.element_sum()) / 3.0
 }
 
-fn by_photons(scene: &Scene, photons: u32, radius: f32, iterations: u64, seeds: u64) -> Vec<Vec<f64>> {
+/// Photons of all indirect light, and photons of caustics alone, guided, beside eye paths that go on.
+const WAYS: [(Indirect, bool); 2] = [(Indirect::Photons, false), (Indirect::Paths, true)];
+
+fn by_photons(
+    scene: &Scene,
+    (indirect, guided): (Indirect, bool),
+    photons: u32,
+    radius: f32,
+    iterations: u64,
+    seeds: u64,
+) -> Vec<Vec<f64>> {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     (0..seeds)
         .map(|seed| {
             let settings = Settings {
                 seed,
                 photons,
+                indirect,
+                guided,
                 initial: InitialBandwidth::Fixed(radius),
                 levels: Levels::new(1),
                 iterations: Some(iterations),
@@ -43,7 +55,7 @@ fn by_photons(scene: &Scene, photons: u32, radius: f32, iterations: u64, seeds: 
 fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let interior = Interior::at(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX };
+    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons };
     (0..seeds)
         .map(|seed| {
             tiles(|index| {
@@ -91,7 +103,10 @@ fn glossy_room() {
     add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
     add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
     let scene = build(description);
-    check("glossy room", &by_photons(&scene, 20_000, 0.05, 8, 10), &by_paths(&scene, 64, 10), 0.015, 0.15);
+    let paths = by_paths(&scene, 64, 10);
+    for way in WAYS {
+        check(&format!("glossy room, {way:?}"), &by_photons(&scene, way, 20_000, 0.05, 8, 10), &paths, 0.015, 0.15);
+    }
 }
 
 /// Smooth and rough glass under a large lamp, which path tracing can run into.
@@ -102,7 +117,10 @@ fn glass_room() {
     let rough = Material { roughness: 0.4, ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
     let scene = build(description);
-    check("glass room", &by_photons(&scene, 40_000, 0.04, 8, 10), &by_paths(&scene, 128, 10), 0.02, 0.2);
+    let paths = by_paths(&scene, 128, 10);
+    for way in WAYS {
+        check(&format!("glass room, {way:?}"), &by_photons(&scene, way, 40_000, 0.04, 8, 10), &paths, 0.02, 0.2);
+    }
 }
 
 /// Everything lit from outside by a bright patch of sky, with a glass pane in the open.
@@ -129,5 +147,8 @@ fn under_the_sky() {
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
     let scene = build(description);
-    check("sky", &by_photons(&scene, 60_000, 0.04, 8, 16), &by_paths(&scene, 128, 16), 0.02, 0.2);
+    let paths = by_paths(&scene, 128, 16);
+    for way in WAYS {
+        check(&format!("sky, {way:?}"), &by_photons(&scene, way, 60_000, 0.04, 8, 16), &paths, 0.02, 0.2);
+    }
 }

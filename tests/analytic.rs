@@ -15,7 +15,7 @@ use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{Eye, Interior, path_radiance};
+use caustique::transport::{Eye, Indirect, Interior, path_radiance};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -73,7 +73,7 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
     let interior = Interior::at(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX };
+    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons };
     (0..seeds)
         .map(|seed| {
             let mut sum = 0.0;

@@ -20,8 +20,8 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
-    Bidirectional, Eye, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next, PathStart, Record,
-    Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, walk,
+    Bidirectional, Eye, Indirect, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next, PathStart,
+    Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -419,7 +419,7 @@ struct Tally {
 fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let surroundings = Surroundings::new(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior: surroundings.eye, max_depth: 12 };
+    let eye = Eye { scene, camera: &camera, interior: surroundings.eye, max_depth: 12, indirect: Indirect::Photons };
     let pixels = (SIZE * SIZE) as f32;
     let strategies = Strategies::vcm(true);
     let shared =

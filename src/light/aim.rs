@@ -12,8 +12,10 @@ use std::f32::consts::PI;
 
 /// Share of the paths that are aimed.
 const AIMED: f32 = 0.5;
-/// More targets than this are joined, neighbours first.
+/// More targets than this are joined, those first whose joint sphere is smallest.
 const MAX_TARGETS: usize = 32;
+/// More objects than this are joined by where they are, before that is looked at.
+const MAX_SPHERES: usize = 512;
 
 /// Bounding spheres of what can make caustics.
 pub struct Targets {
@@ -53,10 +55,65 @@ fn join(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     (a.0 + (b.0 - a.0) * ((radius - a.1) / distance), radius)
 }
 
+/// At most `most` spheres: groups are halved along their widest axis until there are so many.
+fn halved(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
+    if spheres.len() <= most {
+        return spheres;
+    }
+    let mut groups = vec![spheres];
+    while groups.len() < most {
+        let Some(largest) = (0..groups.len()).max_by_key(|&g| groups[g].len()) else { break };
+        let mut group = groups.swap_remove(largest);
+        if group.len() < 2 {
+            groups.push(group);
+            break;
+        }
+        let (low, high) =
+            group.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), s| (low.min(s.0), high.max(s.0)));
+        let extent = high - low;
+        let axis = extent.to_array().iter().position(|&e| e == extent.max_element()).unwrap_or(0);
+        group.sort_by(|a, b| a.0[axis].total_cmp(&b.0[axis]));
+        let rest = group.split_off(group.len() / 2);
+        groups.extend([group, rest]);
+    }
+    groups.into_iter().filter_map(|group| group.into_iter().reduce(join)).collect()
+}
+
+/// At most `most` spheres: the two whose joint sphere is smallest are joined until there are so many, so that what is small and alone stays so.
+fn gathered(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
+    // The best partner of each among those after it; only what has lost its own is looked at again.
+    let partner = |spheres: &[(Vec3, f32)], i: usize| {
+        let joint = |j: usize| (join(spheres[i], spheres[j]).1, j);
+        (i + 1..spheres.len()).map(joint).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f32::INFINITY, i))
+    };
+    let mut best: Vec<(f32, usize)> = (0..spheres.len()).map(|i| partner(&spheres, i)).collect();
+    while spheres.len() > most {
+        let Some(i) = (0..best.len()).min_by(|&a, &b| best[a].0.total_cmp(&best[b].0)) else { break };
+        let j = best[i].1;
+        spheres[i] = join(spheres[i], spheres[j]);
+        spheres.remove(j);
+        best.remove(j);
+        for k in 0..spheres.len() {
+            if k == i || best[k].1 == i || best[k].1 == j {
+                best[k] = partner(&spheres, k);
+                continue;
+            }
+            if best[k].1 > j {
+                best[k].1 -= 1;
+            }
+            let joint = if k < i { join(spheres[k], spheres[i]).1 } else { f32::INFINITY };
+            if joint < best[k].0 {
+                best[k] = (joint, i);
+            }
+        }
+    }
+    spheres
+}
+
 impl Targets {
     /// The targets of a scene.
     pub fn new(shapes: &Shapes, materials: &Materials) -> Targets {
-        let mut spheres: Vec<(Vec3, f32)> = shapes
+        let spheres: Vec<(Vec3, f32)> = shapes
             .instances
             .iter()
             .filter(|instance| focuses(&materials.list[instance.material as usize]))
@@ -65,27 +122,7 @@ impl Targets {
                 bounding_sphere(mesh.positions.iter().map(|&p| instance.point(p)))
             })
             .collect();
-        // Halves along the widest axis until few enough groups are left.
-        if spheres.len() > MAX_TARGETS {
-            let mut groups = vec![spheres];
-            while groups.len() < MAX_TARGETS {
-                let Some(largest) = (0..groups.len()).max_by_key(|&g| groups[g].len()) else { break };
-                let mut group = groups.swap_remove(largest);
-                if group.len() < 2 {
-                    groups.push(group);
-                    break;
-                }
-                let (low, high) = group
-                    .iter()
-                    .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), s| (low.min(s.0), high.max(s.0)));
-                let extent = high - low;
-                let axis = extent.to_array().iter().position(|&e| e == extent.max_element()).unwrap_or(0);
-                group.sort_by(|a, b| a.0[axis].total_cmp(&b.0[axis]));
-                let rest = group.split_off(group.len() / 2);
-                groups.extend([group, rest]);
-            }
-            spheres = groups.into_iter().filter_map(|group| group.into_iter().reduce(join)).collect();
-        }
+        let spheres = gathered(halved(spheres, MAX_SPHERES), MAX_TARGETS);
         let areas = spheres.iter().map(|s| PI * s.1 * s.1);
         let area = areas.clone().sum();
         Targets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
@@ -96,18 +133,37 @@ impl Targets {
     pub fn aim(&self, sky: &Sky, emission: &mut EmissionSample, u: f32, point: Vec2) {
         let Some(choice) = &self.choice else { return };
         let d = emission.direction;
-        let frame = Frame::from_normal(d);
         if u < AIMED {
             let (target, ..) = choice.sample(u / AIMED);
-            let (center, radius) = self.spheres[target];
-            let q = warp::disc_concentric(point) * radius;
-            let p = center + frame.t * q.x + frame.b * q.y;
-            // Upstream of everything, as all starts are.
-            emission.origin = p - d * ((p - sky.center).dot(d) + sky.radius);
+            emission.origin = self.point(sky, d, target, point);
         }
-        emission.density.onward = self.density(sky, emission.origin, d);
-        // The flux given was for the uniform density alone.
+        self.weigh(sky, emission);
+    }
+
+    /// The same, drawn through the disc of one target.
+    pub fn through(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
+        emission.origin = self.point(sky, emission.direction, target, point);
+        self.weigh(sky, emission);
+    }
+
+    /// A point of the line along `d` through a point of a target's disc, upstream of everything, as all starts are.
+    fn point(&self, sky: &Sky, d: Vec3, target: usize, point: Vec2) -> Vec3 {
+        let frame = Frame::from_normal(d);
+        let (center, radius) = self.spheres[target];
+        let q = warp::disc_concentric(point) * radius;
+        let p = center + frame.t * q.x + frame.b * q.y;
+        p - d * ((p - sky.center).dot(d) + sky.radius)
+    }
+
+    /// Gives a start the flux and density of the mixture; it has those of the uniform density alone.
+    fn weigh(&self, sky: &Sky, emission: &mut EmissionSample) {
+        emission.density.onward = self.density(sky, emission.origin, emission.direction);
         emission.flux *= 1.0 / (PI * sky.radius * sky.radius * emission.density.onward);
+    }
+
+    /// The bounding spheres: centres and radii.
+    pub fn spheres(&self) -> &[(Vec3, f32)] {
+        &self.spheres
     }
 
     /// Density per area, in the mixture, of the line through `p` along the unit `d`.

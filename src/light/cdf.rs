@@ -42,8 +42,9 @@ impl Cdf {
         self.total
     }
 
+    /// Probability of an index before `index`.
     #[inline]
-    fn below(&self, index: usize) -> f32 {
+    pub fn below(&self, index: usize) -> f32 {
         if index == 0 { 0.0 } else { self.cumulative[index - 1] }
     }
 

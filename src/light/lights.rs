@@ -7,6 +7,7 @@ use crate::geometry::{Shapes, Surface, spawn};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::ops::Range;
 
 /// Share of the choices that all lights get alike; the rest goes by power.
 const EQUAL_SHARE: f64 = 0.05;
@@ -166,6 +167,52 @@ impl Lights {
     /// The bounding sphere and the environment.
     pub fn sky(&self) -> &Sky {
         &self.sky
+    }
+
+    /// What can make caustics.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
+    /// The choice of lights by power; `None` if there is none.
+    pub(super) fn choice(&self) -> Option<&Cdf> {
+        self.choice.as_ref()
+    }
+
+    /// The emitters of every lamp, the triangles of an instance or a light alone, and the probability of choosing one of them.
+    pub(super) fn lamps(&self) -> impl Iterator<Item = (Range<usize>, f32)> {
+        let same = |a: &Emitter, b: &Emitter| match (a, b) {
+            (Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }) => a == b,
+            _ => false,
+        };
+        let below = |end: usize| {
+            self.choice.as_ref().map_or(0.0, |choice| if end == self.emitters.len() { 1.0 } else { choice.below(end) })
+        };
+        self.emitters.chunk_by(same).scan(0, move |first, emitters| {
+            let range = *first..*first + emitters.len();
+            *first = range.end;
+            let probability = below(range.end) - below(range.start);
+            Some((range, probability))
+        })
+    }
+
+    /// Density per solid angle of emission along `d` from any point of a light that is not at infinity, and the cosine there; `None` where nothing
+    /// leaves it.
+    #[inline]
+    pub(super) fn onward(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
+        match &self.emitters[index] {
+            Emitter::Triangle { two_sided, plane, .. } => {
+                let cos = plane.truncate().dot(d);
+                let cos = if *two_sided { cos.abs() } else { cos };
+                (cos >= LEAST_COSINE).then(|| (Self::lambertian(cos, *two_sided), cos))
+            }
+            Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
+            Emitter::Spot { frame, cos_inner, cos_outer, .. } => {
+                let falloff = spot_falloff(frame.n.dot(d), *cos_inner, *cos_outer);
+                (falloff > 0.0).then(|| (falloff * Self::spot_pdf_w(*cos_inner, *cos_outer), 1.0))
+            }
+            Emitter::Sun { .. } | Emitter::Environment => None,
+        }
     }
 
     /// A light chosen by power, seen from `p`. `None` where the one chosen does not shine on `p`.

@@ -4,10 +4,12 @@ mod aim;
 mod cdf;
 mod emitter;
 mod environment;
+pub mod guide;
 mod lights;
 
 pub use aim::Targets;
 pub use cdf::Cdf;
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
+pub use guide::Guide;
 pub use lights::{DirectSample, EmissionDensity, EmissionSample, Lights};

@@ -25,6 +25,10 @@ pub enum Domain {
     PilotLight = 5,
     /// Light paths that serve the eye paths of [`Domain::EyeCorrelated`].
     LightCorrelated = 6,
+    /// Light paths by which emission is guided.
+    GuideLight = 7,
+    /// Eye paths by which emission is guided.
+    GuideEye = 8,
     /// Anything in tests.
     Test = 99,
 }
@@ -73,6 +77,8 @@ pub enum Purpose {
     SecondAlpha = 19,
     /// Whether a photon of constant flux outlives what it lost on its way here.
     Loss = 20,
+    /// Which of several sets of lobes a path goes on with.
+    LobeChoice = 21,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

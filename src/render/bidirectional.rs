@@ -10,6 +10,7 @@
 
 use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
+use super::guiding::learnt;
 use super::result::Phases;
 use super::settings::Settings;
 use super::techniques::{TechniquePicture, TilePictures, Watch, collect};
@@ -18,16 +19,18 @@ use crate::camera::Camera;
 use crate::estimator::bandwidth::initial_bandwidths;
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
+use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
+    Bidirectional, Eye, EyeMeasure, Indirect, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
     Surroundings, path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// A light path and an eye path for every pixel, and the levels they make.
 struct Pair {
@@ -51,6 +54,7 @@ pub struct Passes<'a> {
     settings: &'a Settings,
     surroundings: &'a Surroundings,
     shared: Option<Bidirectional<'a>>,
+    guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
     /// Measures of the iteration, one list per pair.
@@ -78,7 +82,13 @@ impl<'a> Passes<'a> {
         }
         let (width, height) = camera.size();
         let pixels = (width * height) as f32;
-        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
+        let eye = Eye {
+            scene,
+            camera,
+            interior: surroundings.eye,
+            max_depth: settings.max_depth,
+            indirect: Indirect::Photons,
+        };
         let shared = settings.method.strategies(camera).map(|strategies| Bidirectional {
             eye,
             surroundings,
@@ -86,20 +96,40 @@ impl<'a> Passes<'a> {
             light_paths: pixels,
             merged_paths: pixels * pairs.len() as f32,
         });
+        let guided = settings.guided && shared.is_some();
+        let guide = guided.then(|| learnt(&eye, surroundings, settings.seed)).flatten().map(Arc::new);
         let tiles = Tiles::new(camera);
         let measures = pairs.iter().map(|_| vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS]).collect();
         let techniques = settings.techniques.then(|| (0..tiles.count()).map(|_| TilePictures::new()).collect());
-        Passes { scene, camera, settings, surroundings, shared, pairs, tiles, measures, photons: None, techniques }
+        Passes {
+            scene,
+            camera,
+            settings,
+            surroundings,
+            shared,
+            guide,
+            pairs,
+            tiles,
+            measures,
+            photons: None,
+            techniques,
+        }
     }
 
     fn eye(&self) -> Eye<'a> {
         let Passes { scene, camera, .. } = *self;
-        Eye { scene, camera, interior: self.surroundings.eye, max_depth: self.settings.max_depth }
+        Eye {
+            scene,
+            camera,
+            interior: self.surroundings.eye,
+            max_depth: self.settings.max_depth,
+            indirect: Indirect::Photons,
+        }
     }
 
-    fn light_pass(&self, i: u64, pair: &Pair) -> LightPass {
+    fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
         let (width, height) = self.camera.size();
-        LightPass::new(self.settings.seed, i, pair.light, width * height, self.settings.max_depth)
+        LightPass::new(self.settings.seed, i, pair.light, width * height, self.settings.max_depth).guided(guide)
     }
 
     /// The photons that pass `i` leaves, where it was not rendered here.
@@ -108,7 +138,7 @@ impl<'a> Passes<'a> {
         let mut parts = Vec::new();
         // In the order of `iterate`, so that even photons in one place are summed alike.
         for pair in &self.pairs {
-            let pass = self.light_pass(i, pair);
+            let pass = self.light_pass(i, pair, self.guide.as_deref());
             let walk = |tile| {
                 let (mut left, mut arena) = (Left::default(), Bump::new());
                 for place in tiles.pixels(tile) {
@@ -155,7 +185,8 @@ impl<'a> Passes<'a> {
         let merges = map.map_or(0, |map| map.photons().len());
         let bandwidths: &[Pixel] = pixels;
         let mut photons: Vec<Vec<MergePhoton>> = Vec::new();
-        let passes: Vec<LightPass> = self.pairs.iter().map(|pair| self.light_pass(i, pair)).collect();
+        let guide = self.guide.clone();
+        let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
             let streams = Streams::new(seed, i, pair.eye);

@@ -1,6 +1,6 @@
 //! The methods, and what of a render's shape follows from the one chosen.
 
-use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS};
+use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, RadiusRule};
 use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
 use crate::transport::Strategies;
@@ -86,6 +86,15 @@ impl Method {
     /// or none.
     pub fn counts_photons(self) -> bool {
         self.gathers() || self == Method::Pm
+    }
+
+    /// Whether its light paths can be guided: photons then differ in weight, which rules that count them would take for light.
+    pub fn guides(self, rule: RadiusRule) -> bool {
+        match self {
+            Method::Sppm => rule == RadiusRule::Memoryless,
+            Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm => true,
+            Method::Path | Method::Pm | Method::Ppm | Method::Appm | Method::Cppm => false,
+        }
     }
 
     /// Light paths where no number is asked for, of methods that count them.

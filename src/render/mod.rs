@@ -5,6 +5,7 @@ mod choice;
 mod control;
 mod counting;
 mod drive;
+mod guiding;
 mod method;
 pub mod output;
 mod pm;

@@ -22,7 +22,7 @@ use crate::math::Vec3;
 use crate::photon::{MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{Bandwidths, Eye, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
+use crate::transport::{Bandwidths, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -91,7 +91,13 @@ pub(super) struct Pm<'a> {
 impl<'a> Pm<'a> {
     /// Nothing done yet.
     pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &'a Settings, surroundings: &'a Surroundings) -> Pm<'a> {
-        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
+        let eye = Eye {
+            scene,
+            camera,
+            interior: surroundings.eye,
+            max_depth: settings.max_depth,
+            indirect: Indirect::Photons,
+        };
         Pm { eye, settings, surroundings, map: None }
     }
 

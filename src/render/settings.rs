@@ -6,7 +6,7 @@ use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
 #[cfg(doc)]
 use crate::photon::kernel;
-use crate::transport::MAX_LEVELS;
+use crate::transport::{Indirect, MAX_LEVELS};
 
 /// Iterations when no stop condition is given.
 pub const DEFAULT_ITERATIONS: u64 = 64;
@@ -85,6 +85,10 @@ pub struct Settings {
     pub photons: u32,
     /// Most bytes that the map of [`Method::Pm`] may take, while it is built.
     pub photon_memory: u64,
+    /// What [`Method::Sppm`]'s photons bring: all indirect light, or caustics alone.
+    pub indirect: Indirect,
+    /// Light paths start toward what makes caustics, where a pilot has found them to matter. The methods that count photons have none of it.
+    pub guided: bool,
     /// Bandwidth levels.
     pub levels: Levels,
     /// Also make a picture per sampling technique ([`Method::has_techniques`]).
@@ -120,6 +124,8 @@ impl Default for Settings {
             seed: 0,
             photons: DEFAULT_PHOTONS,
             photon_memory: DEFAULT_MAP_MEMORY,
+            indirect: Indirect::Photons,
+            guided: false,
             levels: Levels::new(5),
             techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),

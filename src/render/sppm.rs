@@ -5,6 +5,7 @@
 
 use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
+use super::guiding::learnt;
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
 use super::volume::{Maps, VolumeMap};
@@ -12,10 +13,13 @@ use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths};
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
+use crate::light::Guide;
 use crate::photon::{Kernel, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{EqualFlux, Eye, EyeMeasure, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
+use crate::transport::{
+    EqualFlux, Eye, EyeMeasure, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path,
+};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -30,20 +34,24 @@ pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPas
 
 /// Traces some of the light paths of a pass.
 pub(super) fn trace_some(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, paths: Range<u32>) -> Photons {
-    trace_by(paths, |arena, index, photons| light_path(scene, arena, surroundings, pass, index, photons))
+    trace_by(paths, |arena, index, photons| {
+        light_path(scene, arena, surroundings, pass, index, photons);
+    })
+}
+
+/// So many light paths in units of work.
+pub(super) fn chunks(paths: u32) -> impl IndexedParallelIterator<Item = Range<u32>> {
+    (0..paths).into_par_iter().step_by(CHUNK as usize).map(move |first| first..paths.min(first.saturating_add(CHUNK)))
 }
 
 /// Calls `light_path` for some paths; photons are in the order of paths.
 fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync) -> Photons {
-    let parts: Vec<Photons> = (0..paths.len() as u32)
-        .into_par_iter()
-        .step_by(CHUNK as usize)
-        .map_init(Bump::new, |arena, first| {
+    let parts: Vec<Photons> = chunks(paths.len() as u32)
+        .map_init(Bump::new, |arena, part| {
             let surface = Vec::with_capacity(CHUNK as usize * 2);
             let mut photons = Photons { surface, ..Photons::default() };
-            let first = paths.start + first;
-            for index in first..paths.end.min(first.saturating_add(CHUNK)) {
-                light_path(arena, index, &mut photons);
+            for index in part {
+                light_path(arena, paths.start + index, &mut photons);
                 arena.reset();
             }
             photons
@@ -106,18 +114,26 @@ pub(super) struct Sppm<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
     surroundings: &'a Surroundings,
+    guide: Option<Guide>,
 }
 
 impl<'a> Sppm<'a> {
-    /// Nothing done yet.
+    /// Nothing done yet but the guide, if there is to be one.
     pub fn new(
         scene: &'a Scene,
         camera: &'a Camera,
         settings: &'a Settings,
         surroundings: &'a Surroundings,
     ) -> Sppm<'a> {
-        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth: settings.max_depth };
-        Sppm { eye, settings, surroundings }
+        let eye = Eye {
+            scene,
+            camera,
+            interior: surroundings.eye,
+            max_depth: settings.max_depth,
+            indirect: settings.indirect,
+        };
+        let guide = settings.guided.then(|| learnt(&eye, surroundings, settings.seed)).flatten();
+        Sppm { eye, settings, surroundings, guide }
     }
 
     /// Eye paths.
@@ -174,9 +190,11 @@ impl<'a> Sppm<'a> {
         Maps { surface: PhotonMap::build(photons.surface), volume }
     }
 
-    fn light_pass(&self, i: u64, domain: Domain) -> LightPass {
+    fn light_pass(&self, i: u64, domain: Domain) -> LightPass<'_> {
         let Settings { seed, photons, max_depth, .. } = *self.settings;
         LightPass::new(seed, i, domain, photons, max_depth)
+            .guided(self.guide.as_ref())
+            .caustics_only(self.settings.indirect == Indirect::Paths)
     }
 }
 

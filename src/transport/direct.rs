@@ -36,15 +36,16 @@ pub fn direct_light(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: 
     if scene.lights.is_empty() {
         return Rgb::ZERO;
     }
-    let mut light = next_event(scene, vertex, gather, onward, survival);
+    let mut light = next_event(scene, vertex, [(gather, SECOND_STRATEGY), (onward, survival)]);
     if !gather.is_empty() && vertex.draws().one(Purpose::SecondStrategy) < SECOND_STRATEGY {
         light += second_strategy(scene, vertex, gather);
     }
     light
 }
 
+/// Light straight from a light for some sets of lobes, each with the probability of trying its second strategy, which is not done here.
 #[inline]
-fn next_event(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) -> Rgb {
     let draws = vertex.draws();
     let choice = draws.one(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
@@ -52,7 +53,7 @@ fn next_event(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSe
         return Rgb::ZERO;
     };
     let mut scattered = Rgb::ZERO;
-    for (set, tries) in [(gather, SECOND_STRATEGY), (onward, survival)] {
+    for (set, tries) in sets {
         // Delta lobes scatter nothing towards a light sample, but they take their share of the directions drawn from the set.
         if !set.has(LobeSet::SMOOTH) {
             continue;

@@ -5,10 +5,15 @@
 //! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself, which goes on;
 //! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light.
 //!
+//! Where only caustics are left to photons ([`Indirect::Paths`]), the eye path goes on with the broad lobes of X, too. Between its last broad bounce and a
+//! light there is then at least one vertex:
+//! - one that scatters the light broadly: next-event estimation there and its second strategy, the eye path;
+//! - narrow lobes alone: photons of caustics, at every vertex of the eye path, for its broad lobes. The eye path itself does not count such light.
+//!
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
-use super::direct::{balance, direct_light};
+use super::direct::{balance, direct_light, next_event};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::segment::Known;
@@ -163,6 +168,9 @@ impl EyeMeasure {
     }
 }
 
+/// Least probability of going on with either set of lobes where there are two.
+const LEAST_CHANCE: f32 = 0.1;
+
 /// Where on its way an eye path is: decides to which layer light belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
@@ -174,7 +182,17 @@ enum Stage {
     Later,
 }
 
-struct Gather<'a, B, K> {
+/// Who brings light that has been scattered broadly before the eye path's first broad bounce.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Indirect {
+    /// Photons.
+    #[default]
+    Photons,
+    /// The eye path, which goes on.
+    Paths,
+}
+
+struct Gather<'a, B, K, const PATHS: bool> {
     kernel: K,
     scene: &'a Scene,
     photons: &'a PhotonMap,
@@ -187,15 +205,21 @@ struct Gather<'a, B, K> {
     /// Length of the path so far.
     length: f32,
     stage: Stage,
+    /// The path has scattered broadly.
+    broadly: bool,
     /// The last vertex.
     last: Vec3,
 }
 
-impl<B: Bandwidths, K: Kernel> Gather<'_, B, K> {
+impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with
     /// which next-event estimation at the last vertex would have found it.
     #[inline]
     fn run_into(&mut self, radiance: Rgb, throughput: Rgb, pdf_light: f32, scattered: Option<Scattered>) {
+        if PATHS && self.broadly && scattered.is_some_and(|s| !s.lobe.has(LobeSet::BROAD)) {
+            // A caustic.
+            return;
+        }
         let arriving = throughput * radiance;
         match (self.stage, scattered) {
             (Stage::Clear, _) => self.measure.emission += arriving,
@@ -209,6 +233,41 @@ impl<B: Bandwidths, K: Kernel> Gather<'_, B, K> {
             }
             // Behind a perfect mirror or clear glass next-event estimation cannot see it.
             _ => self.measure.indirect += arriving,
+        }
+    }
+
+    /// Direct light and photons at a vertex from which the path goes on whatever its lobes, and with which of them.
+    #[inline]
+    fn go_on(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: LobeSet) -> Next {
+        let chance = match (broad.is_empty(), onward.is_empty()) {
+            (true, _) => 0.0,
+            (false, true) => 1.0,
+            (false, false) => {
+                let [broad, onward] = [broad, onward].map(|set| vertex.shading.albedo(set).max_element());
+                (broad / (broad + onward)).clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE)
+            }
+        };
+        if vertex.depth < self.max_depth {
+            let tries = |set: LobeSet, chance: f32| {
+                if chance > 0.0 { chance * vertex.survival_chosen(set, chance) } else { 0.0 }
+            };
+            // What narrow lobes send on to the last broad bounce is a caustic there.
+            let seen = if self.broadly { LobeSet::NONE } else { onward };
+            let sets = [(broad, tries(broad, chance)), (seen, tries(seen, 1.0 - chance))];
+            let direct = vertex.throughput * next_event(self.scene, vertex, sets);
+            if self.stage == Stage::Clear {
+                self.measure.direct += direct;
+            } else {
+                self.measure.indirect += direct;
+            }
+            self.gather(vertex, broad, seen & LobeSet::SHARP);
+        }
+        self.stage = if self.stage == Stage::Clear { Stage::First } else { Stage::Later };
+        if vertex.draws.one(Purpose::LobeChoice) < chance {
+            self.broadly = true;
+            Next::Choose(broad, chance)
+        } else {
+            Next::Choose(onward, 1.0 - chance)
         }
     }
 
@@ -236,7 +295,7 @@ impl<B: Bandwidths, K: Kernel> Gather<'_, B, K> {
     }
 }
 
-impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
+impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_, B, K, PATHS> {
     const SPLITS: bool = true;
 
     #[inline]
@@ -266,6 +325,9 @@ impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
         }
         let (broad, sharp) = (lobes & LobeSet::BROAD, lobes & LobeSet::SHARP);
         let onward = lobes & (LobeSet::SHARP | LobeSet::DELTA);
+        if PATHS {
+            return self.go_on(vertex, broad, onward);
+        }
         if vertex.depth < self.max_depth {
             let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
             let direct = vertex.throughput * direct_light(self.scene, vertex, broad, onward, survival);
@@ -323,6 +385,8 @@ pub struct Eye<'a> {
     pub interior: Interior,
     /// Longest path in segments.
     pub max_depth: u32,
+    /// Who brings indirect light where photons are gathered.
+    pub indirect: Indirect,
 }
 
 impl Eye<'_> {
@@ -398,7 +462,29 @@ impl Eye<'_> {
         bandwidths: impl Bandwidths,
         kernel: impl Kernel,
     ) -> EyeMeasure {
-        let mut gather = Gather {
+        match self.indirect {
+            Indirect::Photons => {
+                self.measure_by::<_, _, false>(scratch, start, *stream, photons, volume, bandwidths, kernel)
+            }
+            Indirect::Paths => {
+                self.measure_by::<_, _, true>(scratch, start, *stream, photons, volume, bandwidths, kernel)
+            }
+        }
+    }
+
+    #[inline]
+    #[allow(clippy::too_many_arguments, reason = "those of `measure`")]
+    fn measure_by<B: Bandwidths, K: Kernel, const PATHS: bool>(
+        &self,
+        scratch: &mut Scratch,
+        start: &PathStart,
+        stream: Stream,
+        photons: &PhotonMap,
+        volume: Option<Volume<'_>>,
+        bandwidths: B,
+        kernel: K,
+    ) -> EyeMeasure {
+        let mut gather = Gather::<B, K, PATHS> {
             kernel,
             scene: self.scene,
             photons,
@@ -410,9 +496,10 @@ impl Eye<'_> {
             measure: EyeMeasure::default(),
             length: 0.0,
             stage: Stage::Clear,
+            broadly: false,
             last: Vec3::ZERO,
         };
-        walk(self.scene, &scratch.arena, start, *stream, Transport::Radiance, self.max_depth, &mut gather);
+        walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
         let measure = gather.measure;
         scratch.arena.reset();
         measure

@@ -5,7 +5,7 @@ use super::segment::Known;
 use super::site::MediumVertex;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
-use crate::light::EmissionDensity;
+use crate::light::{EmissionDensity, Guide, guide};
 use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags, VolumePhoton};
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
@@ -13,8 +13,8 @@ use crate::scene::Scene;
 use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
-#[derive(Clone, Copy, Debug)]
-pub struct LightPass {
+#[derive(Clone, Copy)]
+pub struct LightPass<'a> {
     seed: u64,
     pass: u64,
     domain: Domain,
@@ -23,6 +23,8 @@ pub struct LightPass {
     choice: SobolPair,
     point: SobolPair,
     direction: SobolPair,
+    guide: Option<&'a Guide>,
+    caustics_only: bool,
 }
 
 /// How a light path begins.
@@ -38,16 +40,31 @@ pub struct Emitted {
     pub light: u32,
     /// Densities of the start.
     pub density: EmissionDensity,
+    /// Component of the guide that made it; [`guide::UNGUIDED`] where there is none.
+    pub cell: usize,
+    /// Density of unguided emission over that of the guide.
+    pub ratio: f32,
 }
 
-impl LightPass {
+impl<'a> LightPass<'a> {
     /// Pass `pass` of `paths` light paths.
-    pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPass {
+    pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPass<'a> {
         let key =
             mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(0x9e37_79b9_7f4a_7c15))
                 ^ domain as u64);
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
-        LightPass { seed, pass, domain, paths, max_depth, choice: pair(1), point: pair(2), direction: pair(3) }
+        let (choice, point, direction) = (pair(1), pair(2), pair(3));
+        LightPass { seed, pass, domain, paths, max_depth, choice, point, direction, guide: None, caustics_only: false }
+    }
+
+    /// The same with emission guided, if there is a guide.
+    pub fn guided(self, guide: Option<&'a Guide>) -> LightPass<'a> {
+        LightPass { guide, ..self }
+    }
+
+    /// The same with photons of caustics alone, if `only`: light paths end where they would scatter broadly.
+    pub fn caustics_only(self, only: bool) -> LightPass<'a> {
+        LightPass { caustics_only: only, ..self }
     }
 
     /// Number of light paths.
@@ -64,8 +81,18 @@ impl LightPass {
     pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
         let choice = self.choice.point(index);
         let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
-        let mut emission = scene.lights.sample_emission(&scene.shapes, &scene.materials, choice.x, point, direction)?;
-        scene.lights.aim(&mut emission, choice.y, point);
+        let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
+        let (emission, cell, ratio) = match self.guide {
+            Some(guide) => {
+                let guided = guide.emit(lights, shapes, materials, choice, point, direction)?;
+                (guided.emission, guided.cell, guided.ratio)
+            }
+            None => {
+                let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
+                lights.aim(&mut emission, choice.y, point);
+                (emission, guide::UNGUIDED, 1.0)
+            }
+        };
         let mut flux = emission.flux / self.paths as f32;
         if emission.infinite
             && let Some(medium) = scene.medium
@@ -87,6 +114,8 @@ impl LightPass {
             delta: emission.delta,
             light: emission.light,
             density: emission.density,
+            cell,
+            ratio,
         })
     }
 }
@@ -104,6 +133,8 @@ pub struct Photons {
 struct Deposit<'a> {
     scene: &'a Scene,
     photons: &'a mut Photons,
+    /// Lobes that a path goes on with.
+    onward: LobeSet,
     caustic: bool,
     unreachable: bool,
 }
@@ -130,7 +161,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             });
         }
-        Next::Continue(LobeSet::ALL)
+        Next::Continue(self.onward)
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
@@ -145,11 +176,11 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             });
         }
-        Next::Continue(LobeSet::ALL)
+        Next::Continue(self.onward)
     }
 }
 
-/// Traces light path `index` of the pass and appends its photons.
+/// Traces light path `index` of the pass and appends its photons. Returns the component of the guide that made it, if it began at all.
 #[inline]
 pub fn light_path(
     scene: &Scene,
@@ -158,10 +189,12 @@ pub fn light_path(
     pass: &LightPass,
     index: u32,
     photons: &mut Photons,
-) {
-    let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
-    let mut deposit = Deposit { scene, photons, caustic: true, unreachable: emitted.delta };
+) -> Option<usize> {
+    let emitted = pass.emit(scene, surroundings, index)?;
+    let onward = if pass.caustics_only { LobeSet::SHARP | LobeSet::DELTA } else { LobeSet::ALL };
+    let mut deposit = Deposit { scene, photons, onward, caustic: true, unreachable: emitted.delta };
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
+    Some(emitted.cell)
 }
 
 /// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path would lose is the probability that
@@ -205,7 +238,8 @@ impl EqualFlux {
         let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
         for copy in 0..copies {
             let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
-            let mut deposit = Deposit { scene, photons, caustic: true, unreachable: emitted.delta };
+            let mut deposit =
+                Deposit { scene, photons, onward: LobeSet::ALL, caustic: true, unreachable: emitted.delta };
             walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
             arena.reset();
         }

@@ -78,12 +78,14 @@ pub struct Scattered {
 }
 
 /// What a visitor wants next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
     /// End the path.
     Stop,
     /// Go on with a direction from these lobes.
     Continue(LobeSet),
+    /// Go on with a direction from these lobes, which were chosen from several sets with this probability.
+    Choose(LobeSet, f32),
 }
 
 /// Receives the vertices of a walk.
@@ -118,8 +120,14 @@ impl Vertex<'_, '_> {
     /// is drawn, so that MIS weights can use it.
     #[inline]
     pub fn survival(&self, set: LobeSet) -> f32 {
+        self.survival_chosen(set, 1.0)
+    }
+
+    /// The same if the visitor chooses these lobes with probability `chance`.
+    #[inline]
+    pub fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
         let albedo = self.shading.albedo(set);
-        survival((self.throughput * albedo).max_element() * self.survival_scale, self.depth)
+        survival((self.throughput * albedo).max_element() * self.survival_scale / chance, self.depth)
     }
 }
 
@@ -230,7 +238,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
                 }
                 let set = match visitor.medium(&vertex, scattered) {
                     Next::Stop => return,
-                    Next::Continue(set) => set & LobeSet::BROAD,
+                    Next::Continue(set) | Next::Choose(set, _) => set & LobeSet::BROAD,
                 };
                 let survival = vertex.survival(set);
                 if set.is_empty() || depth == max_depth || draws.one(Purpose::Roulette) >= survival {
@@ -281,15 +289,16 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
             flight,
             survival_scale,
         };
-        let set = match visitor.surface(&vertex, scattered) {
+        let (set, chance) = match visitor.surface(&vertex, scattered) {
             Next::Stop => return,
-            Next::Continue(set) => set & shading.bsdf.lobes(),
+            Next::Continue(set) => (set & shading.bsdf.lobes(), 1.0),
+            Next::Choose(set, chance) => (set & shading.bsdf.lobes(), chance),
         };
         if set.is_empty() || depth == max_depth {
             return;
         }
         let survival = match channel {
-            None => vertex.survival(set),
+            None => vertex.survival_chosen(set, chance),
             // It has its roulette on arrival; this one ends what is trapped without loss.
             Some(_) => {
                 if depth > LATE {
@@ -305,8 +314,9 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
         let sample = shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
         let Some(sample) = sample else { return };
         visitor.scatter(&vertex, &sample);
-        throughput *= sample.weight / survival;
-        scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
+        let going = survival * chance;
+        throughput *= sample.weight / going;
+        scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * going });
         if sample.transmitted && crossing.is_some() && transport == Transport::Radiance {
             // Radiance is denser where the index is higher, by its square; a path that has only come in there has lost nothing, and gets
             // it back on the way out. Roulette must not take it for absorption.

@@ -81,6 +81,10 @@ pub struct RenderArgs {
     /// standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and the local rule count photons and need box [default: box]
     #[arg(long, value_enum, help_heading = "Method")]
     pub kernel: Option<Kernel>,
+    /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
+    /// the same, its noise another. Not for path, pm and the methods that count photons [default: off; auto: on]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub guide: Option<Switch>,
     /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
     pub max_depth: Option<u32>,
@@ -198,6 +202,16 @@ impl Method {
 }
 
 /// Rules by which bandwidths shrink.
+/// On or off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Switch {
+    /// On
+    On,
+    /// Off
+    Off,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RadiusRule {
@@ -333,6 +347,7 @@ impl RenderArgs {
             (self.cppm_beta.is_some() && method != render::Method::Cppm, "--cppm-beta"),
             (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
             (self.cppm_plus && method != render::Method::Cppm, "--cppm-plus"),
+            (self.guide == Some(Switch::On) && !method.guides(rule), "--guide"),
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !matches!(method, M::Sppm | M::Appm)) {
@@ -368,6 +383,7 @@ impl RenderArgs {
             let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
             return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
         }
+        let guided = self.guide.map_or(self.method == Method::Auto, |guide| guide == Switch::On);
         let chi_squared = ChiSquaredSettings::default();
         let chi_squared = ChiSquaredSettings {
             annuli: self.cppm_grid.map_or(chi_squared.annuli, |grid| grid.annuli),
@@ -420,6 +436,12 @@ impl RenderArgs {
             time: self.time,
             target_error: self.target_error,
             shard,
+            guided,
+            indirect: if std::env::var_os("HYBRID").is_some() {
+                caustique::transport::Indirect::Paths
+            } else {
+                Default::default()
+            },
         };
         if self.shard.is_some() && !settings.is_memoryless() {
             let rule = if method == render::Method::Sppm { " with local statistics" } else { "" };

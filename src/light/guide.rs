@@ -1,0 +1,239 @@
+//! Guided emission: most light paths start toward what makes caustics, from the lights that reach it.
+//!
+//! A start is drawn from a mixture: with probability [`Guide::unguided`] as [`Lights::sample_emission`] draws it, else from a cell, a pair of a lamp
+//! and a target. The lamp gives the origin; the direction is uniform in the cone that the target's bounding sphere fills from there (for light from
+//! infinity, the line is uniform over the sphere's disc). Whatever component made it, a start carries its native flux times the ratio of its native
+//! density to its density in the mixture \[Veach 1997, (9.15), the balance heuristic\], at most 1 / unguided: the mean is that of unguided emission.
+//!
+//! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
+
+use super::lights::{EmissionSample, Lights};
+use super::{Cdf, Emitter};
+use crate::geometry::{Shapes, spawn};
+use crate::material::Materials;
+use crate::math::{Frame, Vec2, Vec3, warp};
+use std::f32::consts::PI;
+use std::ops::Range;
+
+/// Least share of unguided light paths: what the guide has never seen keeps its photons.
+const LEAST_UNGUIDED: f64 = 0.2;
+/// Share of the guided paths that all cells keep, by their lamps' power.
+const PRIOR: f64 = 0.1;
+/// Lamps that can be guided; beyond this many the weakest go unguided.
+const MAX_LAMPS: usize = 256;
+
+/// The cell of unguided paths.
+pub const UNGUIDED: usize = 0;
+
+/// Emitters that are guided together: a lamp's triangles, or one punctual light.
+struct Lamp {
+    emitters: Range<usize>,
+    /// Probability of choosing one of them by power, and where in the choice they begin.
+    probability: f32,
+    below: f32,
+    /// Targets and the probability of their cells over `probability`.
+    targets: Vec<(usize, f32)>,
+}
+
+/// Probabilities of cells.
+pub struct Guide {
+    lamps: Vec<Lamp>,
+    /// Lamp of an emitter; `u32::MAX` for those unguided.
+    lamp_of: Vec<u32>,
+    /// Lamp and target of a cell; that of [`UNGUIDED`] means nothing.
+    cells: Vec<(usize, usize)>,
+    /// Of the cells by power alone.
+    prior: Vec<f64>,
+    choice: Cdf,
+}
+
+/// A guided start.
+pub struct Guided {
+    /// The start; its densities are those of unguided emission, by which strategies are weighed against each other.
+    pub emission: EmissionSample,
+    /// The component that made it.
+    pub cell: usize,
+    /// Native density over the mixture's: what the flux was multiplied by.
+    pub ratio: f32,
+}
+
+impl Guide {
+    /// Every pair of a lamp and a target, lamps by power. `None` where nothing can make caustics, or nothing shines.
+    pub fn new(lights: &Lights) -> Option<Guide> {
+        let choice = lights.choice()?;
+        let targets = lights.targets().spheres().len();
+        let mut lamps: Vec<Lamp> = Vec::new();
+        let mut below = 0.0;
+        for (range, probability) in lights.lamps() {
+            if probability > 0.0 {
+                lamps.push(Lamp { emitters: range, probability, below, targets: Vec::new() });
+            }
+            below += probability;
+        }
+        lamps.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        lamps.truncate(MAX_LAMPS);
+        // As the choice itself has rounded it.
+        for lamp in &mut lamps {
+            lamp.below = choice.below(lamp.emitters.start);
+        }
+        let mut lamp_of = vec![u32::MAX; lights.emitters().len()];
+        for (index, lamp) in lamps.iter().enumerate() {
+            lamp_of[lamp.emitters.clone()].fill(index as u32);
+        }
+        let mut cells = vec![(usize::MAX, usize::MAX)];
+        cells.extend((0..lamps.len()).flat_map(|lamp| (0..targets).map(move |target| (lamp, target))));
+        if cells.len() == 1 {
+            return None;
+        }
+        let power: f32 = lamps.iter().map(|lamp| lamp.probability).sum();
+        let each = |&(lamp, _): &(usize, usize)| f64::from(lamps[lamp].probability / (power * targets as f32));
+        let prior: Vec<f64> = std::iter::once(0.0).chain(cells[1..].iter().map(each)).collect();
+        let weights = prior.iter().enumerate().map(|(cell, p)| if cell == UNGUIDED { 0.5 } else { 0.5 * p });
+        let choice = Cdf::new(weights)?;
+        let mut guide = Guide { lamps, lamp_of, cells, prior, choice };
+        guide.spread();
+        Some(guide)
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Probability of an unguided start.
+    pub fn unguided(&self) -> f32 {
+        self.choice.pdf(UNGUIDED)
+    }
+
+    /// Makes a cell as probable as leaves the least error: `error[c]` is the sum of the squared relative errors that its photons left in the
+    /// picture, made by `paths[c]` light paths. Of strata with n paths each the sum of `error * paths / n` is least for n in proportion to
+    /// `sqrt(error * paths)`.
+    pub fn learn(&mut self, error: &[f64], paths: &[f64]) {
+        let best: Vec<f64> = error.iter().zip(paths).map(|(error, paths)| (error * paths).sqrt()).collect();
+        let guided: f64 = best[1..].iter().sum();
+        if !(guided.is_finite() && guided > 0.0) {
+            return;
+        }
+        let unguided = (best[UNGUIDED] / (best[UNGUIDED] + guided)).clamp(LEAST_UNGUIDED, 1.0 - PRIOR);
+        let weight = |(cell, best): (usize, f64)| {
+            if cell == UNGUIDED {
+                unguided
+            } else {
+                (1.0 - unguided) * ((1.0 - PRIOR) * best / guided + PRIOR * self.prior[cell])
+            }
+        };
+        if let Some(choice) = Cdf::new(best.iter().copied().enumerate().map(weight)) {
+            self.choice = choice;
+            self.spread();
+        }
+    }
+
+    /// Gives every lamp its targets.
+    fn spread(&mut self) {
+        for lamp in &mut self.lamps {
+            lamp.targets.clear();
+        }
+        for (cell, &(lamp, target)) in self.cells.iter().enumerate().skip(1) {
+            let probability = self.choice.pdf(cell);
+            if probability > 0.0 {
+                let lamp = &mut self.lamps[lamp];
+                lamp.targets.push((target, probability / lamp.probability));
+            }
+        }
+    }
+
+    /// A start. `choice`, `point` and `direction` are uniform on the unit square.
+    #[inline]
+    pub fn emit(
+        &self,
+        lights: &Lights,
+        shapes: &Shapes,
+        materials: &Materials,
+        choice: Vec2,
+        point: Vec2,
+        direction: Vec2,
+    ) -> Option<Guided> {
+        let (cell, _, rest) = self.choice.sample(choice.y);
+        let (emission, made) = if cell == UNGUIDED {
+            let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
+            lights.aim(&mut emission, rest, point);
+            (emission, None)
+        } else {
+            let (lamp, target) = self.cells[cell];
+            let lamp = &self.lamps[lamp];
+            // The part of the choice that falls on this lamp, and a hair less, for the sum may have been rounded up.
+            let u = (lamp.below + choice.x * lamp.probability).min((lamp.below + lamp.probability).next_down());
+            let emission = lights.sample_emission(shapes, materials, u, point, direction)?;
+            (self.turn(lights, emission, target, point, direction)?, Some(target))
+        };
+        let lamp = self.lamp_of[emission.light as usize];
+        let native = emission.density.onward;
+        let mut mixed = self.unguided() * native;
+        if let Some(lamp) = self.lamps.get(lamp as usize) {
+            for &(target, weight) in &lamp.targets {
+                mixed += weight * Self::density(lights, &emission, target, made == Some(target));
+            }
+        }
+        let ratio = native / mixed;
+        // Written so that NaN ends it.
+        if !(ratio > 0.0) {
+            return None;
+        }
+        Some(Guided { emission: EmissionSample { flux: emission.flux * ratio, ..emission }, cell, ratio })
+    }
+
+    /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give it there.
+    fn turn(
+        &self,
+        lights: &Lights,
+        mut emission: EmissionSample,
+        target: usize,
+        point: Vec2,
+        direction: Vec2,
+    ) -> Option<EmissionSample> {
+        let (center, radius) = lights.targets().spheres()[target];
+        if emission.infinite {
+            lights.targets().through(lights.sky(), &mut emission, target, point);
+            return Some(emission);
+        }
+        let Some((axis, one_minus_cos)) = cone(emission.origin, center, radius) else { return Some(emission) };
+        let d = Frame::from_normal(axis).to_world(warp::cone_uniform(direction, one_minus_cos));
+        if let Emitter::Triangle { plane, corners, .. } = &lights.emitters()[emission.light as usize] {
+            let b = warp::triangle_uniform(point);
+            emission.origin = spawn(corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate(), d);
+        }
+        emission.direction = d;
+        (emission.density.onward, emission.density.cos) = lights.onward(emission.light as usize, d)?;
+        Some(emission)
+    }
+
+    /// Density of the start's direction (of its line, from infinity) toward a target; `inside`: it was drawn from there, whatever rounding says.
+    #[inline]
+    fn density(lights: &Lights, emission: &EmissionSample, target: usize, inside: bool) -> f32 {
+        let (center, radius) = lights.targets().spheres()[target];
+        let d = emission.direction;
+        if emission.infinite {
+            let v = emission.origin - center;
+            let off_axis = (v - d * v.dot(d)).length_squared();
+            return if inside || off_axis < radius * radius { 1.0 / (PI * radius * radius) } else { 0.0 };
+        }
+        match cone(emission.origin, center, radius) {
+            // From within a target nothing is turned.
+            None => emission.density.onward,
+            Some((axis, one_minus_cos)) => {
+                // 1 - cos from the chord: exact for narrow cones.
+                let within = 0.5 * (d - axis).length_squared() < one_minus_cos;
+                if inside || within { warp::cone_uniform_pdf_w(one_minus_cos) } else { 0.0 }
+            }
+        }
+    }
+}
+
+/// Axis of the cone that a sphere fills from `p`, and 1 - cos of its half angle; `None` from within.
+#[inline]
+fn cone(p: Vec3, center: Vec3, radius: f32) -> Option<(Vec3, f32)> {
+    let to = center - p;
+    let distance2 = to.length_squared();
+    let sin2 = radius * radius / distance2;
+    (sin2 < 0.9999).then(|| (to / distance2.sqrt(), sin2 / (1.0 + (1.0 - sin2).sqrt())))
+}

@@ -1,0 +1,148 @@
+//! Learning where light paths are to start: rounds of a few light paths and eye paths before the first iteration.
+//!
+//! A round draws light paths by what the rounds before it have learnt, gathers their photons where eye paths look, and adds up by cell of the guide how
+//! much squared relative error every photon leaves in the picture: its own share of the pixel, squared, for it is there or not. The pixel's value is
+//! what the round itself finds there.
+
+use super::sppm::chunks;
+use crate::estimator::bandwidth::{SCREEN_CAP, span};
+use crate::light::Guide;
+use crate::math::{Rgb, Vec3, luminance};
+use crate::photon::{Located, Nearest, Photon, PhotonMap};
+use crate::random::{Domain, Purpose, Stream};
+use crate::transport::{Eye, Indirect, LightPass, Photons, Probe, Surroundings, light_path};
+use bumpalo::Bump;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+const ROUNDS: u64 = 5;
+/// Light paths of a round.
+const LIGHT_PATHS: u32 = 1 << 15;
+/// Eye paths of a round, but one in so many pixels at most.
+const EYE_PATHS: u32 = 1 << 13;
+const PIXELS_PER_EYE_PATH: u64 = 4;
+/// Eye paths per unit of work.
+const CHUNK: u32 = 256;
+/// Photons that a pixel gathers.
+const NEIGHBOURS: usize = 16;
+/// Added to a pixel's squared value: the relative error of [`super::Rendered::relative_error`].
+const DARK: f32 = 0.01;
+
+/// A photon and the component of the guide that has made it.
+#[derive(Clone, Copy)]
+struct Marked {
+    photon: Photon,
+    cell: u32,
+}
+
+impl Located for Marked {
+    fn position(&self) -> Vec3 {
+        self.photon.p
+    }
+
+    fn normal(&self) -> Vec3 {
+        self.photon.ng
+    }
+
+    fn is_finite(&self) -> bool {
+        self.photon.is_finite()
+    }
+}
+
+/// The guide of a view, learnt; `None` where nothing can make caustics.
+pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, seed: u64) -> Option<Guide> {
+    let mut guide = Guide::new(&eye.scene.lights)?;
+    for round in 0..ROUNDS {
+        let (map, paths) = photons(eye, surroundings, seed, round, &guide);
+        let error = error(eye, seed, round, &map, guide.cells());
+        guide.learn(&error, &paths);
+    }
+    Some(guide)
+}
+
+/// Photons of a round, and the number of light paths by cell.
+fn photons(
+    eye: &Eye<'_>,
+    surroundings: &Surroundings,
+    seed: u64,
+    round: u64,
+    guide: &Guide,
+) -> (PhotonMap<Marked>, Vec<f64>) {
+    let pass = LightPass::new(seed, round, Domain::GuideLight, LIGHT_PATHS, eye.max_depth)
+        .guided(Some(guide))
+        .caustics_only(eye.indirect == Indirect::Paths);
+    let trace = |paths: std::ops::Range<u32>| {
+        let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), Vec::new());
+        let mut cells = Vec::with_capacity(paths.len());
+        for index in paths {
+            let Some(cell) = light_path(eye.scene, &arena, surroundings, &pass, index, &mut photons) else { continue };
+            arena.reset();
+            photons.volume.clear();
+            let cell = cell as u32;
+            marked.extend(photons.surface.drain(..).map(|photon| Marked { photon, cell }));
+            cells.push(cell);
+        }
+        (marked, cells)
+    };
+    let parts: Vec<(Vec<Marked>, Vec<u32>)> = chunks(LIGHT_PATHS).map(trace).collect();
+    let mut paths = vec![0.0; guide.cells()];
+    for &cell in parts.iter().flat_map(|(_, cells)| cells) {
+        paths[cell as usize] += 1.0;
+    }
+    (PhotonMap::build(parts.into_iter().flat_map(|(marked, _)| marked).collect()), paths)
+}
+
+/// Sum over a round's eye paths of the squared relative errors that photons leave, by cell.
+fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: usize) -> Vec<f64> {
+    let (width, height) = eye.camera.size();
+    let pixels = u64::from(width) * u64::from(height);
+    let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
+    let look = |first: u32| {
+        let mut error = vec![0.0f64; cells];
+        let (mut arena, mut nearest) = (Bump::new(), Nearest::default());
+        for index in first..paths.min(first + CHUNK) {
+            arena.reset();
+            let stream = Stream::new(seed, round, Domain::GuideEye, u64::from(index));
+            // Pixels in even steps from a first one drawn anew every round.
+            let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
+            let pixel = ((f64::from(index) + f64::from(offset)) * pixels as f64 / f64::from(paths)) as u64;
+            let pixel = pixel.min(pixels - 1);
+            let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
+            if let Some(probe) = eye.probe(&arena, &eye.start(at, stream), stream) {
+                weigh(eye, map, &mut nearest, &probe, &mut error);
+            }
+        }
+        error
+    };
+    let parts: Vec<Vec<f64>> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
+    let mut sum = vec![0.0; cells];
+    for part in parts {
+        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+    }
+    sum
+}
+
+/// Adds what the photons around a probe leave in its pixel.
+fn weigh(eye: &Eye<'_>, map: &PhotonMap<Marked>, nearest: &mut Nearest<Marked>, probe: &Probe, error: &mut [f64]) {
+    let cap = SCREEN_CAP * span(eye.camera, probe.length);
+    let radius2 = nearest.radius2(map, probe.p, probe.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
+    let scale = probe.weight / (PI * radius2);
+    let mut light = Vec::with_capacity(NEIGHBOURS);
+    let mut sum = Rgb::ZERO;
+    map.within(probe.p, radius2, |marked, _| {
+        let photon = &marked.photon;
+        if photon.ng.dot(probe.ng) > 0.0 {
+            let found = scale * photon.flux;
+            sum += found;
+            light.push((marked.cell, luminance(found)));
+        }
+    });
+    let value = luminance(sum + probe.direct);
+    let inverse = 1.0 / (value * value + DARK);
+    for (cell, light) in light {
+        let share = f64::from(light * light * inverse);
+        if share.is_finite() {
+            error[cell as usize] += share;
+        }
+    }
+}
