@@ -58,7 +58,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         environment: environment(description.environment),
     };
     let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);
-    let others = others.map(|light| punctual(light, origin)).collect();
+    let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
     let lights = Lights::new(&shapes, &materials, others, sky);
     for (i, instance) in shapes.instances.iter().enumerate() {
         if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
@@ -90,6 +90,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         objects: description.objects,
         tracer,
         lights,
+        light_names,
         cameras: description.cameras,
         medium: description.medium,
         scattering,

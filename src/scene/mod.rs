@@ -13,7 +13,7 @@ pub use view::{MAX_SIZE, View};
 
 use crate::error::Result;
 use crate::geometry::Shapes;
-use crate::light::Lights;
+use crate::light::{Emitter, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::DVec3;
 use crate::trace::Tracer;
@@ -37,6 +37,8 @@ pub struct Scene {
     pub tracer: Tracer,
     /// Lights.
     pub lights: Lights,
+    /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].
+    pub light_names: Vec<String>,
     /// Cameras as described, in the file's order.
     pub cameras: Vec<CameraDescription>,
     /// The medium that fills the space.
@@ -56,5 +58,20 @@ impl Scene {
     /// Embree is missing, or out of memory.
     pub fn build(description: Description, threads: usize) -> Result<Scene> {
         build::build(description, threads)
+    }
+
+    /// A light by name, for messages: `light "Sun"`, `object "Panel"` for the triangles of one that glows.
+    pub fn light_name(&self, index: usize) -> String {
+        match &self.lights.emitters()[index] {
+            Emitter::Triangle { instance, .. } => {
+                format!("object \"{}\"", self.shapes.instances[*instance as usize].name)
+            }
+            Emitter::Environment => "the environment".into(),
+            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Sun { .. } => {
+                let environment = usize::from(self.lights.sky().environment.is_some());
+                let first = self.lights.emitters().len() - environment - self.light_names.len();
+                format!("light \"{}\"", self.light_names[index - first])
+            }
+        }
     }
 }

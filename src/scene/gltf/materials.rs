@@ -8,7 +8,6 @@ use super::topology::Solid;
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
-use crate::texture::TextureRef;
 use std::collections::HashMap;
 
 /// Loads materials as meshes call for them.
@@ -103,28 +102,9 @@ fn default() -> Material {
     Material { name: "default".into(), ..Material::default() }
 }
 
-fn uses(material: &Material) -> impl Iterator<Item = TextureRef> {
-    [
-        material.base_color_texture,
-        material.metallic_roughness_texture,
-        material.normal_texture.map(|(t, _)| t),
-        material.emission_texture,
-        material.transmission_texture,
-        material.specular_texture,
-        material.specular_color_texture,
-        material.clearcoat_texture,
-        material.clearcoat_roughness_texture,
-        material.sheen_color_texture,
-        material.sheen_roughness_texture,
-        material.anisotropy_texture,
-    ]
-    .into_iter()
-    .flatten()
-}
-
 fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &mut Vec<String>) {
     for set in 0..2 {
-        if mesh.uvs[set].is_empty() && uses(material).any(|t| usize::from(t.set) == set) {
+        if mesh.uvs[set].is_empty() && material.textures().any(|t| usize::from(t.set) == set) {
             warnings.push(format!(
                 "mesh \"{}\": it lacks the texture coordinates {set} that its {place} reads; one texel covers it",
                 mesh.name
