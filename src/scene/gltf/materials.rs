@@ -1,10 +1,10 @@
 //! The materials that a scene uses, each once, or twice where its closed meshes are solid and its open ones thin.
 
-use super::Glass;
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
 use super::texture::Textures;
 use super::topology::Solid;
+use super::{Glass, counted};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
@@ -57,9 +57,13 @@ impl Library {
                 Glass::Thin => false,
             });
         if solid && !closed {
-            let why = match bounds.flipped {
-                true => "part of its faces is turned over: recalculate its normals",
-                false => "the mesh is not closed: light may get lost inside",
+            let why = match (bounds.flipped, bounds.rim) {
+                (true, _) => "part of its faces is turned over: recalculate its normals".to_string(),
+                (false, 0) => "edges join more than two of its faces: light may get lost inside".into(),
+                (false, rim) => format!(
+                    "the mesh is not closed ({}): light may get lost inside; close the holes, or take its thickness away",
+                    counted(rim, "edge has one face only", "edges have one face only")
+                ),
             };
             warnings.push(format!("mesh \"{}\": its {place} is solid, but {why}", mesh.name));
         }
