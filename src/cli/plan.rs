@@ -131,3 +131,35 @@ fn text(plan: &Plan) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::render::plan::plan;
+    use caustique::plan::switch::Removed;
+    use caustique::plan::{Effect, Switches};
+    use caustique::scene::{Description, Scene};
+
+    /// Columns of figures are there when something has measured them, with a dash where it has not.
+    #[test]
+    fn figures_have_columns() {
+        let scene = Scene::build(Description::default(), 1).unwrap();
+        let camera = scene.camera(&View::default()).unwrap();
+        let wishes = Wishes { method: Method::Vcm, max_depth: None, switches: Switches::default() };
+        let mut plan = plan(&wishes, &scene, &camera, &Removed::default());
+        assert_eq!(columns(&plan).len(), 2);
+        let caustic = &mut plan.effects[Effect::Caustic as usize];
+        (caustic.energy, caustic.seconds_per_iteration, caustic.error_if_off) = (Some(0.123), Some(0.25), Some(0.4));
+        let text = text(&plan);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[1], "  effect          simulated by  of the light  off saves  off costs   because");
+        assert_eq!(
+            lines[5],
+            "  glossy          -             -             -          -           nothing in the scene calls for it"
+        );
+        assert_eq!(
+            lines[6],
+            "  caustic         -             12 %          0.25 s     error 40 %  nothing in the scene calls for it"
+        );
+    }
+}

@@ -105,7 +105,7 @@ impl Plan {
         for EffectPlan { effect, because, present, .. } in &effects {
             let (name, off) = (effect.name(), asked.switches.off.has(*effect));
             if off && *present {
-                warnings.push(format!("--effects -{name}: leaves out what {} calls for", names::cut(because)));
+                warnings.push(format!("--effects -{name}: left out, though called for by {}", because.join("; ")));
             } else if *present && !finds(*effect) && asked.max_depth.is_none() && *effect != Effect::Dispersion {
                 // Dispersion, which no method simulates, was told of when the scene was built.
                 warnings.push(format!("--method {} does not find all light of the effect '{name}'", asked.method));

@@ -57,7 +57,7 @@ fn the_plan_as_json() {
     assert_eq!((&environment["present"], &environment["simulated"]), (&true.into(), &false.into()));
     assert_eq!((&environment["by"], &environment["because"]), (&Value::Null, &json!(["the environment"])));
     assert_eq!(effect("volume")["present"], false);
-    assert_eq!(plan["warnings"], json!(["--effects -environment: leaves out what the environment calls for"]));
+    assert_eq!(plan["warnings"], json!(["--effects -environment: left out, though called for by the environment"]));
 }
 
 /// A render without an effect is the render of a scene that never had it, to the last bit; its header tells what was left out.
@@ -66,7 +66,7 @@ fn an_effect_switched_off_is_as_if_it_were_not_there() {
     let folder = Folder::new();
     folder.render("-o plain.exr --iterations 2 --no-combine");
     let outcome = folder.render("-o off.exr --iterations 2 --no-combine --env 1,1,1 --effects -environment");
-    let warning = "warning: scene.glb: --effects -environment: leaves out what the environment calls for\n";
+    let warning = "warning: scene.glb: --effects -environment: left out, though called for by the environment\n";
     assert!(outcome.stderr.contains(warning), "{}", outcome.stderr);
     let ((plain, _), (off, header)) = (folder.read("plain.exr"), folder.read("off.exr"));
     for (a, b) in plain.layers.iter().zip(&off.layers) {
@@ -75,7 +75,7 @@ fn an_effect_switched_off_is_as_if_it_were_not_there() {
     assert_eq!(header["arguments"]["effects"], "-environment");
     assert_eq!(
         header["plan"]["warnings"],
-        json!(["--effects -environment: leaves out what the environment calls for"])
+        json!(["--effects -environment: left out, though called for by the environment"])
     );
 }
 

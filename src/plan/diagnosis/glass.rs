@@ -2,7 +2,7 @@
 
 use super::super::names::{cut, worn, worn_in};
 use super::rays;
-use crate::geometry::Mesh;
+use crate::geometry::{Instance, Mesh};
 use crate::material::{Material, WIDEST_ROUGHNESS};
 use crate::math::{Vec2, Vec3};
 use crate::scene::Scene;
@@ -12,7 +12,9 @@ use std::collections::BTreeMap;
 const FLAT: f32 = 1e-3;
 /// Glass objects that are looked at.
 const OBJECTS: usize = 64;
-/// Points on each mesh of one.
+/// Meshes, or copies, of one.
+const COPIES: usize = 16;
+/// Points on each of these.
 const POINTS: usize = 16;
 /// Lights asked for from each point.
 const SAMPLES: u32 = 64;
@@ -24,16 +26,21 @@ fn is_glass(material: &Material) -> bool {
 /// Curved thin walls: most were meant to be solid, and thin only because the exporter wrote no thickness and the mesh is open. Flat ones are
 /// panes, which a thickness would change little.
 pub(super) fn thin(scene: &Scene) -> Vec<String> {
-    let curved: Vec<bool> = scene.shapes.meshes.iter().map(|mesh| !is_flat(mesh)).collect();
-    let instances = scene.shapes.instances.iter().filter(|instance| curved[instance.mesh as usize]);
-    let worn = worn(&scene.materials.list, instances.map(|i| (i.material, i.name.as_str())));
-    let thin = worn.iter().filter(|w| is_glass(w.material) && w.material.thin && w.material.focuses());
+    let (meshes, materials) = (&scene.shapes.meshes, &scene.materials.list);
+    let mut flat: BTreeMap<u32, bool> = BTreeMap::new();
+    let mut meant_solid = |instance: &&Instance| {
+        let material = &materials[instance.material as usize];
+        let wall = is_glass(material) && material.thin && material.focuses();
+        wall && !*flat.entry(instance.mesh).or_insert_with(|| is_flat(&meshes[instance.mesh as usize]))
+    };
+    let instances = scene.shapes.instances.iter().filter(|instance| meant_solid(instance));
+    let worn = worn(materials, instances.map(|i| (i.material, i.name.as_str())));
     let tell = |label: String| {
         format!(
             "{label}: a thin wall does not bend light and casts no caustic; close the mesh (a bowl has an inside and an outside), or give the material a thickness"
         )
     };
-    thin.map(|worn| tell(worn.label())).collect()
+    worn.iter().map(|worn| tell(worn.label())).collect()
 }
 
 fn is_flat(mesh: &Mesh) -> bool {
@@ -101,7 +108,7 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
 
 fn shade(scene: &Scene, instances: &[u32]) -> Shade {
     let mut shade = Shade { lit: false, blockers: BTreeMap::new() };
-    for &index in instances {
+    for index in rays::spread(instances.len(), COPIES).map(|i| instances[i]) {
         let mesh = &scene.shapes.meshes[scene.shapes.instances[index as usize].mesh as usize];
         for primitive in rays::spread(mesh.triangles.len(), POINTS) {
             let Some(point) = scene.shapes.surface(index, primitive as u32, [1.0 / 3.0; 2]) else { continue };
