@@ -29,6 +29,8 @@ pub mod camera;
 
 pub mod scene;
 
+pub mod plan;
+
 pub mod photon;
 
 pub mod transport;

@@ -8,6 +8,8 @@ mod commands;
 mod converge;
 #[path = "cli/files.rs"]
 mod files;
+#[path = "cli/plan.rs"]
+mod plan;
 #[path = "cli/running.rs"]
 mod running;
 #[path = "cli/usage.rs"]

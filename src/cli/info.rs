@@ -34,7 +34,8 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         let object = image_object(&set, attributes.object());
         return if args.json { print_json(&Value::Object(object)) } else { print(&image_text(path, &set, &object)) };
     }
-    let scene = super::pool(0)?.install(|| scene::read(&SceneArgs::of(path), rayon::current_num_threads()))?;
+    let asked = SceneArgs::of(path);
+    let scene = super::pool(0)?.install(|| scene::read(&asked, rayon::current_num_threads()))?.scene;
     let object = scene_object(path, &scene);
     if args.json { print_json(&object) } else { print(&scene_text(path, &object)) }
 }

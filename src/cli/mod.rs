@@ -7,6 +7,7 @@ mod doctor;
 mod info;
 mod number;
 mod output;
+mod plan;
 mod plot;
 mod processor;
 mod progress;
@@ -32,6 +33,8 @@ struct Cli {
 enum Command {
     /// Render a scene to a multichannel EXR, and to a PNG to look at
     Render(Box<render::RenderArgs>),
+    /// Say which effects a scene calls for, which will be simulated, and why
+    Plan(Box<plan::PlanArgs>),
     /// Run the learned combiner on a rendered EXR
     Combine(combine::CombineArgs),
     /// Measure the error of an image against a reference
@@ -64,6 +67,7 @@ pub fn main() -> ExitCode {
     };
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Combine(args) => combine::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Converge(args) => converge::run(&args),

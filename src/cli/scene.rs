@@ -3,6 +3,8 @@
 use super::number::{finite, not_negative, rgb};
 use super::say;
 use caustique::error::{Error, Kind, Result};
+use caustique::plan::switch::{self, Removed};
+use caustique::plan::{Effect, Switches};
 use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Scene, environment_file, gltf};
 use clap::ValueEnum;
@@ -34,6 +36,10 @@ pub struct SceneArgs {
     /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light, and says so
     #[arg(long, value_enum, default_value_t = Glass::Auto)]
     pub glass: Glass,
+    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: dispersion, volume (or medium), depth_of_field,
+    /// environment, alpha (cut-outs), textures. 'caustique plan' lists what a scene calls for [default: all that it calls for]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
+    pub effects: Option<Switches>,
     /// Take anything in the scene that is ignored or approximated as an error
     #[arg(long)]
     pub strict: bool,
@@ -83,11 +89,27 @@ impl FromStr for EnvironmentChoice {
     }
 }
 
-/// Reads and builds the scene, with the environment that the options ask for.
-pub fn read(args: &SceneArgs, threads: usize) -> Result<Scene> {
+/// A scene as the options ask for it.
+pub struct Loaded {
+    pub scene: Scene,
+    /// What it was built without.
+    pub removed: Removed,
+}
+
+/// Reads and builds the scene, with the environment that the options ask for, without the effects that they switch off.
+pub fn read(args: &SceneArgs, threads: usize) -> Result<Loaded> {
+    let off = args.switches().off;
+    if let Some(class) = off.classes().iter().next() {
+        let properties: Vec<&str> =
+            Effect::ALL.into_iter().filter(|effect| !effect.is_class()).map(Effect::name).collect();
+        let cause = format!("'{}', a class of light paths, cannot be switched off yet", class.name());
+        return Err(Error::new(Kind::Usage, "--effects", cause)
+            .hint(format!("those that can be switched off are {}", properties.join(", "))));
+    }
     let mut description = gltf::read(&args.path, &args.read_options())?;
     environment(&mut description, args)?;
-    Scene::build(description, threads)
+    let removed = switch::off(&mut description, off);
+    Ok(Loaded { scene: Scene::build(description, threads)?, removed })
 }
 
 /// `--env`, `--env-rotation`, `--env-strength`: the last two also act on the scene's own environment.
@@ -122,10 +144,14 @@ pub fn tell(args: &SceneArgs, warnings: &[String]) -> Result<()> {
     if !args.strict || warnings.is_empty() {
         return Ok(());
     }
-    let things = if warnings.len() == 1 { "1 thing is" } else { &format!("{} things are", warnings.len()) };
+    Err(forbidden(args, warnings.len()))
+}
+
+/// What `--strict` makes of so many warnings.
+pub fn forbidden(args: &SceneArgs, warnings: usize) -> Error {
+    let things = if warnings == 1 { "1 thing is" } else { &format!("{warnings} things are") };
     let cause = format!("{things} ignored or approximated, and --strict forbids it");
-    Err(Error::new(Kind::Scene, args.path.display(), cause)
-        .hint("mend what the warnings above name, or leave --strict out"))
+    Error::new(Kind::Scene, args.path.display(), cause).hint("mend what the warnings above name, or leave --strict out")
 }
 
 impl SceneArgs {
@@ -138,8 +164,14 @@ impl SceneArgs {
             env_strength: None,
             light_units: LightUnits::Auto,
             glass: Glass::Auto,
+            effects: None,
             strict: false,
         }
+    }
+
+    /// `--effects`.
+    pub fn switches(&self) -> Switches {
+        self.effects.unwrap_or_default()
     }
 
     fn read_options(&self) -> gltf::ReadOptions {

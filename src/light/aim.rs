@@ -6,7 +6,7 @@
 
 use super::{Cdf, EmissionSample, Sky};
 use crate::geometry::Shapes;
-use crate::material::{Material, Materials};
+use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
@@ -24,13 +24,6 @@ pub struct Targets {
     choice: Option<Cdf>,
     /// Sum of the areas.
     area: f32,
-}
-
-/// Mirrors and glass, narrow enough to focus light.
-fn focuses(material: &Material) -> bool {
-    const WIDEST_ROUGHNESS: f32 = 0.45;
-    let narrow = material.roughness < WIDEST_ROUGHNESS || material.metallic_roughness_texture.is_some();
-    narrow && (material.transmission > 0.0 || material.metallic >= 0.5)
 }
 
 /// Bounding sphere of points: the centre of their box, the farthest of them.
@@ -116,7 +109,7 @@ impl Targets {
         let spheres: Vec<(Vec3, f32)> = shapes
             .instances
             .iter()
-            .filter(|instance| focuses(&materials.list[instance.material as usize]))
+            .filter(|instance| materials.list[instance.material as usize].focuses())
             .filter_map(|instance| {
                 let mesh = &shapes.meshes[instance.mesh as usize];
                 bounding_sphere(mesh.positions.iter().map(|&p| instance.point(p)))

@@ -3,7 +3,10 @@
 use super::{Alpha, Material};
 use crate::geometry::Surface;
 use crate::math::Rgb;
-use crate::texture::Texture;
+use crate::texture::{Texture, TextureRef};
+
+/// Wider lobes focus no light and show no reflections.
+pub const WIDEST_ROUGHNESS: f32 = 0.45;
 
 /// The scene's materials, and the textures they refer to.
 #[derive(Clone, Debug, Default)]
@@ -37,5 +40,40 @@ impl Material {
     /// Whether the mesh that wears it bounds a solid that light enters.
     pub fn is_solid_glass(&self) -> bool {
         self.transmission > 0.0 && !self.thin
+    }
+
+    /// Whether its base (coatings aside) reflects or bends light into narrow lobes somewhere.
+    fn has_narrow_base(&self) -> bool {
+        self.roughness < WIDEST_ROUGHNESS || self.metallic_roughness_texture.is_some()
+    }
+
+    /// Whether it shows reflections: its base, or a coating, has a narrow lobe.
+    pub fn is_glossy(&self) -> bool {
+        self.has_narrow_base() || self.clearcoat > 0.0
+    }
+
+    /// Whether it makes caustics that count: mirrors and glass, narrow enough to focus light.
+    pub fn focuses(&self) -> bool {
+        self.has_narrow_base() && (self.transmission > 0.0 || self.metallic >= 0.5)
+    }
+
+    /// The textures it reads.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture.map(|(texture, _)| texture),
+            self.emission_texture,
+            self.transmission_texture,
+            self.specular_texture,
+            self.specular_color_texture,
+            self.clearcoat_texture,
+            self.clearcoat_roughness_texture,
+            self.sheen_color_texture,
+            self.sheen_roughness_texture,
+            self.anisotropy_texture,
+        ]
+        .into_iter()
+        .flatten()
     }
 }

@@ -38,6 +38,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
             warnings.push(warning);
         }
     }
+    let first_lamp = description.objects.len() as u32;
     add_lamps(&mut description);
     let (low, high) = bounds(&description);
     let (center, radius) =
@@ -58,7 +59,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         environment: environment(description.environment),
     };
     let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);
-    let others = others.map(|light| punctual(light, origin)).collect();
+    let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
     let lights = Lights::new(&shapes, &materials, others, sky);
     for (i, instance) in shapes.instances.iter().enumerate() {
         if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
@@ -67,9 +68,12 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         }
     }
     if lights.is_empty() {
-        warnings.push(
-            "the scene has no light: the picture will be black (add --env, a lamp or an emissive material)".into(),
-        );
+        let dark = match description.lights.len() {
+            0 => "the scene has no light",
+            _ => "the intensities of all lights are zero",
+        };
+        warnings
+            .push(format!("{dark}: the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out area lights and the world)"));
     }
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
@@ -88,8 +92,11 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         shapes,
         materials,
         objects: description.objects,
+        first_lamp,
         tracer,
         lights,
+        light_names,
+        guessed_units: description.guessed_units,
         cameras: description.cameras,
         medium: description.medium,
         scattering,

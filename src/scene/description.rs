@@ -25,6 +25,8 @@ pub struct Description {
     pub cameras: Vec<CameraDescription>,
     /// Point, spot and directional lights.
     pub lights: Vec<PunctualLight>,
+    /// In what units the lights' numbers were taken, where that is a guess.
+    pub guessed_units: Option<GuessedUnits>,
     /// Light from infinity.
     pub environment: Option<EnvironmentDescription>,
     /// The medium that fills the space.
@@ -95,6 +97,15 @@ pub struct PunctualLight {
     pub kind: PunctualKind,
     /// Radius of the lamp (m); 0 is a mathematical point.
     pub radius: f32,
+}
+
+/// Units of punctual lights that neither the file nor the user states.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GuessedUnits {
+    /// Lumens, of which 683 were taken for a watt; watts otherwise.
+    pub photometric: bool,
+    /// What the guess is from, in words.
+    pub from: String,
 }
 
 /// Kind of a punctual light.

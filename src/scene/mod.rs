@@ -13,11 +13,11 @@ pub use view::{MAX_SIZE, View};
 
 use crate::error::Result;
 use crate::geometry::Shapes;
-use crate::light::Lights;
+use crate::light::{Emitter, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::DVec3;
 use crate::trace::Tracer;
-use description::CameraDescription;
+use description::{CameraDescription, GuessedUnits};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,10 +33,16 @@ pub struct Scene {
     pub materials: Arc<Materials>,
     /// Names of objects.
     pub objects: Vec<String>,
+    /// Objects from this one on are spheres, made for point lights that have a radius.
+    pub first_lamp: u32,
     /// Geometry in Embree.
     pub tracer: Tracer,
     /// Lights.
     pub lights: Lights,
+    /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].
+    pub light_names: Vec<String>,
+    /// In what units the numbers of punctual lights were taken, where that is a guess.
+    pub guessed_units: Option<GuessedUnits>,
     /// Cameras as described, in the file's order.
     pub cameras: Vec<CameraDescription>,
     /// The medium that fills the space.
@@ -56,5 +62,22 @@ impl Scene {
     /// Embree is missing, or out of memory.
     pub fn build(description: Description, threads: usize) -> Result<Scene> {
         build::build(description, threads)
+    }
+
+    /// A light by name, for messages: `light "Sun"`, `object "Panel"` for the triangles of one that glows.
+    pub fn light_name(&self, index: usize) -> String {
+        match &self.lights.emitters()[index] {
+            Emitter::Triangle { instance, .. } => {
+                let instance = &self.shapes.instances[*instance as usize];
+                let kind = if instance.object < self.first_lamp { "object" } else { "light" };
+                format!("{kind} \"{}\"", instance.name)
+            }
+            Emitter::Environment => "the environment".into(),
+            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Sun { .. } => {
+                let environment = usize::from(self.lights.sky().environment.is_some());
+                let first = self.lights.emitters().len() - environment - self.light_names.len();
+                format!("light \"{}\"", self.light_names[index - first])
+            }
+        }
     }
 }

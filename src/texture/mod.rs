@@ -1,6 +1,6 @@
 //! Image textures as glTF defines them.
 
-use crate::math::{Vec2, Vec4};
+use crate::math::{DVec4, Vec2, Vec4};
 
 /// How a coordinate outside `[0, 1)` is folded back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -109,6 +109,14 @@ impl Texture {
                 }
             }
         }
+    }
+
+    /// Mean of all texels, linear RGBA.
+    pub fn mean(&self) -> Vec4 {
+        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let sum = texels.fold(DVec4::ZERO, |sum, (x, y)| sum + self.texel(x, y).as_dvec4());
+        (sum / (width * height) as f64).as_vec4()
     }
 
     /// Linear RGBA at (u, v); v runs downwards from the top row, as in glTF. Coordinates that are not finite read texel 0.

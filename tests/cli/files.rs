@@ -98,7 +98,7 @@ fn the_header_has_the_plan_and_the_phases() {
     assert_eq!(of("present"), ["direct", "indirect", "glossy", "caustic", "sds"]);
     // A caustic seen in a mirror has four segments at least.
     assert_eq!(of("simulated"), ["direct", "indirect", "glossy", "caustic"]);
-    assert_eq!(effects[4]["because"], serde_json::json!(["material \"silver\""]));
+    assert_eq!(effects[4]["because"], serde_json::json!(["material \"silver\" on \"Mirror\" under light \"Lamp\""]));
 
     let phases = header["phases"].as_object().expect("phases");
     let sum: f64 = ["pilot", "light", "map", "eye"].iter().filter_map(|name| phases[*name].as_f64()).sum();

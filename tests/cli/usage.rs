@@ -8,7 +8,7 @@ fn errors_word_for_word() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --no-combine";
     let help = "'--help' explains every option";
-    let cases: [(&str, i32, &str, &str); 33] = [
+    let cases: [(&str, i32, &str, &str); 35] = [
         ("", 2, "command line: a command is missing", "'caustique --help' lists the commands"),
         ("rendr", 2, "command line: unrecognized subcommand 'rendr'", "a similar subcommand exists: 'render'"),
         (
@@ -23,7 +23,24 @@ fn errors_word_for_word() {
             "command line: unexpected argument '--itertions' found",
             "a similar argument exists: '--iterations'",
         ),
-        (&format!("{render} --effects -volume"), 2, "command line: unexpected argument '--effects' found", help),
+        (
+            &format!("{render} --effects volume"),
+            2,
+            "command line: invalid value 'volume' for '--effects <LIST>': each effect needs a sign: -volume leaves it out, +volume asks for it",
+            help,
+        ),
+        (
+            &format!("{render} --effects -bloom"),
+            2,
+            "command line: invalid value '-bloom' for '--effects <LIST>': there is no effect 'bloom'; there are emission, direct, indirect, glossy, caustic, sds, volume, dispersion, depth_of_field, environment, alpha, textures",
+            help,
+        ),
+        (
+            "plan scene.glb --effects -alpha,-sds",
+            2,
+            "--effects: 'sds', a class of light paths, cannot be switched off yet",
+            "those that can be switched off are volume, dispersion, depth_of_field, environment, alpha, textures",
+        ),
         (
             &format!("{render} --method cppm --kernel gaussian"),
             2,
@@ -203,17 +220,22 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     let folder = Folder::new();
     let help = folder.run("render --help");
     assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));
-    for option in
-        ["--photons", "--kernel", "--cppm-plus", "--exr-naming", "--target-error", "--strict", "--reproducible"]
-    {
+    for option in [
+        "--photons",
+        "--kernel",
+        "--cppm-plus",
+        "--exr-naming",
+        "--target-error",
+        "--strict",
+        "--effects",
+        "--reproducible",
+    ] {
         assert!(help.stdout.contains(option), "{option}");
     }
-    for absent in ["--effects", "--checkpoint"] {
-        assert!(!help.stdout.contains(absent), "{absent}");
-    }
+    assert!(!help.stdout.contains("--checkpoint"));
     let commands = folder.run("--help").stdout;
     for (command, listed) in
-        [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", false), ("merge", false)]
+        [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", true), ("merge", false)]
     {
         assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
     }

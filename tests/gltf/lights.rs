@@ -71,10 +71,15 @@ fn units_of_lights() {
     };
     let intensity = |file: &Glb, units| with(file, units).lights[0].intensity.x;
     assert_eq!(intensity(&file, LightUnits::Auto), 1.0);
+    let guess = |file: &Glb, units| with(file, units).guessed_units.map(|guess| (guess.photometric, guess.from));
+    let blender = "generator \"Khronos glTF Blender I/O v4.5.51\"";
+    assert_eq!(guess(&file, LightUnits::Auto), Some((true, blender.to_string())));
+    assert_eq!(guess(&file, LightUnits::Photometric), None);
     assert_eq!(intensity(&file, LightUnits::Radiometric), 683.0);
     file.json["asset"]["generator"] = json!("THREE.GLTFExporter");
     let scene = with(&file, LightUnits::Auto);
     assert_eq!(scene.lights[0].intensity.x, 683.0);
+    assert_eq!(guess(&file, LightUnits::Auto), Some((false, "generator \"THREE.GLTFExporter\"".to_string())));
     assert_eq!(
         scene.warnings,
         ["generator \"THREE.GLTFExporter\" does not tell the unit of lamps: they are taken in W/sr and W/m2 \
@@ -84,6 +89,7 @@ fn units_of_lights() {
     file.json["scenes"][0]["extras"] = json!({"caustique": {"light_units": "photometric"}});
     let scene = with(&file, LightUnits::Auto);
     assert_eq!((scene.lights[0].intensity.x, scene.warnings.len()), (1.0, 0));
+    assert_eq!(scene.guessed_units, None);
     assert_eq!(intensity(&file, LightUnits::Radiometric), 683.0);
 }
 

@@ -163,7 +163,9 @@ fn glass_is_solid_where_the_mesh_is_closed() {
     assert_eq!(solid, [true, true]);
     assert_eq!(
         warnings,
-        ["mesh \"open\": its material \"glass\" is solid, but the mesh is not closed: light may get lost inside"]
+        [
+            "mesh \"open\": its material \"glass\" is solid, but the mesh is not closed (3 edges have one face only): light may get lost inside; close the holes, or take its thickness away"
+        ]
     );
     assert_eq!(glass_on(both, Glass::Thin, clear.clone()), (vec![false, false], vec![]));
     // A volume extension decides by itself.

@@ -8,12 +8,14 @@ mod runs;
 
 pub use options::ConvergeArgs;
 
-use super::render::{memory, network, plan};
-use super::scene;
+use super::render::plan::{self, Wishes as PlanWishes};
+use super::render::{memory, network};
+use super::scene::{self, Loaded};
 use super::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::combine::{Combiner, Runtime};
 use caustique::error::{Error, Kind, Result};
+use caustique::plan::switch::Removed;
 use caustique::render::Control;
 use caustique::report::crop::{Look, Window};
 use caustique::report::entry::Entry;
@@ -22,6 +24,7 @@ use caustique::report::summary::{Subject, Wishes, find, summarize};
 use caustique::scene::{Scene, View};
 use progress::Reporter;
 use runs::Run;
+use std::collections::HashSet;
 
 /// Seconds of each run where nothing says when to stop.
 const DEFAULT_TIME: f64 = 60.0;
@@ -41,7 +44,7 @@ pub fn run(args: &ConvergeArgs) -> Result<()> {
 
 fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Result<()> {
     let threads = rayon::current_num_threads();
-    let scene = scene::read(&args.scene, threads)?;
+    let Loaded { scene, removed } = scene::read(&args.scene, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = scene.camera(&view)?;
@@ -50,7 +53,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;
-    let (entries, mut combiners) = open(runs, &scene, &camera)?;
+    let (entries, mut combiners) = open(args, runs, (&scene, &camera), &removed)?;
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
     let interrupt = Interrupt::listen()?;
@@ -118,13 +121,23 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
 }
 
 /// Opens the networks and tells what methods miss.
-fn open(runs: Vec<Run>, scene: &Scene, camera: &Camera) -> Result<(Vec<Entry>, Vec<Option<Combiner>>)> {
+fn open(
+    args: &ConvergeArgs,
+    runs: Vec<Run>,
+    (scene, camera): (&Scene, &Camera),
+    removed: &Removed,
+) -> Result<(Vec<Entry>, Vec<Option<Combiner>>)> {
+    let mut told = HashSet::new();
     let mut entries = Vec::new();
     let mut combiners = Vec::new();
-    for Run { mut entry, args } in runs {
-        plan::tell_missed(&args, &plan::plan(&args, scene, camera));
+    for Run { mut entry, args: options } in runs {
+        let wishes =
+            PlanWishes { max_depth: args.max_depth, switches: args.scene.switches(), ..PlanWishes::of(&options) };
+        let plan = plan::plan(&wishes, scene, camera, removed);
+        let new: Vec<String> = plan.warnings.into_iter().filter(|warning| told.insert(warning.clone())).collect();
+        plan::tell(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);
-        let network = network(&args, entry.settings.levels.count).map_err(|mut error| {
+        let network = network(&options, entry.settings.levels.count).map_err(|mut error| {
             if error.kind == Kind::Usage {
                 error.place = place;
             }

@@ -4,16 +4,16 @@ use super::options::ConvergeArgs;
 use super::progress::Reporter;
 use super::runs::{self, Run};
 use crate::cli::progress::duration;
-use crate::cli::render::{Method, plan};
+use crate::cli::render::Method;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
+use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Settings};
 use caustique::report::entry::Metric;
 use caustique::report::reference::{Halves, OwnError, Reference};
 use caustique::scene::Scene;
-use serde_json::Value;
 
 /// Where the reference comes from.
 pub enum Source {
@@ -66,16 +66,8 @@ pub fn source(
 fn own(args: &ConvergeArgs, scene: &Scene, camera: &Camera) -> Result<Box<Settings>> {
     let method = match args.reference_method {
         Some(method) => method,
-        None => {
-            let bdpt = runs::by_method(args, Method::Bdpt)?;
-            let plan = plan::plan(&bdpt.args, scene, camera);
-            let sds = |effect: &Value| effect["name"] == "sds" && effect["present"] == true;
-            if plan["effects"].as_array().is_some_and(|effects| effects.iter().any(sds)) {
-                Method::Vcm
-            } else {
-                Method::Bdpt
-            }
-        }
+        None if Presence::of(scene, camera).has(Effect::Sds) => Method::Vcm,
+        None => Method::Bdpt,
     };
     let mut settings = runs::by_method(args, method)?.entry.settings;
     if settings.method == caustique::render::Method::Pm {

@@ -10,6 +10,7 @@ pub use options::{Method, RenderArgs};
 
 use super::combine::{DEFAULT_MODEL, Named};
 use super::progress::Reporter;
+use super::scene::Loaded;
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Kind, Result};
@@ -42,14 +43,14 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
 fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Result<()> {
     let threads = rayon::current_num_threads();
-    let scene = scene::read(&args.scene, threads)?;
+    let Loaded { scene, removed } = scene::read(&args.scene, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.view())?;
     plan::check_media(args, &scene)?;
     let present = Present::of(&scene);
     self::selection(args, settings, present.volume)?;
     memory::check(settings, camera.size(), channels(settings, present))?;
-    let plan = plan::plan(args, &scene, &camera);
+    let plan = plan::plan(&plan::Wishes::of(args), &scene, &camera, &removed);
     let mut network = network(args, settings.levels.count)?;
     let talk = args.progress.for_people();
     let interrupt = Interrupt::listen()?;
@@ -57,7 +58,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
         say("method: sppm, chosen by auto");
     }
     let mut reporter = Reporter::new(args.progress, settings);
-    plan::tell_missed(args, &plan);
+    plan::tell(&args.scene.path, &plan.warnings);
     let mut rendered = caustique::render::render(&scene, &camera, settings, |progress, _| {
         reporter.report(progress);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
@@ -88,7 +89,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
         set = selection.apply(set)?;
     }
 
-    header.insert("plan".into(), plan);
+    header.insert("plan".into(), json!(plan));
     let name = combined.as_ref().and(network.as_ref()).map(|network| (network.name.as_str(), combining));
     complete(&mut header, args, &scene, combined, cpu_seconds() - cpu_start);
     attributes.insert(exr::ATTRIBUTE, &header)?;

@@ -1,78 +1,57 @@
-//! The plan in the header: the method and why, and for each effect whether the scene calls for it and whether it is simulated.
+//! The plan of a render: from the options to what the library plans, and its warnings told.
 
 use super::options::{Method, RenderArgs};
 use crate::cli::say;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
-use caustique::light::Emitter;
-use caustique::material::Material;
+use caustique::plan::switch::Removed;
+use caustique::plan::{Asked, Plan, Search, Switches};
 use caustique::render;
 use caustique::scene::Scene;
-use serde_json::{Value, json};
+use std::path::Path;
 
-/// Wider lobes focus no light and show no reflections.
-const WIDEST_ROUGHNESS: f32 = 0.45;
+/// Options that decide what a plan says.
+#[derive(Clone, Copy)]
+pub struct Wishes {
+    /// `--method`.
+    pub method: Method,
+    /// `--max-depth`.
+    pub max_depth: Option<u32>,
+    /// `--effects`.
+    pub switches: Switches,
+}
 
-/// Every effect by name: what calls for it (nothing: the scene has none of it), and whether the method simulates it.
-pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
-    let mut worn = vec![false; scene.materials.list.len()];
-    for instance in &scene.shapes.instances {
-        worn[instance.material as usize] = true;
+impl Wishes {
+    /// Those of a render.
+    pub fn of(args: &RenderArgs) -> Wishes {
+        Wishes { method: args.method, max_depth: args.max_depth, switches: args.scene.switches() }
     }
-    let worn: Vec<&Material> =
-        scene.materials.list.iter().zip(worn).filter(|(_, worn)| *worn).map(|(material, _)| material).collect();
-    let by_material = |has: fn(&Material) -> bool| -> Vec<String> {
-        worn.iter().filter(|material| has(material)).map(|material| format!("material \"{}\"", material.name)).collect()
-    };
-    let when = |present: bool, reason: &str| if present { vec![reason.to_string()] } else { vec![] };
-    let emitters = scene.lights.emitters();
-    let lamps = emitters.iter().any(|emitter| matches!(emitter, Emitter::Triangle { .. }));
-    let environment = scene.lights.sky().environment.is_some();
-    let lit = |because: Vec<String>| if emitters.is_empty() { vec![] } else { because };
-    let caustic = lit(by_material(focuses));
-    let media =
-        when(scene.medium.is_some(), "the scene's medium").into_iter().chain(by_material(|m| m.medium.is_some()));
+}
 
-    let method = args.method.chosen();
-    // Segments of the shortest path that shows it; `--max-depth` cuts longer ones.
-    let deep = |segments: u32| args.max_depth.is_none_or(|most| most >= segments);
-    let surfaces = lit(when(!worn.is_empty(), "light falls on surfaces"));
-    let effects = [
-        ("emission", when(lamps || environment, "light sources can be seen"), deep(1)),
-        ("direct", surfaces.clone(), deep(2)),
-        ("indirect", surfaces, deep(3)),
-        ("glossy", lit(by_material(narrow)), deep(2)),
-        ("caustic", caustic.clone(), deep(3) && reaches(method, "caustic", scene)),
-        ("sds", caustic, deep(4) && reaches(method, "sds", scene)),
-        ("volume", media.collect(), deep(if scene.survey.scattering { 2 } else { 1 })),
-        ("dispersion", by_material(|m| m.transmission > 0.0 && m.dispersion > 0.0), false),
-        ("depth_of_field", when(camera.has_lens(), "the camera has an aperture"), true),
-        ("environment", when(environment, "light comes from all around"), true),
-        ("alpha", when(scene.survey.alpha, "materials have cut-outs or blend"), true),
-        ("textures", when(!scene.materials.textures.is_empty(), "materials have textures"), true),
-    ];
-    let effects = effects.map(|(name, because, possible)| {
-        let present = !because.is_empty();
-        json!({"name": name, "present": present, "simulated": present && possible, "because": because})
-    });
-    let because = match args.method {
+/// The plan of a render of a scene that was built without what is `removed`.
+pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) -> Plan {
+    let method = wishes.method.chosen();
+    let because = match wishes.method {
         Method::Auto => {
             "auto: the one method here that reaches every class of light paths, caustics behind glass and in mirrors too"
         }
         _ => "asked for",
     };
-    json!({"method": method.name(), "because": because, "effects": effects})
+    let (search, max_depth, switches) = (search(method), wishes.max_depth, wishes.switches);
+    Plan::new(scene, camera, &Asked { method: method.name(), because, search, max_depth, switches, removed })
 }
 
-/// Whether the method finds all light of such an effect. A lamp without size is not hit by any path: without photons it shows no light behind
-/// glass, where it could be neither connected to nor run into.
-fn reaches(method: render::Method, effect: &str, scene: &Scene) -> bool {
-    let sizeless = scene.lights.emitters().iter().any(Emitter::is_delta);
-    match (method, effect) {
-        (render::Method::Path, _) => !sizeless,
-        (render::Method::Light, "sds") => false,
-        (render::Method::Bdpt, "sds") => !sizeless,
-        _ => true,
+/// How a method looks for light.
+fn search(method: render::Method) -> Search {
+    use render::Method as M;
+    match method {
+        M::Path => Search::EyePaths,
+        M::Light => Search::LightPaths,
+        M::Bdpt => Search::Connections,
+        M::Pm => Search::Map,
+        M::Ppm | M::Sppm | M::Appm | M::Cppm => Search::Photons,
+        M::Bpm => Search::Merging,
+        M::Vcm => Search::ConnectionsAndMerging,
     }
 }
 
@@ -90,31 +69,9 @@ pub fn check_media(args: &RenderArgs, scene: &Scene) -> Result<()> {
     Err(error.hint("choose --method sppm, cppm, vcm, bdpt or path"))
 }
 
-/// Warns of effects that the scene calls for and the method chosen does not find.
-pub fn tell_missed(args: &RenderArgs, plan: &Value) {
-    let method = args.method.chosen();
-    for effect in plan["effects"].as_array().into_iter().flatten() {
-        let name = effect["name"].as_str().unwrap_or_default();
-        if matches!(name, "caustic" | "sds")
-            && effect["present"] == true
-            && effect["simulated"] == false
-            && args.max_depth.is_none()
-        {
-            let scene = args.scene.path.display();
-            say(&format!(
-                "warning: {scene}: --method {} does not find all light of the effect '{name}'",
-                method.name()
-            ));
-        }
+/// Prints what the plan warns of.
+pub fn tell(scene: &Path, warnings: &[String]) {
+    for warning in warnings {
+        say(&format!("warning: {}: {warning}", scene.display()));
     }
-}
-
-/// Reflects or bends light into narrow lobes.
-fn narrow(material: &Material) -> bool {
-    material.roughness < WIDEST_ROUGHNESS || material.metallic_roughness_texture.is_some() || material.clearcoat > 0.0
-}
-
-/// Mirrors and glass, narrow enough to focus light.
-fn focuses(material: &Material) -> bool {
-    narrow(material) && (material.transmission > 0.0 || material.metallic >= 0.5)
 }

@@ -5,7 +5,7 @@ use super::extras::{self, CameraExtras, LightExtras, Units};
 use super::{LightUnits, fault};
 use crate::error::Result;
 use crate::math::{DAffine3, Rgb};
-use crate::scene::description::{CameraDescription, Projection, PunctualKind, PunctualLight};
+use crate::scene::description::{CameraDescription, GuessedUnits, Projection, PunctualKind, PunctualLight};
 use gltf::json::camera::Type;
 use gltf::json::validation::Checked;
 use serde::Deserialize;
@@ -53,21 +53,26 @@ fn one() -> f32 {
     1.0
 }
 
-/// What divides intensities to make them radiometric.
-pub(super) fn divisor(document: &Document, units: LightUnits, said: Option<Units>, warnings: &mut Vec<String>) -> f32 {
+/// What divides intensities to make them radiometric; and whether that is a guess.
+pub(super) fn divisor(
+    document: &Document,
+    units: LightUnits,
+    said: Option<Units>,
+    warnings: &mut Vec<String>,
+) -> (f32, Option<GuessedUnits>) {
     match (units, said) {
-        (LightUnits::Radiometric, _) | (LightUnits::Auto, Some(Units::Radiometric)) => 1.0,
-        (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => EFFICACY,
+        (LightUnits::Radiometric, _) | (LightUnits::Auto, Some(Units::Radiometric)) => (1.0, None),
+        (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => (EFFICACY, None),
         (LightUnits::Auto, None) => {
             let generator = document.raw["asset"]["generator"].as_str();
-            if generator.is_some_and(|g| g.starts_with("Khronos glTF Blender I/O")) {
-                return EFFICACY;
+            let photometric = generator.is_some_and(|g| g.starts_with("Khronos glTF Blender I/O"));
+            let from = generator.map_or("the file's generator".into(), |g| format!("generator \"{g}\""));
+            if !photometric {
+                warnings.push(format!(
+                    "{from} does not tell the unit of lamps: they are taken in W/sr and W/m2 (--light-units decides)"
+                ));
             }
-            let who = generator.map_or("the file's generator".into(), |g| format!("generator \"{g}\""));
-            warnings.push(format!(
-                "{who} does not tell the unit of lamps: they are taken in W/sr and W/m2 (--light-units decides)"
-            ));
-            1.0
+            (if photometric { EFFICACY } else { 1.0 }, Some(GuessedUnits { photometric, from }))
         }
     }
 }

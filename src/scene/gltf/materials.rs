@@ -1,14 +1,13 @@
 //! The materials that a scene uses, each once, or twice where its closed meshes are solid and its open ones thin.
 
-use super::Glass;
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
 use super::texture::Textures;
 use super::topology::Solid;
+use super::{Glass, counted};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
-use crate::texture::TextureRef;
 use std::collections::HashMap;
 
 /// Loads materials as meshes call for them.
@@ -58,9 +57,13 @@ impl Library {
                 Glass::Thin => false,
             });
         if solid && !closed {
-            let why = match bounds.flipped {
-                true => "part of its faces is turned over: recalculate its normals",
-                false => "the mesh is not closed: light may get lost inside",
+            let why = match (bounds.flipped, bounds.rim) {
+                (true, _) => "part of its faces is turned over: recalculate its normals".to_string(),
+                (false, 0) => "edges join more than two of its faces: light may get lost inside".into(),
+                (false, rim) => format!(
+                    "the mesh is not closed ({}): light may get lost inside; close the holes, or take its thickness away",
+                    counted(rim, "edge has one face only", "edges have one face only")
+                ),
             };
             warnings.push(format!("mesh \"{}\": its {place} is solid, but {why}", mesh.name));
         }
@@ -103,28 +106,9 @@ fn default() -> Material {
     Material { name: "default".into(), ..Material::default() }
 }
 
-fn uses(material: &Material) -> impl Iterator<Item = TextureRef> {
-    [
-        material.base_color_texture,
-        material.metallic_roughness_texture,
-        material.normal_texture.map(|(t, _)| t),
-        material.emission_texture,
-        material.transmission_texture,
-        material.specular_texture,
-        material.specular_color_texture,
-        material.clearcoat_texture,
-        material.clearcoat_roughness_texture,
-        material.sheen_color_texture,
-        material.sheen_roughness_texture,
-        material.anisotropy_texture,
-    ]
-    .into_iter()
-    .flatten()
-}
-
 fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &mut Vec<String>) {
     for set in 0..2 {
-        if mesh.uvs[set].is_empty() && uses(material).any(|t| usize::from(t.set) == set) {
+        if mesh.uvs[set].is_empty() && material.textures().any(|t| usize::from(t.set) == set) {
             warnings.push(format!(
                 "mesh \"{}\": it lacks the texture coordinates {set} that its {place} reads; one texel covers it",
                 mesh.name

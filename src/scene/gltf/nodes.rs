@@ -206,8 +206,13 @@ impl Reader<'_> {
         }
         if let Some(reference) = extension::<LightReference>(raw, "KHR_lights_punctual", place)? {
             let (units, said) = (self.options.light_units, self.scene.light_units);
-            let warnings = &mut self.out.warnings;
-            let divisor = *self.divisor.get_or_insert_with(|| lights::divisor(document, units, said, warnings));
+            let out = &mut self.out;
+            let divisor = *self.divisor.get_or_insert_with(|| {
+                let (divisor, guessed) = lights::divisor(document, units, said, &mut out.warnings);
+                out.guessed_units = guessed;
+                divisor
+            });
+            let warnings = &mut out.warnings;
             let light = lights::light(document, reference.light as usize, (&name, raw), to_world, divisor, warnings);
             self.out.lights.push(light.map_err(|e| e.within(place))?);
         }

@@ -11,6 +11,8 @@ pub(super) struct Solid {
     pub(super) closed: bool,
     /// Every edge is shared by two triangles, but some run along it in the same direction: part of the faces is turned over.
     pub(super) flipped: bool,
+    /// Edges of one triangle alone: the rims of holes.
+    pub(super) rim: usize,
     /// Volume inside (m3); negative when the front faces look inwards. Meaningless for an open surface.
     pub(super) volume: f64,
 }
@@ -48,7 +50,8 @@ pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
     let same = |a: &(u32, u32, bool), b: &(u32, u32, bool)| (a.0, a.1) == (b.0, b.1);
     let paired = !edges.is_empty() && edges.chunk_by(same).all(|edge| edge.len() == 2);
     let opposite = edges.chunk_by(same).all(|edge| edge.first().map(|e| e.2) != edge.last().map(|e| e.2));
-    Solid { closed: paired && opposite, flipped: paired && !opposite, volume }
+    let rim = edges.chunk_by(same).filter(|edge| edge.len() == 1).count();
+    Solid { closed: paired && opposite, flipped: paired && !opposite, rim, volume }
 }
 
 #[cfg(test)]
@@ -72,11 +75,11 @@ mod tests {
         let mut open = whole.clone();
         open.triangles.pop();
         let found = solid(&[&open]);
-        assert!(!found.closed && !found.flipped);
+        assert!(!found.closed && !found.flipped && found.rim == 3);
         let mut flipped = whole.clone();
         flipped.triangles[3].swap(0, 1);
         let found = solid(&[&flipped]);
-        assert!(!found.closed && found.flipped);
+        assert!(!found.closed && found.flipped && found.rim == 0);
         let mut inside_out = whole.clone();
         inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         let found = solid(&[&inside_out]);

@@ -1,0 +1,185 @@
+//! Lamps whose light does not come through, or is out of proportion.
+
+use super::super::names::cut;
+use super::super::{Asked, Effect};
+use super::rays;
+use crate::light::Emitter;
+use crate::math::{Vec3, luminance};
+use crate::scene::Scene;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f32::consts::PI;
+
+/// Lumens of a watt, as exporters count.
+const EFFICACY: f32 = 683.0;
+/// Lights that are so many times out of proportion as the units differ, within this factor.
+const ABOUT: f32 = 5.0;
+/// Lights that are looked at.
+const LIGHTS: usize = 64;
+/// Directions from a point light.
+const DIRECTIONS: u32 = 256;
+/// Surfaces that light meets one after another, before it counts as enclosed.
+const BOUNCES: usize = 4;
+/// Places on a surface that glows, and directions from each.
+const PLACES: (usize, u32) = (8, 64);
+
+/// Lamps in lumens beside surfaces and environments in watts, or the other way round: the units are a guess, and by the other guess the lights
+/// were in proportion. Lamps are compared with surfaces, suns with the environment.
+pub(super) fn units(scene: &Scene) -> Option<String> {
+    let guessed = scene.guessed_units.as_ref()?;
+    let sky = scene.lights.sky();
+    let (mut lamps, mut surfaces, mut suns) = (0.0, 0.0, 0.0);
+    for emitter in scene.lights.emitters() {
+        match emitter {
+            Emitter::Triangle { instance, .. } => {
+                let own = scene.shapes.instances[*instance as usize].object < scene.first_lamp;
+                *if own { &mut surfaces } else { &mut lamps } += emitter.power(sky) as f32;
+            }
+            Emitter::Point { .. } | Emitter::Spot { .. } => lamps += emitter.power(sky) as f32,
+            Emitter::Sun { irradiance, .. } => suns += luminance(*irradiance),
+            Emitter::Environment => {}
+        }
+    }
+    let around = sky.environment.as_ref().map_or(0.0, |environment| PI * luminance(environment.mean()));
+    let about = EFFICACY / ABOUT..EFFICACY * ABOUT;
+    let pairs =
+        [(lamps, "its lamps", surfaces, "its surfaces that glow"), (suns, "its suns", around, "the environment")];
+    let (strong, weak, many) = pairs.into_iter().find_map(|(a, named_a, b, named_b)| {
+        // Taken for watts they would be too strong; taken for lumens, too weak.
+        let many = if guessed.photometric { b / a } else { a / b };
+        let (strong, weak) = if guessed.photometric { (named_b, named_a) } else { (named_a, named_b) };
+        about.contains(&many).then_some((strong, weak, many))
+    })?;
+    let (taken, other) = if guessed.photometric { ("lumens", "radiometric") } else { ("watts", "photometric") };
+    Some(format!(
+        "the light of {strong} is {many:.0} times that of {weak}: the numbers of lamps were taken for {taken}, going by {}; if that is wrong, use --light-units {other}",
+        guessed.from
+    ))
+}
+
+/// A light, and the rays that leave it.
+struct Source {
+    name: String,
+    /// Object that glows.
+    object: Option<u32>,
+    rays: Vec<(Vec3, Vec3)>,
+}
+
+/// Lamps and surfaces that glow; light from infinity comes from outside.
+fn sources(scene: &Scene) -> Vec<Source> {
+    let mut sources = Vec::new();
+    let mut glowing: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    let sky = scene.lights.sky();
+    for (index, emitter) in scene.lights.emitters().iter().enumerate().filter(|(_, e)| e.power(sky) > 0.0) {
+        let from = |p: Vec3, shines: &dyn Fn(&Vec3) -> bool| Source {
+            name: scene.light_name(index),
+            object: None,
+            rays: rays::directions(DIRECTIONS).filter(shines).map(|d| (p, d)).collect(),
+        };
+        match emitter {
+            Emitter::Point { p, .. } => sources.push(from(*p, &|_| true)),
+            Emitter::Spot { p, frame, cos_outer, .. } => sources.push(from(*p, &|d| frame.n.dot(*d) > *cos_outer)),
+            Emitter::Triangle { instance, .. } => glowing.entry(*instance).or_default().push(index),
+            Emitter::Sun { .. } | Emitter::Environment => {}
+        }
+        if sources.len() >= LIGHTS {
+            break;
+        }
+    }
+    for (instance, triangles) in glowing.into_iter().take(LIGHTS) {
+        let mut rays = Vec::new();
+        for at in rays::spread(triangles.len(), PLACES.0) {
+            let Emitter::Triangle { primitive, two_sided, .. } = &scene.lights.emitters()[triangles[at]] else {
+                continue;
+            };
+            let Some(place) = scene.shapes.surface(instance, *primitive, [1.0 / 3.0; 2]) else { continue };
+            let shines = |d: &Vec3| *two_sided || place.ng.dot(*d) > 0.0;
+            rays.extend(rays::directions(PLACES.1).filter(shines).map(|d| (place.spawn(d), d)));
+        }
+        let object = Some(scene.shapes.instances[instance as usize].object);
+        sources.push(Source { name: scene.light_name(triangles[0]), object, rays });
+    }
+    sources
+}
+
+/// Lamps in a casing that lets no light out. In a room without windows no light gets out, either: but there the camera is among what it lights.
+pub(super) fn encased(scene: &Scene, camera: Vec3) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for Source { name, object, rays } in sources(scene) {
+        let Some(mut casing) = enclosure(scene, rays) else { continue };
+        casing.retain(|lit| Some(*lit) != object);
+        if casing.is_empty() || within(scene, &casing, camera) {
+            continue;
+        }
+        let names: Vec<String> = casing.iter().map(|lit| format!("\"{}\"", scene.objects[*lit as usize])).collect();
+        warnings.push(format!(
+            "{name}: all its light stays within {}, and the camera is outside; make an opening, or give the casing a material that transmits light",
+            cut(&names)
+        ));
+    }
+    warnings
+}
+
+/// All opaque objects that light meets which goes on from surface to surface; `None` if some gets away.
+fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>> {
+    let onward: Vec<Vec3> = rays::directions(DIRECTIONS).collect();
+    let mut met = BTreeSet::new();
+    for bounce in 0..BOUNCES {
+        for (index, ray) in rays.iter_mut().enumerate() {
+            let (origin, direction) = *ray;
+            let surface = rays::first_opaque(scene, origin, direction, f32::INFINITY, index as u32)?;
+            met.insert(scene.shapes.instances[surface.instance as usize].object);
+            // Any direction on the side that the ray came from; neighbours go on in different ones.
+            let front = if direction.dot(surface.ng) < 0.0 { surface.ng } else { -surface.ng };
+            let next = onward[(97 * index + 41 * bounce) % onward.len()];
+            let next = if next.dot(front) < 0.0 { -next } else { next };
+            *ray = (surface.spawn(next), next);
+        }
+    }
+    (!rays.is_empty()).then_some(met)
+}
+
+/// Whether a point is in the box around objects.
+fn within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for instance in scene.shapes.instances.iter().filter(|instance| objects.contains(&instance.object)) {
+        for &q in &scene.shapes.meshes[instance.mesh as usize].positions {
+            let q = instance.point(q);
+            (low, high) = (low.min(q), high.max(q));
+        }
+    }
+    p.cmpge(low).all() && p.cmple(high).all()
+}
+
+/// Lamps without size that shine through glass, where the method does not find them.
+pub(super) fn behind_glass(scene: &Scene, asked: &Asked) -> Vec<String> {
+    if asked.search.finds(Effect::Caustic, true, scene.survey.scattering) {
+        return vec![];
+    }
+    let mut warnings = Vec::new();
+    for source in sources(scene).into_iter().filter(|source| source.object.is_none()) {
+        let mut panes = BTreeMap::new();
+        let n = source.rays.len();
+        for (token, (origin, direction)) in source.rays.into_iter().enumerate() {
+            let Some(surface) = rays::first(scene, origin, direction, f32::INFINITY, token as u32) else { continue };
+            let material = &scene.materials.list[surface.material as usize];
+            if material.transmission > 0.0 && (material.thin || material.ior != 1.0) {
+                let name = format!("\"{}\"", scene.shapes.instances[surface.instance as usize].name);
+                *panes.entry(name).or_insert(0usize) += 1;
+            }
+        }
+        let through: usize = panes.values().sum();
+        // A little glass in a corner of its light is no mistake.
+        if 2 * through < n || through == 0 {
+            continue;
+        }
+        let names: Vec<String> = panes.into_keys().collect();
+        warnings.push(format!(
+            "{}: {} % of its light goes through the glass of {}, and --method {} cannot find a lamp without size there; choose --method sppm or vcm, or give it a radius",
+            source.name,
+            100 * through / n,
+            cut(&names),
+            asked.method
+        ));
+    }
+    warnings
+}

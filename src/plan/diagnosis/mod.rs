@@ -1,0 +1,25 @@
+//! Why is there no caustic? What looks like a mistake in the scene, told from the scene alone, each with a remedy.
+//!
+//! What the file itself shows (open and inverted meshes, a scene without light) is told when it is read and built. Where rays are asked here, they go in
+//! fixed directions and their number is fixed: the same scene gets the same answer everywhere.
+
+mod glass;
+mod lamps;
+mod rays;
+
+use super::Asked;
+use crate::camera::Camera;
+use crate::scene::Scene;
+
+/// All that looks like a mistake.
+pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<String> {
+    let mut warnings = glass::thin(scene);
+    warnings.extend(glass::wide(scene));
+    warnings.extend(lamps::units(scene));
+    if !scene.lights.is_empty() {
+        warnings.extend(lamps::encased(scene, camera.position()));
+        warnings.extend(lamps::behind_glass(scene, asked));
+        warnings.extend(glass::unlit(scene));
+    }
+    warnings
+}

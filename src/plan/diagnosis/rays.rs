@@ -1,0 +1,70 @@
+//! Rays in fixed directions, and what they meet.
+
+use crate::geometry::Surface;
+use crate::math::Vec3;
+use crate::scene::Scene;
+use crate::trace::Ray;
+
+/// A ray through more surfaces than this that let it pass is given up.
+const MOST_SURFACES: usize = 64;
+
+/// Directions spread evenly over the sphere: a spiral that turns by the golden angle.
+pub(super) fn directions(n: u32) -> impl Iterator<Item = Vec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    (0..n).map(move |i| {
+        let y = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(n);
+        let (sin, cos) = (golden * f64::from(i)).sin_cos();
+        let r = (1.0 - y * y).sqrt();
+        Vec3::new((r * cos) as f32, y as f32, (r * sin) as f32)
+    })
+}
+
+/// The first surface along a ray; `token` decides about cut-outs.
+pub(super) fn first(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
+    let hit = scene.tracer.intersect(&Ray { origin, direction, tmax, token })?;
+    scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)
+}
+
+/// The first surface along a ray that lets no light through. What lets light through does not bend the ray.
+pub(super) fn first_opaque(
+    scene: &Scene,
+    mut origin: Vec3,
+    direction: Vec3,
+    mut tmax: f32,
+    token: u32,
+) -> Option<Surface> {
+    for _ in 0..MOST_SURFACES {
+        let surface = first(scene, origin, direction, tmax, token)?;
+        if scene.materials.list[surface.material as usize].transmission == 0.0 {
+            return Some(surface);
+        }
+        let next = surface.spawn(direction);
+        tmax -= (next - origin).dot(direction);
+        origin = next;
+        if tmax <= 0.0 {
+            break;
+        }
+    }
+    None
+}
+
+/// At most `n` of `0..len`, evenly spread.
+pub(super) fn spread(len: usize, n: usize) -> impl Iterator<Item = usize> {
+    let n = n.min(len);
+    (0..n).map(move |i| (2 * i + 1) * len / (2 * n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_are_even_and_samples_are_spread() {
+        let all: Vec<Vec3> = directions(256).collect();
+        assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-6));
+        assert!((all.iter().copied().sum::<Vec3>() / 256.0).length() < 0.01);
+        assert_eq!(spread(3, 8).collect::<Vec<_>>(), [0, 1, 2]);
+        assert_eq!(spread(100, 4).collect::<Vec<_>>(), [12, 37, 62, 87]);
+        assert_eq!(spread(0, 4).count(), 0);
+    }
+}

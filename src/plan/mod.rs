@@ -1,0 +1,147 @@
+//! The plan of a render: which effects the scene calls for, because of what, which are simulated and how, and what looks like a mistake.
+//!
+//! `presence` says what the scene calls for, `search` what a method finds of it, [`switch`] leaves out what the user does without, `diagnosis` says why
+//! something may be missing that was hoped for. None of it traces a path: what effects weigh and cost is measured by a pilot, which fills
+//! the figures of [`EffectPlan`].
+
+mod diagnosis;
+mod effect;
+mod names;
+mod presence;
+mod search;
+pub mod switch;
+
+pub use effect::{Effect, EffectSet, Switches};
+pub use presence::Presence;
+pub use search::Search;
+
+use crate::camera::Camera;
+use crate::scene::Scene;
+use serde::Serialize;
+use switch::Removed;
+
+/// One effect of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectPlan {
+    /// Which one.
+    #[serde(rename = "name")]
+    pub effect: Effect,
+    /// The scene calls for it.
+    pub present: bool,
+    /// It is simulated.
+    pub simulated: bool,
+    /// What calls for it, by name.
+    pub because: Vec<String>,
+    /// What brings it into the picture, where it is simulated.
+    pub by: Option<&'static str>,
+    /// Its share of the picture's light, 0 to 1; `None` where nothing has measured it.
+    pub energy: Option<f64>,
+    /// Core-seconds that it takes of an iteration.
+    pub seconds_per_iteration: Option<f64>,
+    /// Relative error (the root of relMSE) of the picture without it.
+    pub error_if_off: Option<f64>,
+}
+
+/// What a render does and leaves, and why.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// The scene's file.
+    pub scene: String,
+    /// How light is found.
+    pub method: String,
+    /// Why that way.
+    pub because: String,
+    /// All effects, in their order.
+    pub effects: Vec<EffectPlan>,
+    /// What is missing from the picture and what may be a mistake in the scene, each with a remedy. What reading the scene has found is in
+    /// [`Scene::warnings`].
+    pub warnings: Vec<String>,
+    #[serde(skip)]
+    off: EffectSet,
+}
+
+/// What a plan is made for.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// The method's name.
+    pub method: &'a str,
+    /// Why it was chosen.
+    pub because: &'a str,
+    /// How it looks for light.
+    pub search: Search,
+    /// Longest light path in segments.
+    pub max_depth: Option<u32>,
+    /// Effects asked for by name.
+    pub switches: Switches,
+    /// What the scene was built without, because of them.
+    pub removed: &'a Removed,
+}
+
+impl Plan {
+    /// Plans a render of a scene seen by a camera.
+    pub fn new(scene: &Scene, camera: &Camera, asked: &Asked) -> Plan {
+        let presence = Presence::of(scene, camera);
+        let sizeless = Presence::has_sizeless_lights(scene);
+        let finds = |effect| asked.search.finds(effect, sizeless, scene.survey.scattering);
+        let plan = |effect: Effect| {
+            let removed = asked.removed.because(effect);
+            let because = if removed.is_empty() { presence.because(effect) } else { removed }.to_vec();
+            let present = !because.is_empty();
+            let deep = asked.max_depth.is_none_or(|most| most >= shortest(effect, scene));
+            let simulated = present && deep && finds(effect) && !asked.switches.off.has(effect);
+            EffectPlan {
+                effect,
+                present,
+                simulated,
+                because,
+                by: simulated.then(|| asked.search.carrier(effect, scene.survey.scattering)),
+                energy: None,
+                seconds_per_iteration: None,
+                error_if_off: None,
+            }
+        };
+        let effects: Vec<EffectPlan> = Effect::ALL.into_iter().map(plan).collect();
+        let mut warnings = Vec::new();
+        for EffectPlan { effect, because, present, .. } in &effects {
+            let (name, off) = (effect.name(), asked.switches.off.has(*effect));
+            if off && *present {
+                warnings.push(format!("--effects -{name}: left out, though called for by {}", because.join("; ")));
+            } else if *present && !finds(*effect) && asked.max_depth.is_none() && *effect != Effect::Dispersion {
+                // Dispersion, which no method simulates, was told of when the scene was built.
+                warnings.push(format!("--method {} does not find all light of the effect '{name}'", asked.method));
+            } else if asked.switches.on.has(*effect) && !present {
+                warnings.push(format!("--effects +{name}: nothing in the scene calls for it"));
+            }
+        }
+        warnings.extend(diagnosis::warnings(scene, camera, asked));
+        Plan {
+            scene: scene.source.display().to_string(),
+            method: asked.method.into(),
+            because: asked.because.into(),
+            effects,
+            warnings,
+            off: asked.switches.off,
+        }
+    }
+
+    /// One of the effects.
+    pub fn effect(&self, effect: Effect) -> &EffectPlan {
+        &self.effects[effect as usize]
+    }
+
+    /// Classes of light paths that the user does without. The other effects switched off are gone from the scene itself.
+    pub fn classes_off(&self) -> EffectSet {
+        self.off.classes()
+    }
+}
+
+/// Segments of the shortest path that shows an effect; a depth limit cuts longer ones.
+fn shortest(effect: Effect, scene: &Scene) -> u32 {
+    match effect {
+        Effect::Direct | Effect::Glossy => 2,
+        Effect::Indirect | Effect::Caustic => 3,
+        Effect::Sds => 4,
+        Effect::Volume if scene.survey.scattering => 2,
+        _ => 1,
+    }
+}

@@ -1,0 +1,55 @@
+//! How a method looks for light, as far as that decides which effects it finds.
+
+use super::effect::Effect;
+
+/// Kinds of methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Search {
+    /// Paths from the eye, connected to lights.
+    EyePaths,
+    /// Paths from the lights, connected to the eye.
+    LightPaths,
+    /// Both, connected to each other.
+    Connections,
+    /// Eye paths that gather the photons of one map, on surfaces.
+    Map,
+    /// Eye paths that gather photons, on surfaces and in media.
+    Photons,
+    /// Both, merged where they meet, on surfaces.
+    Merging,
+    /// Both, connected and merged.
+    ConnectionsAndMerging,
+}
+
+impl Search {
+    /// Whether it finds all light of an effect. A light without size is hit by no path: without photons it shows no light behind glass, where it
+    /// could be neither connected to nor run into.
+    pub(super) fn finds(self, effect: Effect, sizeless_lights: bool, media_scatter: bool) -> bool {
+        match (self, effect) {
+            (_, Effect::Dispersion) => false,
+            (Search::EyePaths, Effect::Caustic | Effect::Sds) => !sizeless_lights,
+            (Search::LightPaths, Effect::Sds) => false,
+            (Search::Connections, Effect::Sds) => !sizeless_lights,
+            (Search::Map | Search::Merging, Effect::Volume) => !media_scatter,
+            _ => true,
+        }
+    }
+
+    /// What brings an effect into the picture.
+    pub(super) fn carrier(self, effect: Effect, media_scatter: bool) -> &'static str {
+        let gathers = matches!(self, Search::Map | Search::Photons);
+        match (effect, self) {
+            (Effect::Environment | Effect::Alpha | Effect::Textures | Effect::Dispersion, _) => "all paths",
+            (Effect::Volume, _) if !media_scatter => "all paths",
+            (_, Search::LightPaths) => "light paths",
+            (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "eye paths",
+            (Effect::Direct, Search::EyePaths | Search::Map | Search::Photons) => "connections to lights",
+            (_, Search::EyePaths) => "eye paths",
+            (Effect::Caustic | Effect::Sds, Search::ConnectionsAndMerging) => "photons",
+            (_, Search::Merging) => "photons",
+            _ if gathers => "photons",
+            (_, Search::Connections) => "connections",
+            _ => "connections and photons",
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! `caustique plan`, and what `--effects` leaves out.
+
+use crate::Folder;
+use serde_json::{Value, json};
+
+/// The whole table of a small scene, word for word.
+#[test]
+fn the_plan_of_a_scene() {
+    let folder = Folder::new();
+    let outcome = folder.run("plan scene.glb --method bdpt --env 0.5,0.5,0.5 --effects -textures,+alpha");
+    let table = r#"scene.glb: bdpt, asked for
+  effect          simulated by  because
+  emission        eye paths     the environment
+  direct          connections   light "Lamp"
+                                the environment
+  indirect        connections   "Floor", "Mirror" under light "Lamp", the environment
+  glossy          eye paths     material "silver" on "Mirror"
+  caustic         connections   material "silver" on "Mirror" under light "Lamp", the environment
+  sds             left out      caustics seen in material "silver" on "Mirror"
+  volume          -             nothing in the scene calls for it
+  dispersion      -             nothing in the scene calls for it
+  depth_of_field  -             nothing in the scene calls for it
+  environment     all paths     the environment
+  alpha           -             nothing in the scene calls for it
+  textures        -             nothing in the scene calls for it
+warning: --method bdpt does not find all light of the effect 'sds'
+warning: --effects +alpha: nothing in the scene calls for it
+"#;
+    assert_eq!((outcome.code, outcome.stdout, outcome.stderr), (Some(0), table.to_string(), String::new()));
+    assert_eq!(folder.files(), [""; 0]);
+}
+
+/// The keys that scripts read, and their order in the list; a switched-off effect is present and not simulated.
+#[test]
+fn the_plan_as_json() {
+    let folder = Folder::new();
+    let outcome = folder.run("plan scene.glb --json --env 1,1,1 --effects -environment");
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
+    let plan = outcome.json();
+    assert_eq!((&plan["scene"], &plan["method"]), (&"scene.glb".into(), &"sppm".into()));
+    assert!(plan["because"].as_str().is_some_and(|because| because.starts_with("auto: ")), "{plan}");
+    let effects = plan["effects"].as_array().expect("a list");
+    let names: Vec<&str> = effects.iter().filter_map(|effect| effect["name"].as_str()).collect();
+    let all = "emission direct indirect glossy caustic sds volume dispersion depth_of_field environment alpha textures";
+    assert_eq!(names.join(" "), all);
+    let effect = |name: &str| effects.iter().find(|effect| effect["name"] == name).expect("it is listed");
+    let unmeasured = |mut effect: Value| {
+        for figure in ["energy", "seconds_per_iteration", "error_if_off"] {
+            effect[figure] = Value::Null;
+        }
+        effect
+    };
+    let caustic = json!({"name": "caustic", "present": true, "simulated": true, "by": "photons", "energy": null,
+        "because": ["material \"silver\" on \"Mirror\" under light \"Lamp\""], "seconds_per_iteration": null, "error_if_off": null});
+    assert_eq!(unmeasured(effect("caustic").clone()), caustic);
+    let environment = effect("environment");
+    assert_eq!((&environment["present"], &environment["simulated"]), (&true.into(), &false.into()));
+    assert_eq!((&environment["by"], &environment["because"]), (&Value::Null, &json!(["the environment"])));
+    assert_eq!(effect("volume")["present"], false);
+    assert_eq!(plan["warnings"], json!(["--effects -environment: left out, though called for by the environment"]));
+}
+
+/// A render without an effect is the render of a scene that never had it, to the last bit; its header tells what was left out.
+#[test]
+fn an_effect_switched_off_is_as_if_it_were_not_there() {
+    let folder = Folder::new();
+    folder.render("-o plain.exr --iterations 2 --no-combine");
+    let outcome = folder.render("-o off.exr --iterations 2 --no-combine --env 1,1,1 --effects -environment");
+    let warning = "warning: scene.glb: --effects -environment: left out, though called for by the environment\n";
+    assert!(outcome.stderr.contains(warning), "{}", outcome.stderr);
+    let ((plain, _), (off, header)) = (folder.read("plain.exr"), folder.read("off.exr"));
+    for (a, b) in plain.layers.iter().zip(&off.layers) {
+        assert!(a.name == b.name && a.planes == b.planes, "{}", a.name);
+    }
+    assert_eq!(header["arguments"]["effects"], "-environment");
+    assert_eq!(
+        header["plan"]["warnings"],
+        json!(["--effects -environment: left out, though called for by the environment"])
+    );
+}
+
+/// A camera that is not there, and --strict.
+#[test]
+fn plans_fail_as_renders_do() {
+    let folder = Folder::new();
+    let outcome = folder.run("plan scene.glb --camera Top");
+    assert_eq!(
+        (outcome.code, outcome.stderr.as_str()),
+        (Some(2), "scene.glb: there is no camera \"Top\"\nhint: it has \"Camera\", \"Side\"\n")
+    );
+    crate::support::glb::write(&folder.path("dark.glb"), false);
+    let outcome = folder.run("plan dark.glb --strict --json");
+    assert_eq!((outcome.code, outcome.json()["warnings"].as_array().map(Vec::len)), (Some(1), Some(1)));
+    assert!(outcome.stderr.starts_with("dark.glb: 1 thing is ignored or approximated"), "{}", outcome.stderr);
+}

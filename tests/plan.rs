@@ -1,0 +1,39 @@
+//! What a scene calls for, what of it can be switched off, and what looks like a mistake in it.
+
+mod support;
+
+#[path = "plan/diagnosis.rs"]
+mod diagnosis;
+#[path = "plan/presence.rs"]
+mod presence;
+#[path = "plan/switch.rs"]
+mod switch;
+
+use caustique::math::{DVec3, Vec3};
+use caustique::plan::switch::Removed;
+use caustique::plan::{Asked, Plan, Search, Switches};
+use caustique::scene::Description;
+use support::scenes::{add, build, look_at, matte, quad, square};
+
+/// A grey floor, and a camera that looks at it from above.
+fn floor() -> Description {
+    let mut description = Description::default();
+    let plane = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::new(0.0, 0.0, 8.0), Vec3::new(8.0, 0.0, 0.0));
+    add(&mut description, "Floor", plane, matte(0.5, 0.0));
+    description.cameras = vec![look_at(DVec3::new(0.0, 5.0, 6.0), DVec3::ZERO, 50.0)];
+    description
+}
+
+/// The plan of a scene by a kind of method.
+fn plan_by(description: Description, search: Search) -> Plan {
+    let scene = build(description);
+    let camera = scene.camera(&square(64)).expect("there is a camera");
+    let removed = Removed::default();
+    let asked =
+        Asked { method: "any", because: "", search, max_depth: None, switches: Switches::default(), removed: &removed };
+    Plan::new(&scene, &camera, &asked)
+}
+
+fn plan(description: Description) -> Plan {
+    plan_by(description, Search::Photons)
+}

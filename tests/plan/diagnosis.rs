@@ -1,0 +1,201 @@
+//! What looks like a mistake is told, with its name and a remedy; what does not is not.
+
+use super::{floor, plan, plan_by};
+use crate::support::scenes::{add, cuboid, glass, matte, point_light, quad, sphere};
+use caustique::geometry::Mesh;
+use caustique::material::Material;
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::plan::Search;
+use caustique::scene::Description;
+use caustique::scene::description::{
+    EnvironmentDescription, EnvironmentSource, GuessedUnits, PunctualKind, PunctualLight,
+};
+
+/// The floor under a lamp.
+fn lit() -> Description {
+    let mut description = floor();
+    description.lights = vec![point_light(DVec3::new(0.0, 3.0, 0.0), 10.0)];
+    description
+}
+
+fn with(mut description: Description, name: &str, mesh: Mesh, material: Material) -> Description {
+    add(&mut description, name, mesh, material);
+    description
+}
+
+fn ball(material: Material) -> Description {
+    with(lit(), "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), material)
+}
+
+/// Its only warning.
+fn warning(description: Description) -> String {
+    let warnings = plan(description).warnings;
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    warnings.concat()
+}
+
+fn silent(description: Description) {
+    assert_eq!(plan(description).warnings, [""; 0]);
+}
+
+#[test]
+fn a_good_scene_is_passed_over() {
+    silent(ball(glass(1.5)));
+    silent(lit());
+}
+
+#[test]
+fn thin_walls_that_were_meant_to_bend_light() {
+    let thin = Material { thin: true, ..glass(1.5) };
+    assert_eq!(
+        warning(ball(thin.clone())),
+        "material \"Ball\" on \"Ball\": a thin wall does not bend light and casts no caustic; close the mesh (a bowl has an inside and an \
+         outside), or give the material a thickness"
+    );
+    // A pane is thin on purpose.
+    silent(with(lit(), "Pane", quad(Vec3::new(-1.0, 1.0, 0.0), Vec3::X, Vec3::new(0.0, 1.0, 1.0)), thin));
+}
+
+#[test]
+fn glass_too_rough_for_a_caustic() {
+    let frosted = Material { roughness: 0.6, ..glass(1.5) };
+    assert_eq!(
+        warning(ball(frosted)),
+        "material \"Ball\" on \"Ball\": its roughness of 0.6 spreads light too wide for a caustic to show; 0.45 and more is frosted"
+    );
+    silent(ball(Material { roughness: 0.3, ..glass(1.5) }));
+}
+
+/// A lamp of flux 4 pi I beside a panel of flux pi L A, in one system of units and in two.
+#[test]
+fn lamps_and_surfaces_in_different_units() {
+    let scene = |intensity: f32, photometric| {
+        let panel = quad(Vec3::new(-2.0, 3.0, -2.0), Vec3::X, Vec3::Z);
+        let mut description = with(lit(), "Panel", panel, matte(0.0, 4.0));
+        description.lights[0].intensity = Rgb::splat(intensity);
+        description.guessed_units = Some(GuessedUnits { photometric, from: "generator \"Any\"".into() });
+        description
+    };
+    assert_eq!(
+        warning(scene(683.0, false)),
+        "the light of its lamps is 683 times that of its surfaces that glow: the numbers of lamps were taken for watts, going by generator \
+         \"Any\"; if that is wrong, use --light-units photometric"
+    );
+    assert_eq!(
+        warning(scene(1.0 / 683.0, true)),
+        "the light of its surfaces that glow is 683 times that of its lamps: the numbers of lamps were taken for lumens, going by generator \
+         \"Any\"; if that is wrong, use --light-units radiometric"
+    );
+    for (intensity, photometric) in [(1.0, false), (1.0, true), (30.0, false), (683.0, true), (1e6, false)] {
+        silent(scene(intensity, photometric));
+    }
+    // Nothing is guessed where the file or the user states the units.
+    let mut stated = scene(683.0, false);
+    stated.guessed_units = None;
+    silent(stated);
+}
+
+#[test]
+fn suns_and_environments_in_different_units() {
+    let scene = |irradiance: f32| {
+        let mut description = floor();
+        description.lights =
+            vec![PunctualLight { kind: PunctualKind::Sun { angle: 0.0 }, ..point_light(DVec3::ZERO, irradiance) }];
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.guessed_units = Some(GuessedUnits { photometric: false, from: "the file's generator".into() });
+        description
+    };
+    assert!(warning(scene(683.0 * 4.0)).starts_with("the light of its suns is 870 times that of the environment: "));
+    silent(scene(4.0));
+}
+
+/// A lamp in a globe of glass: photons find it, paths from the eye do not; with a radius, they do.
+#[test]
+fn lamps_without_size_behind_glass() {
+    let globe = || with(lit(), "Globe", sphere(Vec3::new(0.0, 3.0, 0.0), 0.5, 16), glass(1.5));
+    silent(globe());
+    let warnings = plan_by(globe(), Search::EyePaths).warnings;
+    assert_eq!(
+        warnings.last().map(String::as_str),
+        Some(
+            "light \"point\": 100 % of its light goes through the glass of \"Globe\", and --method any cannot find a lamp without size there; \
+             choose --method sppm or vcm, or give it a radius"
+        )
+    );
+    let mut sized = globe();
+    sized.lights[0].radius = 0.1;
+    assert_eq!(plan_by(sized, Search::EyePaths).warnings, [""; 0]);
+    // Glass beside the lamp, not around it.
+    let beside = plan_by(ball(glass(1.5)), Search::EyePaths).warnings;
+    assert!(beside.iter().all(|warning| !warning.contains("% of its light")), "{beside:?}");
+}
+
+#[test]
+fn scenes_without_light() {
+    let warnings = |description: Description| crate::support::scenes::build(description).warnings;
+    let black = "the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out area lights and the world)";
+    assert_eq!(warnings(floor()), [format!("the scene has no light: {black}")]);
+    let mut dark = lit();
+    dark.lights[0].intensity = Rgb::ZERO;
+    assert_eq!(warnings(dark.clone()), [format!("the intensities of all lights are zero: {black}")]);
+    silent(with(dark, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), glass(1.5)));
+    assert_eq!(warnings(lit()), [""; 0]);
+}
+
+#[test]
+fn lamps_in_a_casing() {
+    let around = |half: f32, material| {
+        let center = Vec3::new(0.0, 3.0, 0.0);
+        with(lit(), "Casing", cuboid(center - half, center + half, false), material)
+    };
+    assert_eq!(
+        warning(around(0.3, matte(0.5, 0.0))),
+        "light \"point\": all its light stays within \"Casing\", and the camera is outside; make an opening, or give the casing a material \
+         that transmits light"
+    );
+    silent(around(0.3, glass(1.5)));
+    // A room around the camera is no casing.
+    silent(around(20.0, matte(0.5, 0.0)));
+    // An opening.
+    let mut open = around(0.3, matte(0.5, 0.0));
+    open.meshes[1].triangles.truncate(10);
+    silent(open);
+    // Surfaces that glow, too.
+    let mut panel = around(0.3, matte(0.5, 0.0));
+    panel.lights.clear();
+    let panel = with(panel, "Filament", sphere(Vec3::new(0.0, 3.0, 0.0), 0.05, 8), matte(0.0, 100.0));
+    assert!(warning(panel).starts_with("object \"Filament\": all its light stays within \"Casing\", "));
+    // A spot that lights nothing but the floor: what it lights scatters its light away.
+    let mut spot = lit();
+    spot.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2 };
+    spot.lights[0].to_world.matrix3 = glam::DMat3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+    silent(spot);
+}
+
+#[test]
+fn glass_that_no_light_reaches() {
+    // A lid as wide as the floor, between the lamp and the ball.
+    let lid = |y: f32| {
+        let plane = quad(Vec3::new(-4.0, y, -4.0), Vec3::new(0.0, 0.0, 8.0), Vec3::new(8.0, 0.0, 0.0));
+        with(ball(glass(1.5)), "Lid", plane, matte(0.5, 0.0))
+    };
+    assert_eq!(
+        warning(lid(2.0)),
+        "object \"Ball\": no light shines on its glass, so it casts no caustic; what stands in the way is \"Lid\""
+    );
+    silent(lid(3.5));
+    // Glass in the way lets light through.
+    let mut clear = lid(2.0);
+    clear.materials[2] = Material { thin: true, ..glass(1.5) };
+    silent(clear);
+    // A spot that shines past it.
+    let mut past = ball(glass(1.5));
+    past.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2 };
+    past.lights[0].to_world.translation = DVec3::new(3.0, 3.0, 0.0);
+    past.lights[0].to_world.matrix3 = glam::DMat3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+    assert_eq!(
+        warning(past),
+        "object \"Ball\": no light shines on its glass, so it casts no caustic; aim a light at it"
+    );
+}

@@ -1,0 +1,84 @@
+//! Which effects are there, and because of what.
+
+use super::{floor, plan};
+use crate::support::scenes::{add, glass, matte, mirror, point_light, quad, sphere};
+use caustique::material::{Material, MediumParameters};
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::plan::{Effect, Plan};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+
+fn present(plan: &Plan) -> String {
+    let names = plan.effects.iter().filter(|effect| effect.present).map(|effect| effect.effect.name());
+    names.collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn effects_are_there_for_reasons() {
+    assert_eq!(present(&plan(floor())), "");
+    let mut scene = floor();
+    scene.lights = vec![point_light(DVec3::new(0.0, 3.0, 0.0), 10.0)];
+    assert_eq!(present(&plan(scene.clone())), "direct indirect");
+    // A matte light can be seen; a mirror and glass focus it, and show what they focus.
+    add(&mut scene, "Panel", quad(Vec3::new(0.0, 4.0, 0.0), Vec3::X, Vec3::Z), matte(0.0, 1.0));
+    add(&mut scene, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), Material { dispersion: 0.3, ..glass(1.5) });
+    add(&mut scene, "Disc", sphere(Vec3::new(2.0, 1.0, 0.0), 0.5, 16), mirror());
+    let everything = plan(scene.clone());
+    assert_eq!(present(&everything), "emission direct indirect glossy caustic sds dispersion");
+    let because = |effect: Effect| everything.effect(effect).because.join("; ");
+    assert_eq!(because(Effect::Emission), "object \"Panel\"");
+    assert_eq!(because(Effect::Direct), "object \"Panel\"; light \"point\"");
+    assert_eq!(
+        because(Effect::Indirect),
+        "\"Floor\", \"Panel\", \"Ball\" and 1 more under object \"Panel\", light \"point\""
+    );
+    assert_eq!(
+        because(Effect::Caustic),
+        "material \"Ball\" on \"Ball\" under object \"Panel\", light \"point\"; \
+         material \"Disc\" on \"Disc\" under object \"Panel\", light \"point\""
+    );
+    assert_eq!(
+        because(Effect::Sds),
+        "caustics seen through material \"Ball\" on \"Ball\"; caustics seen in material \"Disc\" on \"Disc\""
+    );
+    assert_eq!(
+        (everything.effect(Effect::Caustic).by, everything.effect(Effect::Sds).by),
+        (Some("photons"), Some("photons"))
+    );
+    // No method disperses.
+    assert!(!everything.effect(Effect::Dispersion).simulated);
+    // Without light nothing is lit.
+    scene.lights.clear();
+    scene.materials[1].emission = Rgb::ZERO;
+    assert_eq!(present(&plan(scene)), "dispersion");
+}
+
+#[test]
+fn properties_of_the_scene() {
+    let mut scene = floor();
+    scene.environment =
+        Some(EnvironmentDescription { source: EnvironmentSource::Color(Rgb::ONE), rotation_deg: 0.0, strength: 1.0 });
+    let fog = MediumParameters { sigma_s: Rgb::splat(0.1), ..MediumParameters::default() };
+    scene.medium = Some(fog);
+    add(&mut scene, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), Material { medium: Some(fog), ..glass(1.5) });
+    scene.cameras[0].aperture_radius = 0.1;
+    let whole = plan(scene.clone());
+    assert_eq!(present(&whole), "emission direct indirect glossy caustic sds volume depth_of_field environment");
+    let because = |effect: Effect| whole.effect(effect).because.join("; ");
+    assert_eq!(because(Effect::Volume), "the scene's medium; the medium of material \"Ball\" on \"Ball\"");
+    assert_eq!(because(Effect::DepthOfField), "the camera's aperture");
+    // An environment without strength is none.
+    scene.environment.as_mut().expect("it is there").strength = 0.0;
+    assert_eq!(present(&plan(scene)), "volume depth_of_field");
+}
+
+/// Lamps that have a radius are lights by name, whatever they are made of.
+#[test]
+fn lights_have_their_names() {
+    let mut scene = floor();
+    let mut bulb = point_light(DVec3::new(0.0, 3.0, 0.0), 10.0);
+    (bulb.name, bulb.radius) = ("Bulb".into(), 0.1);
+    let mut dark = point_light(DVec3::new(0.0, 3.0, 1.0), 0.0);
+    dark.name = "Dark".into();
+    scene.lights = vec![dark, bulb, point_light(DVec3::new(1.0, 3.0, 0.0), 1.0)];
+    assert_eq!(plan(scene).effect(Effect::Direct).because, ["light \"Bulb\"", "light \"point\""]);
+}
