@@ -67,6 +67,12 @@ impl Camera {
         }
     }
 
+    /// The same view on a film of `factor` times as many pixels a side, at least one.
+    pub fn resized(&self, factor: f64) -> Camera {
+        let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
+        Camera { width: scaled(self.width), height: scaled(self.height), ..*self }
+    }
+
     /// Width and height of the film in pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)

@@ -8,13 +8,15 @@ use super::scene::{self, SceneArgs};
 use super::{print, print_json};
 use caustique::error::Result;
 use caustique::plan::{EffectPlan, Plan};
+use caustique::render::Settings;
+use caustique::render::auto::{Free, choose};
 use caustique::scene::{MAX_SIZE, View};
 use clap::value_parser;
 use serde_json::json;
 
 /// Say which effects a scene calls for, which will be simulated, and why.
 ///
-/// Reads the scene as 'caustique render' does and prints what it would do. Below that it says what looks like a mistake in the scene: glass that does not bend
+/// Reads the scene as 'caustique render' does, tries what --method auto tries, and prints what it would do. Below that it says what looks like a mistake in the scene: glass that does not bend
 /// light, lamps that are closed in or a thousand times too bright, and the like.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
@@ -56,7 +58,12 @@ fn report(args: &PlanArgs) -> Result<()> {
     let loaded = scene::read(&args.scene, rayon::current_num_threads())?;
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = loaded.scene.camera(&view)?;
-    let wishes = Wishes { method: args.method, max_depth: args.max_depth, switches: args.scene.switches() };
+    let free = Free { photons: true, neighbours: true };
+    let max_depth = args.max_depth.unwrap_or(u32::MAX);
+    let make = |way| Some(Settings { max_depth, ..Settings::of(way) });
+    let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();
+    let switches = args.scene.switches();
+    let wishes = Wishes { method: args.method, choice: choice.as_ref(), max_depth: args.max_depth, switches };
     let mut plan = plan(&wishes, &loaded.scene, &camera, &loaded.removed);
     let of_scene = &loaded.scene.warnings;
     plan.warnings.splice(0..0, of_scene.iter().cloned());
@@ -145,7 +152,7 @@ mod tests {
     fn figures_have_columns() {
         let scene = Scene::build(Description::default(), 1).unwrap();
         let camera = scene.camera(&View::default()).unwrap();
-        let wishes = Wishes { method: Method::Vcm, max_depth: None, switches: Switches::default() };
+        let wishes = Wishes { method: Method::Vcm, choice: None, max_depth: None, switches: Switches::default() };
         let mut plan = plan(&wishes, &scene, &camera, &Removed::default());
         assert_eq!(columns(&plan).len(), 2);
         let caustic = &mut plan.effects[Effect::Caustic as usize];

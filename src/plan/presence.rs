@@ -63,7 +63,7 @@ impl Presence {
     }
 
     /// Whether light from points and parallel light, which no path runs into, is part of the scene.
-    pub(super) fn has_sizeless_lights(scene: &Scene) -> bool {
+    pub fn has_sizeless_lights(scene: &Scene) -> bool {
         scene.lights.emitters().iter().any(Emitter::is_delta)
     }
 }

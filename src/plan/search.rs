@@ -15,6 +15,8 @@ pub enum Search {
     Map,
     /// Eye paths that gather photons, on surfaces and in media.
     Photons,
+    /// Eye paths connected to lights, that gather photons of caustics.
+    PathsAndPhotons,
     /// Both, merged where they meet, on surfaces.
     Merging,
     /// Both, connected and merged.
@@ -38,14 +40,17 @@ impl Search {
     /// What brings an effect into the picture.
     pub(super) fn carrier(self, effect: Effect, media_scatter: bool) -> &'static str {
         let gathers = matches!(self, Search::Map | Search::Photons);
+        let walks = matches!(self, Search::EyePaths | Search::PathsAndPhotons);
         match (effect, self) {
             (Effect::Environment | Effect::Alpha | Effect::Textures | Effect::Dispersion, _) => "all paths",
             (Effect::Volume, _) if !media_scatter => "all paths",
             (_, Search::LightPaths) => "light paths",
             (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "eye paths",
-            (Effect::Direct, Search::EyePaths | Search::Map | Search::Photons) => "connections to lights",
-            (_, Search::EyePaths) => "eye paths",
-            (Effect::Caustic | Effect::Sds, Search::ConnectionsAndMerging) => "photons",
+            (Effect::Direct, Search::EyePaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
+                "connections to lights"
+            }
+            (Effect::Caustic | Effect::Sds, Search::ConnectionsAndMerging | Search::PathsAndPhotons) => "photons",
+            _ if walks => "eye paths",
             (_, Search::Merging) => "photons",
             _ if gathers => "photons",
             (_, Search::Connections) => "connections",

@@ -279,6 +279,10 @@ impl Iterate for Passes<'_> {
         initial_bandwidths(&self.eye(), initial, self.settings.seed, &none).into_iter().map(Pixel::new).collect()
     }
 
+    fn guide(&self) -> Option<&Guide> {
+        self.guide.as_deref()
+    }
+
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let start = cpu_seconds();
         let work = match self.techniques.take() {

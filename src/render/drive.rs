@@ -7,6 +7,7 @@ use super::settings::Settings;
 use super::techniques::TechniquePicture;
 use crate::camera::Camera;
 use crate::estimator::Pixel;
+use crate::light::Guide;
 use crate::scene::Scene;
 
 /// What an iteration has done.
@@ -26,6 +27,10 @@ pub(super) trait Iterate {
     /// Bandwidths of every pixel and level after the last iteration, of methods where they do not follow from the iteration.
     fn radii(&mut self) -> Vec<f32> {
         Vec::new()
+    }
+    /// Where its light paths start, if they are guided.
+    fn guide(&self) -> Option<&Guide> {
+        None
     }
     /// Pictures per technique after so many iterations, of methods that have them.
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {

@@ -1,5 +1,6 @@
 //! Rendering: the pass loop, when it stops, and what it reports.
 
+pub mod auto;
 mod bidirectional;
 mod choice;
 mod control;

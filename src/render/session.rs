@@ -10,6 +10,7 @@ use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::film::LayerSet;
+use crate::light::Guide;
 use crate::scene::Scene;
 use crate::transport::Surroundings;
 
@@ -78,7 +79,7 @@ impl<'a> Session<'a> {
     /// Runs the pilot, if the method has one.
     pub fn new(stage: &'a Stage<'a>) -> Session<'a> {
         let Stage { scene, camera, settings, surroundings } = stage;
-        let mut spent = Spent::default();
+        let mut spent = settings.decided;
         let (passes, pixels) = spent.during(|| {
             let mut passes = passes(scene, camera, settings, surroundings);
             let pixels = passes.pixels();
@@ -153,6 +154,11 @@ impl<'a> Session<'a> {
     fn total(&self) -> Option<u64> {
         let Settings { iterations, shard, .. } = self.stage.settings;
         iterations.map(|n| n.saturating_sub(shard.index).div_ceil(shard.count))
+    }
+
+    /// Where its light paths start, if they are guided.
+    pub(super) fn guide(&self) -> Option<&Guide> {
+        self.passes.guide()
     }
 
     /// The pixels as they are.

@@ -1,6 +1,8 @@
 //! What a render is asked to do.
 
+use super::auto::Way;
 use super::method::Method;
+use super::session::Spent;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
@@ -115,6 +117,8 @@ pub struct Settings {
     pub target_error: Option<f64>,
     /// Part of the iterations to render.
     pub shard: Shard,
+    /// Time that choosing the settings has taken, which counts as the render's own.
+    pub decided: Spent,
 }
 
 impl Default for Settings {
@@ -139,11 +143,32 @@ impl Default for Settings {
             time: None,
             target_error: None,
             shard: Shard { index: 0, count: 1 },
+            decided: Spent::default(),
         }
     }
 }
 
 impl Settings {
+    /// Those of a way to render when nothing else is asked for.
+    pub fn of(way: Way) -> Settings {
+        let method = way.method;
+        let levels = Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 });
+        Settings {
+            method,
+            indirect: way.indirect,
+            guided: way.guided,
+            levels,
+            photons: method.photons(),
+            initial: if method.counts_photons() {
+                InitialBandwidth::Nearest(method.neighbours(levels.count))
+            } else {
+                InitialBandwidth::Footprint
+            },
+            alpha: method.alpha(),
+            ..Settings::default()
+        }
+    }
+
     /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any order.
     pub fn is_memoryless(&self) -> bool {
         match self.method {

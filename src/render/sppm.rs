@@ -14,7 +14,7 @@ use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths}
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::Guide;
-use crate::photon::{Kernel, PhotonMap, kernel};
+use crate::photon::{Kernel, Nearest, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{
@@ -62,7 +62,15 @@ fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons)
 }
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
-fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, maps: &Maps, pixels: &mut [Pixel], kernel: impl Kernel) {
+fn eye_pass(
+    eye: &Eye<'_>,
+    settings: &Settings,
+    i: u64,
+    later2: f32,
+    maps: &Maps,
+    pixels: &mut [Pixel],
+    kernel: impl Kernel,
+) {
     let photons = &maps.surface;
     let size = eye.camera.size();
     let levels = settings.levels;
@@ -80,7 +88,7 @@ fn eye_pass(eye: &Eye<'_>, settings: &Settings, i: u64, maps: &Maps, pixels: &mu
             let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
             // Radius squared of level k (from 0) of m: each halves that of the next larger.
             let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
-            let all = LevelRadii::new((0..levels.count).map(radius2));
+            let all = LevelRadii::new((0..levels.count).map(radius2)).later(later2 * factor);
             match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                 Some(correlated) => {
                     let volume = maps.volume(pixel, 0..1);
@@ -109,12 +117,28 @@ pub(super) fn keep_first_hit(eye: &Eye<'_>, pixel: &mut Pixel, measure: &EyeMeas
     }
 }
 
+/// Median over photons of the squared distance to the k-th nearest; infinite where there are too few.
+fn usual_radius2(map: &PhotonMap, k: usize) -> f32 {
+    const SAMPLES: usize = 256;
+    let mut nearest = Nearest::default();
+    let every = map.photons().iter().step_by(map.photons().len().div_ceil(SAMPLES).max(1));
+    let mut found: Vec<f32> =
+        every.filter_map(|photon| nearest.radius2(map, photon.p, photon.ng, k, f32::INFINITY)).collect();
+    if found.is_empty() {
+        return f32::INFINITY;
+    }
+    let middle = found.len() / 2;
+    *found.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
 /// The passes of a render.
 pub(super) struct Sppm<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
     surroundings: &'a Surroundings,
     guide: Option<Guide>,
+    /// Largest initial bandwidth, squared, beyond an eye path's first broad bounce.
+    later2: f32,
 }
 
 impl<'a> Sppm<'a> {
@@ -133,7 +157,7 @@ impl<'a> Sppm<'a> {
             indirect: settings.indirect,
         };
         let guide = settings.guided.then(|| learnt(&eye, surroundings, settings.seed)).flatten();
-        Sppm { eye, settings, surroundings, guide }
+        Sppm { eye, settings, surroundings, guide, later2: f32::INFINITY }
     }
 
     /// Eye paths.
@@ -206,7 +230,11 @@ impl Iterate for Sppm<'_> {
         } else {
             Photons::default()
         };
-        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &PhotonMap::build(pilot.surface));
+        let map = PhotonMap::build(pilot.surface);
+        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &map);
+        if let (InitialBandwidth::Nearest(k), Indirect::Paths) = (initial, self.settings.indirect) {
+            self.later2 = usual_radius2(&map, k);
+        }
         let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
         if self.eye.scene.survey.scattering {
             let pilot = PhotonMap::build(pilot.volume);
@@ -218,13 +246,21 @@ impl Iterate for Sppm<'_> {
         pixels
     }
 
+    fn guide(&self) -> Option<&Guide> {
+        self.guide.as_ref()
+    }
+
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let (maps, work) = self.map(i, phases);
         let start = cpu_seconds();
         match self.settings.kernel {
-            KernelChoice::Box => eye_pass(&self.eye, self.settings, i, &maps, pixels, kernel::Box),
-            KernelChoice::Epanechnikov => eye_pass(&self.eye, self.settings, i, &maps, pixels, kernel::Epanechnikov),
-            KernelChoice::Gaussian => eye_pass(&self.eye, self.settings, i, &maps, pixels, kernel::Gaussian),
+            KernelChoice::Box => eye_pass(&self.eye, self.settings, i, self.later2, &maps, pixels, kernel::Box),
+            KernelChoice::Epanechnikov => {
+                eye_pass(&self.eye, self.settings, i, self.later2, &maps, pixels, kernel::Epanechnikov)
+            }
+            KernelChoice::Gaussian => {
+                eye_pass(&self.eye, self.settings, i, self.later2, &maps, pixels, kernel::Gaussian)
+            }
         }
         phases.eye += cpu_seconds() - start;
         work

@@ -40,13 +40,15 @@ pub const MAX_LEVELS: usize = 5;
 pub struct LevelRadii {
     radius2: [f32; MAX_LEVELS],
     count: usize,
+    /// Largest radius squared beyond the eye path's first broad bounce.
+    later2: f32,
 }
 
 impl LevelRadii {
     /// From radii squared in ascending order; at most [`MAX_LEVELS`].
     #[inline]
     pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
-        let mut radii = LevelRadii { radius2: [0.0; MAX_LEVELS], count: 0 };
+        let mut radii = LevelRadii { radius2: [0.0; MAX_LEVELS], count: 0, later2: f32::INFINITY };
         for r in radius2.take(MAX_LEVELS) {
             radii.radius2[radii.count] = r;
             radii.count += 1;
@@ -57,7 +59,15 @@ impl LevelRadii {
     /// Some of the levels.
     #[inline]
     pub fn part(&self, levels: std::ops::Range<usize>) -> LevelRadii {
-        LevelRadii::new(self.radius2[..self.count][levels].iter().copied())
+        LevelRadii::new(self.radius2[..self.count][levels].iter().copied()).later(self.later2)
+    }
+
+    /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
+    /// its path may come to where they are dense, which nobody sees sharply.
+    #[inline]
+    #[must_use]
+    pub fn later(self, later2: f32) -> LevelRadii {
+        LevelRadii { later2, ..self }
     }
 
     /// Number of levels.
@@ -274,7 +284,12 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// Photons around the vertex: kernel density estimation, all levels from one query [post-reconstruction 2021, (2) and (3)].
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
-        let radii = self.bandwidths.at(self.photons, vertex.surface.p, vertex.surface.ng, self.length);
+        let mut radii = self.bandwidths.at(self.photons, vertex.surface.p, vertex.surface.ng, self.length);
+        if PATHS && self.broadly {
+            let largest2 = radii.radius2[radii.count.saturating_sub(1)];
+            let factor = (radii.later2 / largest2).min(1.0);
+            radii.radius2.iter_mut().for_each(|radius2| *radius2 *= factor);
+        }
         let radii = &radii.radius2[..radii.count];
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;

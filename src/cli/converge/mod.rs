@@ -9,14 +9,16 @@ mod runs;
 pub use options::ConvergeArgs;
 
 use super::render::plan::{self, Wishes as PlanWishes};
-use super::render::{memory, network};
+use super::render::{Method, memory, network};
+use super::say;
 use super::scene::{self, Loaded};
 use super::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::combine::{Combiner, Runtime};
 use caustique::error::{Error, Kind, Result};
 use caustique::plan::switch::Removed;
-use caustique::render::Control;
+use caustique::render::auto::{Choice, choose};
+use caustique::render::{Control, Settings};
 use caustique::report::crop::{Look, Window};
 use caustique::report::entry::Entry;
 use caustique::report::race::{Rules, race};
@@ -49,11 +51,12 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
+    let (runs, choices) = choose_all(args, runs, (&scene, &camera));
     memory::check_all(runs.iter().map(|run| &run.entry.settings), camera.size())?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;
-    let (entries, mut combiners) = open(args, runs, (&scene, &camera), &removed)?;
+    let (entries, mut combiners) = open(args, runs, &choices, (&scene, &camera), &removed)?;
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
     let interrupt = Interrupt::listen()?;
@@ -120,19 +123,42 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     Ok(windows)
 }
 
+/// Chooses for the runs that leave it to auto, for the time and iterations of a run; says what.
+fn choose_all(
+    args: &ConvergeArgs,
+    mut runs: Vec<Run>,
+    (scene, camera): (&Scene, &Camera),
+) -> (Vec<Run>, Vec<Option<Choice>>) {
+    let choose_one = |run: &mut Run| {
+        let usual = run.entry.settings.clone();
+        let Settings { max_depth, seed, .. } = usual;
+        let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
+        let make =
+            |way| run.args.allowed(way).filter(|s| run.args.model.is_none() || s.levels == usual.levels).map(limits);
+        let chosen =
+            (run.args.method == Method::Auto).then(|| choose(scene, camera, run.args.free(), make)).flatten()?;
+        say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
+        run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
+        Some(chosen)
+    };
+    let choices = runs.iter_mut().map(choose_one).collect();
+    (runs, choices)
+}
+
 /// Opens the networks and tells what methods miss.
 fn open(
     args: &ConvergeArgs,
     runs: Vec<Run>,
+    choices: &[Option<Choice>],
     (scene, camera): (&Scene, &Camera),
     removed: &Removed,
 ) -> Result<(Vec<Entry>, Vec<Option<Combiner>>)> {
     let mut told = HashSet::new();
     let mut entries = Vec::new();
     let mut combiners = Vec::new();
-    for Run { mut entry, args: options } in runs {
-        let wishes =
-            PlanWishes { max_depth: args.max_depth, switches: args.scene.switches(), ..PlanWishes::of(&options) };
+    for (Run { mut entry, args: options }, choice) in runs.into_iter().zip(choices) {
+        let of_run = PlanWishes::of(&options, choice.as_ref());
+        let wishes = PlanWishes { max_depth: args.max_depth, switches: args.scene.switches(), ..of_run };
         let plan = plan::plan(&wishes, scene, camera, removed);
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| told.insert(warning.clone())).collect();
         plan::tell(&args.scene.path, &new);

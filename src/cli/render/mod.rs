@@ -13,11 +13,13 @@ use super::progress::Reporter;
 use super::scene::Loaded;
 use super::signals::Interrupt;
 use super::{output, say, scene};
+use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
 use caustique::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use caustique::film::{Layer, LayerSet, Selection, describe, output as film};
 use caustique::image::exr::{self, Attributes};
+use caustique::render::auto::{Choice, choose};
 use caustique::render::output::{Present, shape};
 use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory};
 use caustique::scene::Scene;
@@ -49,13 +51,15 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     plan::check_media(args, &scene)?;
     let present = Present::of(&scene);
     self::selection(args, settings, present.volume)?;
+    let choice = auto(args, &scene, &camera, settings, present);
+    let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
     memory::check(settings, camera.size(), channels(settings, present))?;
-    let plan = plan::plan(&plan::Wishes::of(args), &scene, &camera, &removed);
+    let plan = plan::plan(&plan::Wishes::of(args, choice.as_ref()), &scene, &camera, &removed);
     let mut network = network(args, settings.levels.count)?;
     let talk = args.progress.for_people();
     let interrupt = Interrupt::listen()?;
-    if talk && args.method == Method::Auto {
-        say("method: sppm, chosen by auto");
+    if let Some(choice) = choice.as_ref().filter(|_| talk) {
+        say(&format!("method: {}", plan::why(choice)));
     }
     let mut reporter = Reporter::new(args.progress, settings);
     plan::tell(&args.scene.path, &plan.warnings);
@@ -114,6 +118,14 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
         )));
     }
     summary.interrupted(args)
+}
+
+/// What auto chooses, where it is to: among ways whose pictures have the layers asked for, and the levels that a network asked for combines.
+fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, untried: &Settings, present: Present) -> Option<Choice> {
+    let levels = |settings: &Settings| args.model.is_none() || settings.levels == untried.levels;
+    let layers = |settings: &Settings| selection(args, settings, present.volume).is_ok();
+    let make = |way| args.allowed(way).filter(|settings| levels(settings) && layers(settings));
+    (args.method == Method::Auto).then(|| choose(scene, camera, args.free(), make)).flatten()
 }
 
 /// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.

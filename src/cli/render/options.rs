@@ -8,6 +8,7 @@ use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
+use caustique::render::auto::{Free, Way};
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
@@ -159,7 +160,7 @@ pub struct RenderArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Whatever suits the scene; so far that is sppm
+    /// Whichever a short pilot expects to be best; sppm where the render is too short for one
     Auto,
     /// Path tracing
     Path,
@@ -372,7 +373,31 @@ impl RenderArgs {
     /// # Errors
     /// Options that contradict each other.
     pub fn settings(&self) -> Result<Settings> {
-        let method = self.method.chosen();
+        self.settings_of(self.way())
+    }
+
+    /// The way to render that the options ask for; with auto that which needs no trial.
+    pub fn way(&self) -> Way {
+        Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), ..Way::UNTRIED }
+    }
+
+    /// What is left to auto.
+    pub fn free(&self) -> Free {
+        Free { photons: self.photons.is_none(), neighbours: self.knn.is_none() && self.initial_bandwidth.is_none() }
+    }
+
+    /// Settings of a way that auto may choose; `None` where the options rule it out.
+    pub fn allowed(&self, way: Way) -> Option<Settings> {
+        let guide = match self.guide {
+            None => true,
+            Some(Switch::On) => way.guided || !way.method.guides(render::RadiusRule::Memoryless),
+            Some(Switch::Off) => !way.guided,
+        };
+        if guide { self.settings_of(way).ok() } else { None }
+    }
+
+    fn settings_of(&self, way: Way) -> Result<Settings> {
+        let method = way.method;
         let radius_rule = match (self.radius_rule, method) {
             (Some(RadiusRule::Local), _) | (None, render::Method::Ppm) => render::RadiusRule::Local,
             _ => render::RadiusRule::Memoryless,
@@ -383,7 +408,6 @@ impl RenderArgs {
             let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
             return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
         }
-        let guided = self.guide.map_or(self.method == Method::Auto, |guide| guide == Switch::On);
         let chi_squared = ChiSquaredSettings::default();
         let chi_squared = ChiSquaredSettings {
             annuli: self.cppm_grid.map_or(chi_squared.annuli, |grid| grid.annuli),
@@ -436,12 +460,9 @@ impl RenderArgs {
             time: self.time,
             target_error: self.target_error,
             shard,
-            guided,
-            indirect: if std::env::var_os("HYBRID").is_some() {
-                caustique::transport::Indirect::Paths
-            } else {
-                Default::default()
-            },
+            decided: render::Spent::default(),
+            guided: way.guided,
+            indirect: way.indirect,
         };
         if self.shard.is_some() && !settings.is_memoryless() {
             let rule = if method == render::Method::Sppm { " with local statistics" } else { "" };

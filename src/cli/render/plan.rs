@@ -1,44 +1,91 @@
 //! The plan of a render: from the options to what the library plans, and its warnings told.
 
 use super::options::{Method, RenderArgs};
+use crate::cli::progress::percent;
 use crate::cli::say;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
+use caustique::estimator::InitialBandwidth;
 use caustique::plan::switch::Removed;
-use caustique::plan::{Asked, Plan, Search, Switches};
+use caustique::plan::{Asked, Effect, Plan, Search, Switches};
 use caustique::render;
+use caustique::render::auto::{Choice, Shares, Trial};
 use caustique::scene::Scene;
+use caustique::transport::Indirect;
 use std::path::Path;
 
-/// Options that decide what a plan says.
+/// What decides what a plan says.
 #[derive(Clone, Copy)]
-pub struct Wishes {
+pub struct Wishes<'a> {
     /// `--method`.
     pub method: Method,
+    /// What auto has chosen.
+    pub choice: Option<&'a Choice>,
     /// `--max-depth`.
     pub max_depth: Option<u32>,
     /// `--effects`.
     pub switches: Switches,
 }
 
-impl Wishes {
+impl<'a> Wishes<'a> {
     /// Those of a render.
-    pub fn of(args: &RenderArgs) -> Wishes {
-        Wishes { method: args.method, max_depth: args.max_depth, switches: args.scene.switches() }
+    pub fn of(args: &RenderArgs, choice: Option<&'a Choice>) -> Wishes<'a> {
+        Wishes { method: args.method, choice, max_depth: args.max_depth, switches: args.scene.switches() }
     }
 }
 
 /// The plan of a render of a scene that was built without what is `removed`.
 pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) -> Plan {
-    let method = wishes.method.chosen();
-    let because = match wishes.method {
-        Method::Auto => {
-            "auto: the one method here that reaches every class of light paths, caustics behind glass and in mirrors too"
-        }
-        _ => "asked for",
+    let method = wishes.choice.map_or(wishes.method.chosen(), |choice| choice.way.method);
+    let because = wishes.choice.map_or("asked for".into(), why);
+    let (max_depth, switches) = (wishes.max_depth, wishes.switches);
+    let search = match wishes.choice {
+        Some(choice) if choice.way.indirect == Indirect::Paths => Search::PathsAndPhotons,
+        _ => search(method),
     };
-    let (search, max_depth, switches) = (search(method), wishes.max_depth, wishes.switches);
-    Plan::new(scene, camera, &Asked { method: method.name(), because, search, max_depth, switches, removed })
+    let asked = Asked { method: method.name(), because: &because, search, max_depth, switches, removed };
+    let mut plan = Plan::new(scene, camera, &asked);
+    if let Some(trial) = wishes.choice.and_then(Choice::trial) {
+        weigh(&mut plan, trial);
+    }
+    plan
+}
+
+/// Why auto has chosen what it has.
+pub fn why(choice: &Choice) -> String {
+    let Some(trial) = choice.trial() else { return format!("auto: {}", choice.because) };
+    let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.way != trial.way).collect();
+    others.sort_by(|a, b| a.expected.total_cmp(&b.expected));
+    let error = |trial: &Trial| {
+        if trial.expected.is_finite() { percent(trial.expected.sqrt()) } else { "not all of the caustics".into() }
+    };
+    let others: Vec<String> = others.iter().map(|other| format!("{} {}", other.way.name(), error(other))).collect();
+    let name = trial.way.name();
+    let settings = &choice.settings;
+    let with = match settings.initial {
+        InitialBandwidth::Nearest(k) => format!(" with {} light paths and {k} neighbours", settings.photons),
+        _ => String::new(),
+    };
+    format!("auto: {name}{with} is expected to reach an error of {} ({})", error(trial), others.join("; "))
+}
+
+/// Fills in what a trial has measured.
+fn weigh(plan: &mut Plan, trial: &Trial) {
+    let Shares { emission, direct, indirect, caustic, volume } = trial.shares;
+    let without = &trial.without;
+    let measured = [
+        (Effect::Emission, emission, without.emission),
+        (Effect::Direct, direct, without.direct),
+        (Effect::Indirect, indirect, without.indirect),
+        (Effect::Caustic, caustic, without.caustic),
+        (Effect::Volume, volume, without.volume),
+    ];
+    for (effect, energy, error) in measured {
+        let effect = &mut plan.effects[effect as usize];
+        if effect.present {
+            (effect.energy, effect.error_if_off) = (Some(energy), Some(error));
+        }
+    }
 }
 
 /// How a method looks for light.

@@ -1,0 +1,57 @@
+//! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh auto`); choices depend
+//! on their ratios.
+
+use super::Way;
+use crate::render::method::Method;
+use crate::render::settings::Settings;
+use crate::transport::{Indirect, Lengths};
+
+/// A ray from the eye, the pixel it belongs to and its statistics.
+const EYE_PATH: f64 = 0.45e-6;
+/// A vertex of an eye path with its light sample.
+const EYE_VERTEX: f64 = 0.65e-6;
+/// Photons gathered at a vertex.
+const GATHER: f64 = 0.45e-6;
+/// The start of a light path.
+const LIGHT_PATH: f64 = 0.45e-6;
+/// What guiding adds to that.
+const GUIDE: f64 = 1.0e-6;
+/// A vertex of a light path, its photon, and its share of the map.
+const LIGHT_VERTEX: f64 = 0.65e-6;
+/// A vertex of either path where both are kept and their MIS weights with them.
+const TWO_WAY_VERTEX: f64 = 0.75e-6;
+/// A connection of two vertices.
+const CONNECTION: f64 = 0.35e-6;
+/// Photons merged at a vertex.
+const MERGE: f64 = 1.0e-6;
+
+/// The counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cost {
+    /// Mean numbers of vertices of paths.
+    pub lengths: Lengths,
+}
+
+impl Cost {
+    /// Core-seconds of an iteration of a picture of so many pixels.
+    pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
+        let Lengths { eye, eye_to_broad, light, light_to_broad } = self.lengths;
+        let paths = pixels * if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
+        let photons = f64::from(settings.photons);
+        let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
+        match (way.method, way.indirect) {
+            (Method::Path, _) => pixels * (EYE_PATH + eye * EYE_VERTEX),
+            (method, Indirect::Photons) if method.gathers() => {
+                paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + GATHER)) + photons * (start + light * LIGHT_VERTEX)
+            }
+            (method, Indirect::Paths) if method.gathers() => {
+                paths * (EYE_PATH + eye * (EYE_VERTEX + GATHER)) + photons * (start + light_to_broad * LIGHT_VERTEX)
+            }
+            (method, _) => {
+                let merges = if method.has_bandwidths() { MERGE } else { 0.0 };
+                let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
+                paths * (both + eye * (EYE_VERTEX + light * CONNECTION + merges))
+            }
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! Choosing how to render: a short pilot tries every candidate on a small picture of the same view, and takes the one that is expected to come
+//! closest within what the render may cost.
+//!
+//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants ([`cost`]). So the same arguments give the
+//! same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances: noise falls as
+//! 1/n where paths are whole, and as n^-alpha, the squared bias as n^-2(1 - alpha), where photons are gathered \[Knaus and Zwicker 2011\].
+//!
+//! Where photons are gathered the pilot also balances: noise that bandwidths can smooth against the bias they bring, and light paths against eye paths
+//! ([`Balance`]).
+
+mod balance;
+mod cost;
+mod trial;
+
+pub use balance::Balance;
+pub use trial::{Shares, Trial};
+
+use super::control::{Clock, cpu_seconds};
+use super::method::Method;
+use super::session::{Session, Spent, Stage};
+use super::settings::Settings;
+use crate::camera::Camera;
+use crate::light::Guide;
+use crate::plan::Presence;
+use crate::scene::Scene;
+use crate::transport::{Eye, Indirect, Lengths, Surroundings};
+use cost::Cost;
+
+/// Share of the render's cost that the pilot may take.
+const SHARE: f64 = 0.05;
+/// Pixels of the pilot's picture.
+const PIXELS: (f64, f64) = (768.0, 4096.0);
+/// Iterations of a candidate: as many as its share of the pilot allows.
+const ITERATIONS: (u64, u64) = (8, 64);
+/// What a second of `--time` is taken for (core-seconds), whatever the machine.
+const CORES: f64 = 4.0;
+/// What a render until an error is reached is taken for (core-seconds).
+const UNLIMITED: f64 = 1000.0;
+/// A candidate that finds less than this share of the caustics that photons find has not seen them all, and its noise is not known.
+const FOUND: f64 = 0.7;
+
+/// A way to render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Way {
+    /// How light is found.
+    pub method: Method,
+    /// What photons bring, where they are gathered.
+    pub indirect: Indirect,
+    /// Light paths are guided.
+    pub guided: bool,
+}
+
+impl Way {
+    /// What is done where a render is too short to try anything: stochastic progressive photon mapping, which finds all light.
+    pub const UNTRIED: Way = Way { method: Method::Sppm, indirect: Indirect::Photons, guided: false };
+
+    /// A way in words.
+    pub fn name(self) -> String {
+        let what = match self.indirect {
+            Indirect::Photons => "",
+            Indirect::Paths => " for caustics, path tracing for the rest",
+        };
+        format!("{}{what}{}", self.method.name(), if self.guided { ", guided" } else { "" })
+    }
+}
+
+/// Settings that the user leaves to the choice.
+#[derive(Clone, Copy, Debug)]
+pub struct Free {
+    /// Light paths of an iteration.
+    pub photons: bool,
+    /// Neighbours that set bandwidths.
+    pub neighbours: bool,
+}
+
+/// What was chosen.
+pub struct Choice {
+    /// Settings of the render.
+    pub settings: Settings,
+    /// The way.
+    pub way: Way,
+    /// All that were tried; none where the render is too short.
+    pub trials: Vec<Trial>,
+    /// Index of the one chosen.
+    pub chosen: Option<usize>,
+    /// Why.
+    pub because: String,
+    /// Time that it took.
+    pub spent: Spent,
+}
+
+impl Choice {
+    /// The trial of what was chosen.
+    pub fn trial(&self) -> Option<&Trial> {
+        self.chosen.map(|chosen| &self.trials[chosen])
+    }
+}
+
+/// The ways worth trying in a scene.
+fn candidates(scene: &Scene) -> Vec<Way> {
+    let focusing = !scene.lights.targets().spheres().is_empty();
+    let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering);
+    let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
+    let mut ways = vec![plain(Method::Sppm)];
+    if focusing {
+        ways.push(Way { guided: true, ..plain(Method::Sppm) });
+        if !scattering {
+            ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
+        }
+        ways.push(plain(Method::Vcm));
+    }
+    // What photons alone find, these leave out.
+    if !(focusing && sizeless) {
+        ways.extend([plain(Method::Path), plain(Method::Bdpt)]);
+    }
+    ways
+}
+
+/// Tries the candidates and takes the best. `make` gives the settings of a way, `None` where other wishes rule it out.
+pub fn choose(scene: &Scene, camera: &Camera, free: Free, make: impl Fn(Way) -> Option<Settings>) -> Option<Choice> {
+    let (clock, cpu_start) = (Clock::start(), cpu_seconds());
+    let untried = make(Way::UNTRIED)?;
+    let (trials, because) = try_all(scene, camera, free, &untried, &make);
+    let best = (0..trials.len()).min_by(|&a, &b| trials[a].expected.total_cmp(&trials[b].expected));
+    let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
+    let Some(best) = best else {
+        let settings = Settings { decided: spent, ..untried };
+        return Some(Choice { settings, way: Way::UNTRIED, trials, chosen: None, because, spent });
+    };
+    let way = trials[best].way;
+    let mut settings = make(way)?;
+    trials[best].balance.apply(&mut settings);
+    settings.decided = spent;
+    Some(Choice { settings, way, trials, chosen: Some(best), because, spent })
+}
+
+/// Core-seconds that an iteration is taken to cost, by counted work.
+pub fn counted_cost(scene: &Scene, camera: &Camera, way: Way, settings: &Settings) -> f64 {
+    let (width, height) = camera.size();
+    let stage = Stage::new(scene, camera, settings);
+    let session = Session::new(&stage);
+    counts(scene, camera, settings, session.guide()).of(way, settings, f64::from(width) * f64::from(height))
+}
+
+fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
+    let surroundings = Surroundings::new(scene, camera.position());
+    let Settings { max_depth, seed, .. } = *settings;
+    let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons };
+    Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide) }
+}
+
+fn try_all(
+    scene: &Scene,
+    camera: &Camera,
+    free: Free,
+    untried: &Settings,
+    make: &impl Fn(Way) -> Option<Settings>,
+) -> (Vec<Trial>, String) {
+    let (width, height) = camera.size();
+    let pixels = f64::from(width) * f64::from(height);
+    let cost = counts(scene, camera, untried, None);
+    let budget = match (untried.iterations, untried.time) {
+        (Some(n), time) => {
+            let work = n as f64 * cost.of(Way::UNTRIED, untried, pixels);
+            time.map_or(work, |seconds| work.min(seconds * CORES))
+        }
+        (None, Some(seconds)) => seconds * CORES,
+        (None, None) => UNLIMITED,
+    };
+    let ways: Vec<(Way, Settings)> =
+        candidates(scene).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect();
+    if ways.len() < 2 {
+        return (Vec::new(), "the one way that these options leave".into());
+    }
+    let trial_cost = |pixels: f64| -> f64 {
+        let each =
+            |(way, settings): &(Way, Settings)| ITERATIONS.0 as f64 * cost.of(*way, &trial::settings(settings), pixels);
+        ways.iter().map(each).sum()
+    };
+    let allowed = SHARE * budget;
+    let least = PIXELS.0.min(pixels);
+    if trial_cost(least) > allowed {
+        return (Vec::new(), "the render is too short to try others".into());
+    }
+    // The cost grows linearly with pixels. Half of it goes to what makes all equal: cheap ones run for longer.
+    let allowed_once = 0.5 * allowed;
+    let slope = (trial_cost(2.0 * least) - trial_cost(least)) / least;
+    let most = least + (allowed_once - trial_cost(least)).max(0.0) / slope.max(1e-12);
+    let small = camera.resized((most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0));
+    let mut trials: Vec<Trial> = ways
+        .iter()
+        .map(|(way, settings)| {
+            let seconds = |settings: &Settings, light: bool, guide: Option<&Guide>| {
+                let guided = guide.map(|guide| counts(scene, camera, untried, Some(guide)));
+                guided.unwrap_or(cost).of(*way, settings, if light { 0.0 } else { pixels })
+            };
+            let (width, height) = small.size();
+            let once = cost.of(*way, &trial::settings(settings), f64::from(width) * f64::from(height));
+            let iterations = (allowed / (ways.len() as f64 * once)) as u64;
+            let plan = trial::Plan {
+                iterations: iterations.clamp(ITERATIONS.0, ITERATIONS.1),
+                budget: budget - allowed,
+                free,
+            };
+            Trial::new(scene, &small, *way, settings, &seconds, &plan)
+        })
+        .collect();
+    let photons = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;
+    let caustics = trials.iter().filter(photons).map(|trial| trial.shares.caustic).fold(0.0, f64::max);
+    for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
+        if trial.shares.caustic < FOUND * caustics {
+            trial.expected = f64::INFINITY;
+        }
+    }
+    (trials, "least expected error".into())
+}

@@ -1,0 +1,196 @@
+//! One candidate tried on a small picture.
+
+use super::{Balance, Free, Way};
+use crate::camera::Camera;
+use crate::estimator::{Pixel, SquaredError};
+use crate::light::Guide;
+use crate::math::DVec3;
+use crate::render::method::Method;
+use crate::render::session::{Session, Stage};
+use crate::render::settings::{Levels, Settings, Shard};
+use crate::scene::Scene;
+use crate::transport::MAX_LEVELS;
+
+/// Light paths of a trial over those of the render. As many neighbours are then found in as many times the area.
+const PHOTONS: f64 = 0.25;
+/// Added to a pixel's squared value: relMSE.
+const DARK: f64 = 0.01;
+
+/// What an additive part of the picture means to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shares {
+    /// Light sources seen directly or through perfect mirrors and clear glass.
+    pub emission: f64,
+    /// Direct light.
+    pub direct: f64,
+    /// Everything else from surfaces.
+    pub indirect: f64,
+    /// Caustics.
+    pub caustic: f64,
+    /// Light scattered by media on its way to the eye.
+    pub volume: f64,
+}
+
+/// A candidate and how it did.
+#[derive(Clone, Copy, Debug)]
+pub struct Trial {
+    /// The candidate.
+    pub way: Way,
+    /// Share of the picture's light by part.
+    pub shares: Shares,
+    /// Relative error (the root of relMSE) of a picture without the part.
+    pub without: Shares,
+    /// Counted core-seconds of an iteration of the whole picture.
+    pub seconds_per_iteration: f64,
+    /// Expected relMSE when the budget is spent.
+    pub expected: f64,
+    /// What suits it.
+    pub balance: Balance,
+}
+
+/// Settings of a trial: those of the render with fewer photons, and all levels, which tell the bias.
+pub(super) fn settings(of: &Settings) -> Settings {
+    let method = of.method;
+    Settings {
+        levels: Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 }),
+        photons: ((f64::from(of.photons) * PHOTONS) as u32).max(1),
+        iterations: None,
+        time: None,
+        target_error: None,
+        techniques: false,
+        shard: Shard { index: 0, count: 1 },
+        ..of.clone()
+    }
+}
+
+/// What a trial is told.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    /// Iterations to try.
+    pub iterations: u64,
+    /// What the render may take (core-seconds).
+    pub budget: f64,
+    /// Settings that may be balanced.
+    pub free: Free,
+}
+
+/// Standard errors by which a variance is taken to be larger than it looks: rare bright samples make it look smaller more often than larger.
+const CAUTION: f64 = 1.0;
+
+/// Sums over pixels of relative squares.
+#[derive(Default)]
+struct Sums {
+    /// Relative variance of the mean by level.
+    variance: [f64; MAX_LEVELS],
+    /// Of squares of the own level's.
+    variance2: f64,
+    squared_bias: f64,
+    parts: [f64; 5],
+    squares: [f64; 5],
+    pixels: f64,
+}
+
+impl Sums {
+    fn of(pixels: &[Pixel], levels: Levels) -> Sums {
+        let mut sums = Sums::default();
+        let own = levels.own();
+        let mean = |v: DVec3| v.element_sum() / 3.0;
+        for pixel in pixels {
+            let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
+            let n = f64::from(pixel.iterations);
+            let value = mean(pixel.levels[own].mean);
+            let scale = 1.0 / (value * value + DARK);
+            for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
+                *sum += mean(level.variance_of_mean(n)) * scale;
+            }
+            sums.variance2 += (mean(error.variance) * scale).powi(2);
+            sums.squared_bias += mean(error.squared_bias) * scale;
+            let parts = &pixel.parts;
+            let parts = [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume];
+            for (k, part) in parts.into_iter().enumerate() {
+                let part = part / n;
+                sums.parts[k] += mean(part);
+                sums.squares[k] += mean(part * part) * scale;
+            }
+            sums.pixels += 1.0;
+        }
+        sums
+    }
+
+    fn shares(of: [f64; 5]) -> Shares {
+        let [emission, direct, indirect, caustic, volume] = of;
+        Shares { emission, direct, indirect, caustic, volume }
+    }
+}
+
+/// Parts of the variance of levels that share a path: that which is the same at all, and that which falls with the area (1 at the own level). By least
+/// squares over levels 2 to 5, whose areas are 1/4, 1/2, 1 and 2.
+fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
+    let x = [4.0, 2.0, 1.0, 0.5];
+    let y = [variance[1], variance[2], variance[3], variance[4]];
+    let (mx, my) = (x.iter().sum::<f64>() / 4.0, y.iter().sum::<f64>() / 4.0);
+    let slope = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>()
+        / x.iter().map(|x| (x - mx) * (x - mx)).sum::<f64>();
+    let own = y[2];
+    let photons = slope.clamp(0.0, 0.98 * own);
+    (own - photons, photons)
+}
+
+impl Trial {
+    /// Tries a way on a small picture. `cost` tells the core-seconds of an iteration of the whole picture, of its light paths too where there are no eye paths;
+    /// `budget` is what the render may take.
+    pub(super) fn new(
+        scene: &Scene,
+        small: &Camera,
+        way: Way,
+        of: &Settings,
+        cost: &impl Fn(&Settings, bool, Option<&Guide>) -> f64,
+        plan: &Plan,
+    ) -> Trial {
+        let trial = settings(of);
+        let stage = Stage::new(scene, small, &trial);
+        let mut session = Session::new(&stage);
+        for _ in 0..plan.iterations {
+            session.step();
+        }
+        let levels = stage.settings().levels;
+        let sums = Sums::of(session.pixels(), levels);
+        let pixels = sums.pixels.max(1.0);
+        let done = plan.iterations as f64;
+        let total: f64 = sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let relative = |x: f64| x / pixels;
+        let gathers = of.method.gathers();
+        let (fixed, photons) =
+            if gathers { split(&sums.variance.map(relative)) } else { (relative(sums.variance[levels.own()]), 0.0) };
+        let variance = relative(sums.variance[levels.own()]);
+        let spread = (relative(sums.variance2) - variance * variance).max(0.0).sqrt() / pixels.sqrt();
+        let fixed = fixed + CAUTION * spread;
+        let mut squared_bias = relative(sums.squared_bias).max(0.0);
+        if gathers {
+            // The same neighbours in a smaller area.
+            squared_bias *= PHOTONS * PHOTONS;
+        }
+        let guide = session.guide();
+        let (all, light) = (cost(of, false, guide), cost(of, true, guide));
+        let mut balance =
+            if gathers { Balance::new(fixed, photons, squared_bias, all - light, light) } else { Balance::USUAL };
+        balance.keep(plan.free);
+        let mut balanced = of.clone();
+        balance.apply(&mut balanced);
+        let seconds_per_iteration = cost(&balanced, false, guide);
+        let n = plan.budget / seconds_per_iteration / done;
+        let alpha = of.alpha;
+        let area = balance.neighbours / balance.photons;
+        let noise = if gathers { fixed / n + photons / (balance.neighbours * n.powf(alpha)) } else { fixed / n };
+        let bias = squared_bias * area * area / n.powf(2.0 * (1.0 - alpha));
+        let bias = if of.method == Method::Path { 0.0 } else { bias };
+        Trial {
+            way,
+            shares: Sums::shares(sums.parts.map(|part| part / total)),
+            without: Sums::shares(sums.squares.map(|square| relative(square).sqrt())),
+            seconds_per_iteration,
+            expected: noise + bias,
+            balance,
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! What `--method auto` takes an iteration to cost, by counted work, beside what it costs.
+//!
+//! `cargo bench --bench cost -- SCENE.glb... [width=W]`: core-seconds of an iteration by way and scene; the last line is JSON for `scripts/figures`.
+
+use caustique::render::auto::{Way, counted_cost};
+use caustique::render::{Method, Session, Settings, Stage, cpu_seconds};
+use caustique::scene::gltf::{ReadOptions, read};
+use caustique::scene::{Scene, View};
+use caustique::transport::Indirect;
+
+const ITERATIONS: u32 = 4;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let width = arguments.iter().find_map(|a| a.strip_prefix("width=")?.parse().ok()).unwrap_or(320);
+    let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
+    let caustics = Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
+    let ways = [
+        plain(Method::Path),
+        plain(Method::Bdpt),
+        plain(Method::Vcm),
+        plain(Method::Sppm),
+        Way { guided: true, ..plain(Method::Sppm) },
+        caustics,
+    ];
+    let mut rows = Vec::new();
+    for path in arguments.iter().filter(|a| !a.contains('=')) {
+        let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
+        let camera =
+            scene.camera(&View { camera: None, width: Some(width), height: None }).unwrap_or_else(|e| panic!("{e}"));
+        for way in ways {
+            let settings = Settings::of(way);
+            let stage = Stage::new(&scene, &camera, &settings);
+            let mut session = Session::new(&stage);
+            session.step();
+            let start = cpu_seconds();
+            for _ in 0..ITERATIONS {
+                session.step();
+            }
+            let seconds = (cpu_seconds() - start) / f64::from(ITERATIONS);
+            let counted = counted_cost(&scene, &camera, way, &settings);
+            println!(
+                "{path:<24} {:<60} counted {counted:7.3}  measured {seconds:7.3}  ratio {:5.2}",
+                way.name(),
+                counted / seconds
+            );
+            rows.push(serde_json::json!({"scene": path, "way": way.name(), "counted": counted, "measured": seconds}));
+        }
+    }
+    println!("{}", serde_json::json!({ "rows": rows }));
+}
