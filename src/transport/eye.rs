@@ -289,7 +289,8 @@ impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
             let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
             let longest = self.max_depth - vertex.depth;
             let medium = vertex.medium_id(self.scene);
-            let gathered = self.volume.map(|volume| volume.gather(self.near_volume, vertex, medium, longest));
+            let gather = |volume: Volume<'_>| volume.gather(self.kernel, self.near_volume, vertex, medium, longest);
+            let gathered = self.volume.map(gather);
             let clear = self.stage == Stage::Clear;
             let measure = &mut self.measure;
             let (light, photons) = if clear {
