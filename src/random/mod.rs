@@ -73,6 +73,8 @@ pub enum Purpose {
     SecondAlpha = 19,
     /// Whether a photon of constant flux outlives what it lost on its way here.
     Loss = 20,
+    /// Distance of a point in a medium by the angle as seen from a lamp.
+    Equiangular = 21,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

@@ -43,8 +43,9 @@ pub fn direct_light(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: 
     light
 }
 
+/// The first strategy of [`direct_light`] alone.
 #[inline]
-fn next_event(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+pub fn next_event(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
     let draws = vertex.draws();
     let choice = draws.one(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
@@ -60,7 +61,7 @@ fn next_event(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSe
         let (f, pdf) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
         scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
-    let arriving = scattered * sample.radiance / sample.pdf_w;
+    let arriving = scattered * sample.radiance / sample.pdf_w * vertex.next_event_share();
     // NaN is dropped here, before it costs a ray.
     if !is_lit(arriving) {
         return Rgb::ZERO;

@@ -8,7 +8,7 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
-use super::direct::{balance, direct_light};
+use super::direct::{balance, direct_light, next_event};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::segment::Known;
@@ -304,6 +304,15 @@ impl<'a, B: Bandwidths, K: Kernel> Visitor<'a> for Gather<'_, B, K> {
             }
         }
         Next::Stop
+    }
+
+    #[inline]
+    fn lit(&mut self, vertex: &MediumVertex) {
+        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() {
+            let clear = self.stage == Stage::Clear;
+            let light = if clear { &mut self.measure.volume } else { &mut self.measure.indirect };
+            *light += vertex.throughput * next_event(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
+        }
     }
 
     #[inline]

@@ -140,6 +140,7 @@ mod tests {
             draws: Stream::new(0, 0, Domain::Test, 0).vertex(0),
             flight: Flight::FREE,
             opacity: 1.0,
+            next_event: 1.0,
             survival_scale: 1.0,
         }
     }
