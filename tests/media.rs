@@ -271,6 +271,23 @@ fn single_scattering_of_a_point_light() {
     check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
 }
 
+/// Air close to a lamp, where the inverse square would rule the noise of points drawn by transmittance: near enough on one side of the picture for
+/// points drawn by the angle, too far on the other.
+#[test]
+fn air_close_to_a_point_light() {
+    let medium = fog([0.05, 0.1, 0.15], [0.1, 0.1, 0.05], 0.3);
+    let mut description = Description { medium: Some(medium), ..Description::default() };
+    add(&mut description, "mark", quad(Vec3::new(-1.0, -1.0, 6.0), Vec3::X * 2.0, Vec3::Y * 2.0), matte(0.0, 0.0));
+    let light = DVec3::new(0.5, 0.1, -2.0);
+    description.lights.push(point_light(light, 7.0));
+    description.cameras.push(look_at(DVec3::ZERO, -DVec3::Z, 20.0));
+    let scene = build(description);
+    let expected = airlight(&medium, light, 7.0, 10f64.to_radians().tan());
+    let one = |seed| Settings { max_depth: 2, ..photons(100, 0.1, 400, seed) };
+    let check = Check { expected, bias: 2e-3, detects: 0.03 };
+    check.run("air close to a light", &means(&scene, Method::Sppm, 8, 8, one));
+}
+
 // ---------------------------------------------------------------- agreement
 
 const SIZE: u32 = 16;

@@ -6,11 +6,12 @@
 //!   The file's header says `"error_of": "Noisy"`.
 //! - `A` is the fraction of eye paths that hit a surface or are taken by a medium in a mesh; where an environment shines the background is part of the picture,
 //!   and it is 1.
-//! - `Volume` is there only where media scatter.
+//! - `Volume` is there only where media scatter, `VolumeRadius` where photons are gathered in them.
 //! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and `normal` are zero there.
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
+use crate::estimator::rule::volume::level_factor;
 use crate::estimator::{Pixel, SquaredError};
 use crate::math::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -37,6 +38,8 @@ pub struct Shape {
     pub environment: bool,
     /// Whether media scatter.
     pub volume: bool,
+    /// Where photons are gathered in media: bandwidth there of the last iteration over that of the first.
+    pub volume_radius_factor: Option<f64>,
 }
 
 /// Values of one layer at one pixel, as many as it has components.
@@ -74,7 +77,7 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, volume } = *shape;
+    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, volume, volume_radius_factor } = *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
@@ -96,6 +99,10 @@ fn columns(shape: &Shape) -> Vec<Column> {
         // Each level's squared bandwidth is half that of the next larger.
         let factor = (radius2_factor * 0.5f64.powi((levels - 1 - level) as i32)).sqrt() as f32;
         columns.push(Column::one(format!("Radius{}", level + 1), "X", move |p| p.bandwidth * factor));
+    }
+    for (level, factor) in volume_radius_factor.into_iter().flat_map(|factor| (0..levels).map(move |k| (k, factor))) {
+        let factor = factor as f32 * level_factor(level, levels);
+        columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", move |p| p.volume_bandwidth * factor));
     }
     columns.extend([
         Column::rgb("Direct", |p| mean(p.parts.direct, p.iterations)),
@@ -195,6 +202,7 @@ mod tests {
         radius2_factor: 0.25,
         environment: false,
         volume: true,
+        volume_radius_factor: Some(0.5),
     };
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
@@ -223,7 +231,7 @@ mod tests {
 
     #[test]
     fn the_parts_sum_to_the_image_and_radii_halve_their_squares() {
-        let mut pixel = Pixel::new(2.0);
+        let mut pixel = Pixel { volume_bandwidth: 3.0, ..Pixel::new(2.0) };
         for i in 0..5 {
             let x = 0.1 + 0.37 * i as f32;
             pixel.add(&measure(x, true), Some(&measure(1.1 * x, i != 0)), 5, 3);
@@ -240,12 +248,17 @@ mod tests {
         for (name, expected) in [("Radius5", 1.0), ("Radius4", 0.5f32.sqrt()), ("Radius3", 0.5), ("Radius1", 0.25)] {
             assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
         }
+        // Half of the largest, then 1/cbrt(2) a level.
+        for (name, expected) in [("VolumeRadius5", 1.5), ("VolumeRadius4", 1.5 / 2f32.cbrt()), ("VolumeRadius2", 0.75)]
+        {
+            assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
+        }
         // One of ten eye paths missed: it counts for alpha and albedo, not for depth.
         assert_eq!(value(&set, "", "A"), 0.9);
         assert!((value(&set, "albedo", "R") - 0.45).abs() < 1e-6);
         assert_eq!((value(&set, "depth", "Z"), value(&set, "normal", "Y")), (4.0, 1.0));
-        let clear = Shape { volume: false, ..SHAPE };
-        assert_eq!(names(&clear).len() + 1, names(&SHAPE).len());
+        let clear = Shape { volume: false, volume_radius_factor: None, ..SHAPE };
+        assert_eq!(names(&clear).len() + 6, names(&SHAPE).len());
         assert_eq!(names(&SHAPE), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
     }
 

@@ -302,6 +302,20 @@ impl Lights {
         }
     }
 
+    /// The point of a light to which [`Lights::sample_direct`] goes with these numbers, wherever from. `None` for light from infinity.
+    #[inline]
+    pub fn point(&self, choice: f32, u: Vec2) -> Option<Vec3> {
+        let (index, ..) = self.choice.as_ref()?.sample(choice);
+        match &self.emitters[index] {
+            Emitter::Triangle { corners, .. } => {
+                let b = warp::triangle_uniform(u);
+                Some(corners[0] + corners[1] * b.x + corners[2] * b.y)
+            }
+            Emitter::Point { p, .. } | Emitter::Spot { p, .. } => Some(*p),
+            Emitter::Sun { .. } | Emitter::Environment => None,
+        }
+    }
+
     /// Radiance that a surface hit by a ray sends back along it, and the density per solid angle with which
     /// [`Lights::sample_direct`] from the ray's origin `p` would have found that point.
     #[inline]

@@ -1,9 +1,11 @@
 //! Homogeneous participating media: how far light flies in them, and where it goes when they scatter it.
 
+mod equiangular;
 mod flight;
 mod phase;
 
-pub use flight::{Collision, Fate, Flight};
+pub use equiangular::Equiangular;
+pub use flight::{Collision, Collisions, Fate, Flight};
 pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;

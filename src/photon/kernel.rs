@@ -1,7 +1,8 @@
 //! Kernels of density estimation: how much a photon counts by its distance.
 //!
 //! All have the bandwidth as the radius of their support, and the squared distance over the squared bandwidth, `s` in [0, 1), as their argument.
-//! What is written here is a kernel over the box kernel: times 1 / (pi r^2) it integrates to one over the disc of radius r.
+//! What is written here is a kernel over the box kernel: on surfaces, times 1 / (pi r^2) it integrates to one over the disc of radius r; in media,
+//! times 3 / (4 pi r^3), over the ball.
 
 use std::f32::consts::PI;
 use wide::f32x8;
@@ -14,15 +15,17 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     const SECOND_MOMENT: f32;
     /// Integral of the squared kernel, times pi r^2: it scales the variance.
     const ROUGHNESS: f32;
-    /// The kernel over the box kernel.
+    /// The kernel over the box kernel, on surfaces.
     fn weight(s: f32) -> f32;
+    /// The same in media: of the same shape, normalised over the ball.
+    fn ball_weight(s: f32) -> f32;
 }
 
 /// One within the bandwidth \[post-reconstruction 2021, (3)\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Box;
 
-/// `2 (1 - s)`: of all kernels the one of least asymptotic error \[Epanechnikov 1969\].
+/// `2 (1 - s)`, over the ball `5/2 (1 - s)`: of all kernels the one of least asymptotic error \[Epanechnikov 1969\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Epanechnikov;
 
@@ -38,6 +41,10 @@ impl Kernel for Box {
     fn weight(_: f32) -> f32 {
         1.0
     }
+    #[inline(always)]
+    fn ball_weight(_: f32) -> f32 {
+        1.0
+    }
 }
 
 impl Kernel for Epanechnikov {
@@ -48,12 +55,18 @@ impl Kernel for Epanechnikov {
     fn weight(s: f32) -> f32 {
         2.0 * (1.0 - s)
     }
+    #[inline(always)]
+    fn ball_weight(s: f32) -> f32 {
+        2.5 * (1.0 - s)
+    }
 }
 
 /// Half the squared bandwidth over the variance: the exponent at the rim.
 const RIM: f32 = 4.5;
 /// Share of the normal distribution within three standard deviations, in two dimensions: `1 - exp(-RIM)`.
 const KEPT: f32 = 0.988_891;
+/// At the centre, the kernel over the ball over its box kernel: `1 / int_0^1 3 x^2 exp(-RIM x^2) dx`.
+const BALL_PEAK: f32 = 7.397_645;
 
 impl Kernel for Gaussian {
     const BOX: bool = false;
@@ -62,6 +75,10 @@ impl Kernel for Gaussian {
     #[inline(always)]
     fn weight(s: f32) -> f32 {
         (RIM / KEPT) * (-RIM * s).exp()
+    }
+    #[inline(always)]
+    fn ball_weight(s: f32) -> f32 {
+        BALL_PEAK * (-RIM * s).exp()
     }
 }
 
@@ -89,6 +106,12 @@ mod tests {
         assert!((integral(|s| 0.5 * s * weight(s)) - f64::from(K::SECOND_MOMENT)).abs() < 1e-5);
         assert!((integral(|s| weight(s) * weight(s)) - f64::from(K::ROUGHNESS)).abs() < 1e-4);
         assert_eq!(K::BOX, weight(0.0) == weight(0.9));
+        // Over the ball the volume element over 4/3 pi r^3 is 3/2 sqrt(s) ds.
+        let over_ball = |w: fn(f32) -> f32| integral(|s| 1.5 * s.sqrt() * f64::from(w(s as f32)));
+        assert!((over_ball(K::ball_weight) - 1.0).abs() < 1e-5);
+        assert!(K::BOX || (over_ball(K::weight) - 1.0).abs() > 0.1, "the disc's normalisation goes unnoticed");
+        let shape = |s: f32| K::ball_weight(s) / K::weight(s);
+        assert!((shape(0.1) - shape(0.7)).abs() < 1e-5);
     }
 
     #[test]

@@ -79,6 +79,8 @@ pub enum Purpose {
     Loss = 20,
     /// Which of several sets of lobes a path goes on with.
     LobeChoice = 21,
+    /// Distance of a point in a medium by the angle as seen from a lamp.
+    Equiangular = 22,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

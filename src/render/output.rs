@@ -6,7 +6,7 @@ use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::estimator::Pixel;
-use crate::estimator::rule::memoryless::radius2_factor;
+use crate::estimator::rule::{memoryless::radius2_factor, volume::radius_factor};
 use crate::film::{LayerSet, output};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -39,6 +39,8 @@ pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::
         radius2_factor: radius2_factor(last, settings.alpha),
         environment: present.environment,
         volume: present.volume,
+        volume_radius_factor: (present.volume && settings.method.gathers())
+            .then(|| radius_factor(last, settings.volume_alpha)),
     }
 }
 

@@ -61,7 +61,7 @@ pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) 
         let (f, pdf) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
         scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
-    let arriving = scattered * sample.radiance / sample.pdf_w;
+    let arriving = scattered * sample.radiance / sample.pdf_w * vertex.next_event_share();
     // NaN is dropped here, before it costs a ray.
     if !is_lit(arriving) {
         return Rgb::ZERO;

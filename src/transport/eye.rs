@@ -13,7 +13,7 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
-use super::direct::{balance, direct_light, next_event};
+use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::segment::Known;
@@ -366,7 +366,8 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
             let longest = self.max_depth - vertex.depth;
             let medium = vertex.medium_id(self.scene);
-            let gathered = self.volume.map(|volume| volume.gather(self.near_volume, vertex, medium, longest));
+            let gather = |volume: Volume<'_>| volume.gather(self.kernel, self.near_volume, vertex, medium, longest);
+            let gathered = self.volume.map(gather);
             let clear = self.stage == Stage::Clear;
             let measure = &mut self.measure;
             let (light, photons) = if clear {
@@ -380,6 +381,16 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             }
         }
         Next::Stop
+    }
+
+    #[inline]
+    fn lit(&mut self, vertex: &MediumVertex) {
+        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() {
+            let clear = self.stage == Stage::Clear;
+            let light = if clear { &mut self.measure.volume } else { &mut self.measure.indirect };
+            *light += vertex.throughput
+                * next_event(self.scene, vertex, [(LobeSet::BROAD, SECOND_STRATEGY), (LobeSet::NONE, 0.0)]);
+        }
     }
 
     #[inline]

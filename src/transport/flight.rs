@@ -3,12 +3,18 @@
 //! A walk by chance ([`Fly`]) draws where it is scattered and is there or goes past: paths as long as they come. A walk that splits
 //! ([`Split`]) shows its visitor one vertex in every medium on its way and goes on to the surface behind, attenuated. Such a vertex is measured,
 //! not scattered from; it suits eye paths that gather, for which a vertex in a medium is an end.
+//!
+//! Such a vertex is drawn by how much of the ray is scattered where, as suits all light but that straight from a lamp nearby, which falls off with
+//! the distance squared. Where one is near there is a second vertex for that alone, drawn by the angle as seen from the lamp ([`Equiangular`]), and both share
+//! next-event estimation by the balance heuristic. They share its random numbers, too, so the lamp's point is the same for both. Given these numbers both
+//! densities are known, and the shares sum to one: nothing is biased, however lights are chosen.
 
+use super::direct::balance;
 use super::segment::{MediumArrival, Passage, Span, Through};
 use super::site::MediumVertex;
 use super::walk::{Scattered, Visitor};
 use crate::math::{Rgb, Vec3};
-use crate::medium::{Collision, Fate, Flight};
+use crate::medium::{Collision, Equiangular, Fate, Flight};
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 
@@ -74,31 +80,63 @@ pub(super) struct Split<'a, V> {
     pub survival_scale: f32,
 }
 
+impl<V> Split<'_, V> {
+    /// The way as seen from the point of a light to which next-event estimation goes, if that is near.
+    #[inline]
+    fn lamp(&self, span: &Span<'_>, draws: &Draws) -> Option<Equiangular> {
+        let lamp = self.scene.lights.point(draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint))?;
+        let seen = Equiangular::new(span.origin, span.direction, span.distance, lamp)?;
+        // Light comes from within a mean free path, mostly.
+        let length = span.distance.min(3.0 / span.medium.sigma_t().element_sum());
+        seen.is_near(length).then_some(seen)
+    }
+
+    /// A vertex on the way; see [`MediumVertex`] for `opacity` and `next_event`.
+    #[inline]
+    fn vertex(&self, span: &Span<'_>, at: Collision, draws: Draws, opacity: f32, next_event: f32) -> MediumVertex {
+        let met = arrival(self.scene, span, at);
+        let arriving = self.throughput * met.weight;
+        MediumVertex {
+            wo: -span.direction,
+            throughput: arriving * met.medium.sigma_s,
+            arriving,
+            depth: self.depth,
+            from: self.from,
+            draws,
+            flight: Flight::FREE,
+            opacity,
+            next_event,
+            survival_scale: self.survival_scale,
+            met,
+        }
+    }
+}
+
 impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
     #[inline]
     fn pass(&mut self, span: &Span<'_>) -> Passage {
         let left = span.medium.transmittance(span.distance);
-        // One for the point, the others for what is measured there; the surface behind has draws of its own.
+        if !span.medium.scatters() {
+            return Passage::Left(left);
+        }
+        // One for the points, the others for what is measured there; the surface behind has draws of its own.
         let draws = self.draws.nth(span.crossed);
-        let carried = self.throughput * span.left;
-        if span.medium.scatters()
-            && let Some(collision) = span.medium.collide(carried, span.distance, draws.two(Purpose::Flight))
-        {
-            let met = arrival(self.scene, span, collision);
-            let arriving = self.throughput * met.weight;
-            let vertex = MediumVertex {
-                wo: -span.direction,
-                throughput: arriving * met.medium.sigma_s,
-                arriving,
-                depth: self.depth,
-                from: self.from,
-                draws,
-                flight: Flight::FREE,
-                opacity: 1.0 - left.element_sum() / 3.0,
-                survival_scale: self.survival_scale,
-                met,
-            };
-            self.visitor.medium(&vertex, self.scattered);
+        if let Some(collisions) = span.medium.collisions(self.throughput * span.left, span.distance) {
+            let lamp = self.lamp(span, &draws);
+            let opacity = 1.0 - left.element_sum() / 3.0;
+            if let Some(at) = collisions.draw(draws.two(Purpose::Flight)) {
+                let by_angle = lamp.map_or(0.0, |lamp| lamp.pdf(at.distance));
+                let share = balance(collisions.pdf(at.distance), by_angle);
+                let vertex = self.vertex(span, at, draws, opacity, share);
+                self.visitor.medium(&vertex, self.scattered);
+            }
+            if let Some(lamp) = lamp
+                && let Some(at) = collisions.draw_by_angle(&lamp, draws.one(Purpose::Equiangular))
+            {
+                let share = balance(lamp.pdf(at.distance), collisions.pdf(at.distance));
+                let vertex = self.vertex(span, at, draws, opacity, share);
+                self.visitor.lit(&vertex);
+            }
         }
         Passage::Left(left)
     }

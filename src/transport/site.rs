@@ -29,6 +29,8 @@ pub struct MediumVertex {
     pub flight: Flight,
     /// Share of the light that the medium takes from rays through all of it; 1 where chance has brought the path here.
     pub opacity: f32,
+    /// Share of next-event estimation that is this vertex's, where another is drawn for it (`flight.rs`).
+    pub next_event: f32,
     pub(super) survival_scale: f32,
 }
 
@@ -80,6 +82,11 @@ pub trait Site {
     fn crosses(&self, w: Vec3) -> bool;
     /// See [`Vertex::survival`].
     fn survival(&self, set: LobeSet) -> f32;
+    /// See [`MediumVertex::next_event`].
+    #[inline]
+    fn next_event_share(&self) -> f32 {
+        1.0
+    }
 
     /// What is left of light on the way along `wi` to `target` (`None`: out of the scene), a vertex of a medium or not.
     #[inline]
@@ -230,6 +237,11 @@ impl Site for MediumVertex {
     #[inline]
     fn crosses(&self, _: Vec3) -> bool {
         false
+    }
+
+    #[inline]
+    fn next_event_share(&self) -> f32 {
+        self.next_event
     }
 
     #[inline]

@@ -99,6 +99,11 @@ pub trait Visitor<'a> {
         let _ = (vertex, scattered);
         Next::Stop
     }
+    /// A second vertex in the same medium, of a walk that splits, at which nothing but its share of next-event estimation is to be measured.
+    #[inline]
+    fn lit(&mut self, vertex: &MediumVertex) {
+        let _ = vertex;
+    }
     /// `sample` is drawn at `vertex`, and the path goes on.
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
@@ -230,6 +235,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
                     draws,
                     flight,
                     opacity: 1.0,
+                    next_event: 1.0,
                     survival_scale,
                 };
                 // Where the channel that has brought it here scatters nothing, it carries nothing.

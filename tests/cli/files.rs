@@ -1,6 +1,6 @@
 //! What a render leaves in its files.
 
-use crate::{Folder, values};
+use crate::{Folder, support, values};
 use caustique::image::exr;
 use serde_json::Value;
 
@@ -319,6 +319,23 @@ fn levels_layers_names_and_bandwidths_as_asked() {
     let refused = folder.run("render scene.glb -o no.exr --levels 3");
     let error = "command line: the network compact combines 5 levels, not 3\nhint: add --no-combine, or render with --levels 5\n";
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
+}
+
+/// Photons in media have bandwidths of their own, whose balls double from level to level; methods that gather none there have none.
+#[test]
+fn media_add_layers_of_their_own() {
+    let folder = Folder::new();
+    support::glb::write_foggy(&folder.path("scene.glb"));
+    folder.render("-o fog.exr --iterations 2 --no-combine");
+    let (set, _) = folder.read("fog.exr");
+    for k in 1..5 {
+        let [small, large] = [k, k + 1].map(|k| values(&set, &format!("VolumeRadius{k}")));
+        assert!(small.iter().zip(&large).all(|(s, l)| l[0] > 0.0 && ((s[0] / l[0]).powi(3) - 0.5).abs() < 1e-5));
+    }
+    assert!(set.get("VolumeRadius6").is_none() && set.get("Volume").is_some());
+    folder.run("render scene.glb -o vcm.exr --width 64 --height 48 --iterations 2 --no-combine --method vcm");
+    let (set, _) = folder.read("vcm.exr");
+    assert!(set.get("Volume").is_some() && set.get("Radius1").is_some() && set.get("VolumeRadius1").is_none());
 }
 
 /// One iteration cannot tell a variance: the header says so, and nothing in the file is infinite.

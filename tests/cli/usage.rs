@@ -1,6 +1,6 @@
 //! What the command line refuses, word for word, and what it offers.
 
-use crate::{Folder, Outcome};
+use crate::{Folder, Outcome, support};
 
 /// Every error is `place: cause`, then `hint: remedy`, and nothing else, before any work is done.
 #[test]
@@ -280,6 +280,26 @@ fn missing_libraries() {
     }
     let well = folder.run("doctor");
     assert_eq!((well.code, well.stderr.as_str()), (Some(0), ""));
+}
+
+/// Methods that gather photons on surfaces alone would show no light that media scatter: they refuse, before any work is done.
+#[test]
+fn scattering_media_and_the_methods_that_refuse_them() {
+    let folder = Folder::new();
+    support::glb::write_foggy(&folder.path("scene.glb"));
+    let render = "render scene.glb -o out.exr --width 32 --height 24 --iterations 1 --no-combine --method";
+    for method in ["pm", "bpm"] {
+        let outcome = folder.run(&format!("{render} {method}"));
+        let error = format!(
+            "scene.glb: --method {method} does not render media that scatter light\nhint: choose --method sppm, cppm, vcm, bdpt or path\n"
+        );
+        assert_eq!((outcome.code, outcome.stderr), (Some(2), error));
+        assert_eq!((outcome.stdout.as_str(), folder.files().len()), ("", 0));
+    }
+    for method in ["sppm --photons 100", "cppm --photons 100", "vcm", "bdpt", "path"] {
+        let outcome = folder.run(&format!("{render} {method}"));
+        assert_eq!(outcome.code, Some(0), "{method}: {}", outcome.stderr);
+    }
 }
 
 /// What cannot fit into memory is refused before rendering.

@@ -1,15 +1,22 @@
 //! A small scene as a .glb file: a floor, an upright mirror on it, a point light, two cameras.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// Writes the scene, with the lamp or dark.
 pub fn write(path: &Path, lamp: bool) {
-    std::fs::write(path, bytes(lamp)).expect("the scene can be written");
+    std::fs::write(path, bytes(lamp, &json!({"light_units": "radiometric"}))).expect("the scene can be written");
+}
+
+/// The same with the lamp, in fog.
+pub fn write_foggy(path: &Path) {
+    let medium = json!({"sigma_a": [0.02, 0.02, 0.02], "sigma_s": [0.1, 0.1, 0.1], "g": 0.3});
+    let extras = json!({"light_units": "radiometric", "medium": medium});
+    std::fs::write(path, bytes(true, &extras)).expect("the scene can be written");
 }
 
 /// Quads as positions and indices: the floor looks up, the mirror along +Z.
-fn bytes(lamp: bool) -> Vec<u8> {
+fn bytes(lamp: bool, extras: &Value) -> Vec<u8> {
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
     let mirror: [[f32; 3]; 4] = [[-1.0, 0.1, -1.5], [1.0, 0.1, -1.5], [1.0, 2.0, -1.5], [-1.0, 2.0, -1.5]];
     let mut binary = Vec::new();
@@ -27,7 +34,7 @@ fn bytes(lamp: bool) -> Vec<u8> {
         "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [light]}},
         "scene": 0,
-        "scenes": [{"extras": {"caustique": {"light_units": "radiometric"}}, "nodes": if lamp { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
+        "scenes": [{"extras": {"caustique": extras}, "nodes": if lamp { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
         "nodes": [
             {"name": "Floor", "mesh": 0},
             {"name": "Mirror", "mesh": 1},
