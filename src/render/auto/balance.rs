@@ -1,8 +1,9 @@
 //! How wide to gather and how many photons to send: what the levels of a pilot tell.
 //!
 //! With n iterations of p light paths, in bandwidths of f times the usual squared radius, the relative squared error is
-//! `a / n + b / (n f p) + c f^2`: noise that no photon changes, noise of the photons, and squared bias. Levels differ in f alone, so their
-//! variances tell a and b, and their differences c.
+//! `a / n + b / (n f p) + c f`: noise that no photon changes, noise of the photons, and squared bias. Most bias is at edges, and the area that they blur grows
+//! with the radius: the squared bias grows as the area of a kernel does, not as its square. Levels differ in f alone, so their variances tell a
+//! and b, and their differences c.
 
 use super::Free;
 use crate::estimator::InitialBandwidth;
@@ -32,9 +33,9 @@ impl Balance {
         // For a given radius, q times as many light paths: (a + b / q) (eye + q light) is least at q^2 = (b eye) / (a light).
         let ratio = |a: f64, b: f64| if a > 0.0 && b > 0.0 { a / b } else { 1.0 };
         let q = (ratio(photons, fixed) * ratio(eye_cost, light_cost)).sqrt().clamp(PHOTONS.0, PHOTONS.1);
-        // b / (q f) + c f^2 is least at f^3 = b / (2 c q); q iterations' worth of photons more or less change n by `slower`.
+        // b / (q f) + c f is least at f^2 = b / (c q); q iterations' worth of photons more or less change n by `slower`.
         let slower = (eye_cost + q * light_cost) / (eye_cost + light_cost);
-        let f = ratio(photons * slower / q, 2.0 * squared_bias).cbrt();
+        let f = ratio(photons * slower / q, squared_bias).sqrt();
         // Within the radius that the usual number of neighbours sets, q times as many photons are found.
         let neighbours = (f * q).clamp(NEIGHBOURS.0, NEIGHBOURS.1);
         Balance { neighbours, photons: q }

@@ -3,7 +3,7 @@
 //!
 //! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants ([`cost`]). So the same arguments give the
 //! same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances: noise falls as
-//! 1/n where paths are whole, and as n^-alpha, the squared bias as n^-2(1 - alpha), where photons are gathered \[Knaus and Zwicker 2011\].
+//! 1/n where paths are whole, and as n^-alpha, the squared bias as n^-(1 - alpha), where photons are gathered \[Knaus and Zwicker 2011\].
 //!
 //! Where photons are gathered the pilot also balances: noise that bandwidths can smooth against the bias they bring, and light paths against eye paths
 //! ([`Balance`]).
@@ -31,7 +31,7 @@ const SHARE: f64 = 0.05;
 /// Pixels of the pilot's picture.
 const PIXELS: (f64, f64) = (768.0, 4096.0);
 /// Iterations of a candidate: as many as its share of the pilot allows.
-const ITERATIONS: (u64, u64) = (8, 64);
+const ITERATIONS: (u64, u64) = (6, 64);
 /// What a second of `--time` is taken for (core-seconds), whatever the machine.
 const CORES: f64 = 4.0;
 /// What a render until an error is reached is taken for (core-seconds).
