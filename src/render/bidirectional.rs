@@ -21,6 +21,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
+use crate::spectrum::Comb;
 use crate::transport::mis::Eta;
 use crate::transport::{
     Bidirectional, Eye, EyeMeasure, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
@@ -99,7 +100,8 @@ impl<'a> Passes<'a> {
 
     fn light_pass(&self, i: u64, pair: &Pair) -> LightPass {
         let (width, height) = self.camera.size();
-        LightPass::new(self.settings.seed, i, pair.light, width * height, self.settings.max_depth)
+        let Settings { seed, max_depth, .. } = *self.settings;
+        LightPass::new(seed, i, pair.light, width * height, max_depth).with(Comb::new(seed, i))
     }
 
     /// The photons that pass `i` leaves, where it was not rendered here.
@@ -166,9 +168,11 @@ impl<'a> Passes<'a> {
                 .map(|(tile, (measures, watch))| {
                     let (mut left, mut arena) = (Left::default(), Bump::new());
                     for places in tiles.groups(tile) {
-                        let starts = shared.eye.starts(&places, streams);
-                        for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                        let mut starts = shared.eye.starts(&places, streams);
+                        for (place, start) in places.iter().flatten().zip(starts.iter_mut().flatten()) {
                             let index = place.index as u32;
+                            // One wavelength for both, so that they can be connected.
+                            start.0.hue = pass.hue(index);
                             arena.reset();
                             let mut vertices = LightVertices::new_in(&arena);
                             shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());

@@ -11,6 +11,7 @@ use crate::math::{Rgb, Vec3};
 use crate::medium::{Collision, Fate, Flight};
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
+use crate::spectrum::Wavelength;
 
 fn arrival(scene: &Scene, span: &Span<'_>, collision: Collision) -> MediumArrival {
     let p = span.origin + span.direction * collision.distance;
@@ -71,6 +72,7 @@ pub(super) struct Split<'a, V> {
     pub depth: u32,
     pub scattered: Option<Scattered>,
     pub from: Vec3,
+    pub wavelength: Option<Wavelength>,
     pub survival_scale: f32,
 }
 
@@ -95,6 +97,7 @@ impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
                 draws,
                 flight: Flight::FREE,
                 opacity: 1.0 - left.element_sum() / 3.0,
+                wavelength: self.wavelength,
                 survival_scale: self.survival_scale,
                 met,
             };

@@ -10,6 +10,7 @@ use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags, VolumePhoton};
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
+use crate::spectrum::{Band, Comb, Hue};
 use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
@@ -23,6 +24,7 @@ pub struct LightPass {
     choice: SobolPair,
     point: SobolPair,
     direction: SobolPair,
+    comb: Option<Comb>,
 }
 
 /// How a light path begins.
@@ -47,7 +49,26 @@ impl LightPass {
             mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(0x9e37_79b9_7f4a_7c15))
                 ^ domain as u64);
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
-        LightPass { seed, pass, domain, paths, max_depth, choice: pair(1), point: pair(2), direction: pair(3) }
+        let (choice, point, direction) = (pair(1), pair(2), pair(3));
+        LightPass { seed, pass, domain, paths, max_depth, choice, point, direction, comb: None }
+    }
+
+    /// Whose paths take no other wavelengths than these.
+    #[must_use]
+    pub fn with(self, comb: Comb) -> LightPass {
+        LightPass { comb: Some(comb), ..self }
+    }
+
+    /// The hue of path `index`.
+    #[inline]
+    pub fn hue(&self, index: u32) -> Hue {
+        self.hue_of(self.stream(u64::from(index)))
+    }
+
+    #[inline]
+    fn hue_of(&self, stream: Stream) -> Hue {
+        let hue = Hue::new(stream.vertex(0).one(Purpose::Wavelength));
+        self.comb.map_or(hue, |comb| comb.nearest(hue))
     }
 
     /// Number of light paths.
@@ -73,6 +94,7 @@ impl LightPass {
             // It has come through the medium that fills all space, from infinity.
             flux *= medium.transmittance(f32::INFINITY);
         }
+        let stream = self.stream(u64::from(index));
         Some(Emitted {
             start: PathStart {
                 origin: emission.origin,
@@ -82,8 +104,9 @@ impl LightPass {
                 first: Known::Unknown,
                 far: emission.infinite,
                 channel: None,
+                hue: self.hue_of(stream),
             },
-            stream: self.stream(u64::from(index)),
+            stream,
             delta: emission.delta,
             light: emission.light,
             density: emission.density,
@@ -128,6 +151,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flux: vertex.throughput,
                 flags: PhotonFlags(flags),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+                band: Band::of(vertex.wavelength.as_ref()),
             });
         }
         Next::Continue(LobeSet::ALL)
@@ -143,6 +167,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flux: vertex.arriving,
                 medium: vertex.medium_id(self.scene),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+                band: Band::of(vertex.wavelength.as_ref()),
             });
         }
         Next::Continue(LobeSet::ALL)

@@ -8,6 +8,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
 use crate::random::Draws;
 use crate::scene::Scene;
+use crate::spectrum::Wavelength;
 
 /// A vertex of a path in a medium.
 pub struct MediumVertex {
@@ -29,6 +30,8 @@ pub struct MediumVertex {
     pub flight: Flight,
     /// Share of the light that the medium takes from rays through all of it; 1 where chance has brought the path here.
     pub opacity: f32,
+    /// The wavelength the path has taken.
+    pub wavelength: Option<Wavelength>,
     pub(super) survival_scale: f32,
 }
 
@@ -64,6 +67,8 @@ pub trait Site {
     fn depth(&self) -> u32;
     /// Random numbers of the vertex.
     fn draws(&self) -> Draws;
+    /// The wavelength the path has taken.
+    fn wavelength(&self) -> Option<&Wavelength>;
     /// Scattering from `wi` times its cosine, and the density of drawing `wi` ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
     /// Density of the way back ([`crate::bsdf::Shading::reverse_pdf`]).
@@ -120,6 +125,11 @@ impl Site for Vertex<'_, '_> {
     #[inline]
     fn draws(&self) -> Draws {
         self.draws
+    }
+
+    #[inline]
+    fn wavelength(&self) -> Option<&Wavelength> {
+        self.wavelength.as_ref()
     }
 
     #[inline]
@@ -191,6 +201,11 @@ impl Site for MediumVertex {
     #[inline]
     fn draws(&self) -> Draws {
         self.draws
+    }
+
+    #[inline]
+    fn wavelength(&self) -> Option<&Wavelength> {
+        self.wavelength.as_ref()
     }
 
     #[inline]

@@ -53,7 +53,9 @@ impl<'a> Volume<'a> {
             if photon.medium != medium || u32::from(photon.depth) > longest {
                 return;
             }
-            let light = photon.flux * phase.pdf_w(vertex.wo, photon.wi);
+            let meets = vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.meets(photon.band));
+            let Some(weight) = meets else { return };
+            let light = photon.flux * weight * phase.pdf_w(vertex.wo, photon.wi);
             for (sum, &radius2) in sums.iter_mut().zip(radius2) {
                 if distance2 < radius2 {
                     *sum += light;
@@ -107,6 +109,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::medium::{Flight, MediumParameters};
     use crate::random::{Domain, Purpose, Stream};
+    use crate::spectrum::Band;
     use crate::transport::{Interior, MediumArrival};
 
     const PHOTONS: u64 = 40_000;
@@ -121,6 +124,7 @@ mod tests {
             flux: Rgb::ONE / PHOTONS as f32,
             medium,
             depth: 2 + (i % 2) as u16,
+            band: Band::WHITE,
         }
     }
 
@@ -138,6 +142,7 @@ mod tests {
             draws: Stream::new(0, 0, Domain::Test, 0).vertex(0),
             flight: Flight::FREE,
             opacity: 1.0,
+            wavelength: None,
             survival_scale: 1.0,
         }
     }

@@ -45,7 +45,7 @@ pub fn plan(args: &RenderArgs, scene: &Scene, camera: &Camera) -> Value {
         ("caustic", caustic.clone(), deep(3) && reaches(method, "caustic", scene)),
         ("sds", caustic, deep(4) && reaches(method, "sds", scene)),
         ("volume", media.collect(), deep(if scene.survey.scattering { 2 } else { 1 })),
-        ("dispersion", by_material(|m| m.transmission > 0.0 && m.dispersion > 0.0), false),
+        ("dispersion", by_material(Material::disperses), true),
         ("depth_of_field", when(camera.has_lens(), "the camera has an aperture"), true),
         ("environment", when(environment, "light comes from all around"), true),
         ("alpha", when(scene.survey.alpha, "materials have cut-outs or blend"), true),
