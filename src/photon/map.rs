@@ -299,7 +299,15 @@ mod tests {
                     2 => Vec3::new(5.0, 5.0, 5.0),
                     _ => Vec3::new(u.x, u.y, v) * 10.0,
                 };
-                Photon { p, wi: Vec3::Y, ng: Vec3::Y, flux: Vec3::splat(i as f32), flags: PhotonFlags(0), depth: 2, band: Band::WHITE }
+                Photon {
+                    p,
+                    wi: Vec3::Y,
+                    ng: Vec3::Y,
+                    flux: Vec3::splat(i as f32),
+                    flags: PhotonFlags(0),
+                    depth: 2,
+                    band: Band::WHITE,
+                }
             })
             .collect()
     }

@@ -101,7 +101,10 @@ impl<'a> Passes<'a> {
     fn light_pass(&self, i: u64, pair: &Pair) -> LightPass {
         let (width, height) = self.camera.size();
         let Settings { seed, max_depth, .. } = *self.settings;
-        LightPass::new(seed, i, pair.light, width * height, max_depth).with(Comb::new(seed, i))
+        let pass = LightPass::new(seed, i, pair.light, width * height, max_depth);
+        // Others put paths together of one hue alone, whichever it is.
+        let merges = self.shared.is_some_and(|shared| shared.strategies.merge);
+        if merges { pass.with(Comb::slow(seed, i)) } else { pass }
     }
 
     /// The photons that pass `i` leaves, where it was not rendered here.

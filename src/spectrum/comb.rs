@@ -3,20 +3,24 @@
 use super::Hue;
 use crate::random::mix;
 
-/// One wavelength in each band, at the same place in all of them. Whatever paths of a pass meet, if they are of one band, they are of one wavelength.
-///
-/// From pass to pass the place moves to and fro with the square root of the number of passes: over a render it is everywhere alike, and its
-/// steps shrink, so that photons may even be left to the next pass, as bandwidths that shrink allow. Over all seeds it is uniform in every pass.
+/// One wavelength in each band, at the same place in all of them. Whatever paths of a pass meet, if they are of one band, they are of one wavelength. Over all
+/// seeds the place is uniform in every pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Comb {
     offset: f32,
 }
 
 impl Comb {
-    /// Of pass `pass` of a render with `seed`.
+    /// Of pass `pass` of a render with `seed`: places of successive passes fill the bands evenly, by the golden ratio.
     pub fn new(seed: u64, pass: u64) -> Comb {
-        let start = (mix(seed ^ 0x51ed_270b_8f7c_2a35) >> 11) as f64 * (2.0 / (1u64 << 53) as f64);
-        let at = ((pass as f64).sqrt() + start) % 2.0;
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        Comb { offset: ((pass as f64 * GOLDEN + start(seed)) % 1.0) as f32 }
+    }
+
+    /// For passes whose paths meet photons of the pass before: places move to and fro with the square root of the number of passes. Over a render they
+    /// are everywhere, and their steps shrink as bandwidths do, and with them the difference of wavelengths that meet.
+    pub fn slow(seed: u64, pass: u64) -> Comb {
+        let at = ((pass as f64).sqrt() + 2.0 * start(seed)) % 2.0;
         Comb { offset: (if at < 1.0 { at } else { 2.0 - at }) as f32 }
     }
 
@@ -27,26 +31,34 @@ impl Comb {
     }
 }
 
+/// Where the passes of a render begin, uniform in `[0, 1)`.
+fn start(seed: u64) -> f64 {
+    (mix(seed ^ 0x51ed_270b_8f7c_2a35) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::spectrum::BANDS;
 
-    /// Offsets are uniform over seeds in every pass, and over the passes of a render; steps shrink.
+    /// Places are uniform over seeds in every pass, and over the passes of a render; slow ones take steps that shrink.
     #[test]
-    fn offsets_are_uniform_and_slow_down() {
+    fn places_are_uniform() {
         // Kolmogorov's distance of 4000 uniform numbers exceeds 2.2 / sqrt(4000) with probability 1e-4.
         let distance = |mut offsets: Vec<f32>| {
             offsets.sort_by(f32::total_cmp);
             let n = offsets.len() as f32;
             offsets.iter().enumerate().map(|(i, x)| (x - i as f32 / n).abs()).fold(0.0, f32::max)
         };
-        for pass in [0, 1, 7] {
-            assert!(distance((0..4000).map(|seed| Comb::new(seed, pass).offset).collect()) < 0.035, "pass {pass}");
+        for comb in [Comb::new, Comb::slow] {
+            for pass in [0, 1, 7] {
+                assert!(distance((0..4000).map(|seed| comb(seed, pass).offset).collect()) < 0.035, "pass {pass}");
+            }
+            assert!(distance((1..4000).map(|pass| comb(3, pass).offset).collect()) < 0.02);
         }
-        assert!(distance((1..4000).map(|pass| Comb::new(3, pass).offset).collect()) < 0.02);
+        assert!(distance((1..40).map(|pass| Comb::new(3, pass).offset).collect()) < 0.08);
         for pass in 1..4000u64 {
-            let step = (Comb::new(3, pass).offset - Comb::new(3, pass + 1).offset).abs();
+            let step = (Comb::slow(3, pass).offset - Comb::slow(3, pass + 1).offset).abs();
             assert!(f64::from(step) < 0.51 / (pass as f64).sqrt(), "{pass}: {step}");
         }
     }

@@ -109,10 +109,6 @@ impl Wavelength {
     /// meet.
     #[inline]
     pub fn meets(&self, band: Band) -> Option<Rgb> {
-        if band == Band::WHITE {
-            Some(Rgb::ONE)
-        } else {
-            (band == self.band).then(|| self.once() * f32::from(BANDS))
-        }
+        if band == Band::WHITE { Some(Rgb::ONE) } else { (band == self.band).then(|| self.once() * f32::from(BANDS)) }
     }
 }

@@ -88,10 +88,7 @@ pub fn at(u: f32) -> (f32, Rgb) {
     let x = u * STEPS as f32;
     let k = (x as usize).min(STEPS - 1);
     let t = x - k as f32;
-    (
-        table.nm[k] + (table.nm[k + 1] - table.nm[k]) * t,
-        table.weight[k] + (table.weight[k + 1] - table.weight[k]) * t,
-    )
+    (table.nm[k] + (table.nm[k + 1] - table.nm[k]) * t, table.weight[k] + (table.weight[k + 1] - table.weight[k]) * t)
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub use interior::{Crossing, Interior, Surroundings};
 pub use light::{Emitted, EqualFlux, LightPass, Photons, light_path};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;
-pub use segment::{Arrival, End, MediumArrival, Way, next_surface, transmittance, way};
+pub use segment::{Arrival, End, Known, MediumArrival, Way, next_surface, transmittance, way};
 pub use site::{MediumVertex, Site};
 pub use volume::Volume;
 pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
