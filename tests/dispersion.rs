@@ -329,7 +329,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
             for index in 0..pass.paths() {
                 light_path(&scene, &Bump::new(), &surroundings, &pass, index, &mut photons);
             }
-            let (mut flux, mut moment) = ([0.0; 3], [0.0; 3]);
+            let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);
             for photon in photons.surface.iter().filter(|photon| photon.depth == 3) {
                 let d = -photon.wi;
                 let angle = f64::from(d.y).atan2(f64::from(d.x));
@@ -352,28 +352,28 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
                 // It landed where a ray of that angle does.
                 assert!((photon.p.x - 3.0).abs() < 1e-4);
                 assert!((f64::from(photon.p.y) - 3.0 * angle.tan()).abs() < 0.8, "{}", photon.p);
-                for c in 0..3 {
-                    flux[c] += f64::from(photon.flux[c]);
-                    moment[c] += f64::from(photon.flux[c]) * angle;
+                for (c, (flux, moment)) in flux.iter_mut().zip(&mut moment).enumerate() {
+                    *flux += f64::from(photon.flux[c]);
+                    *moment += f64::from(photon.flux[c]) * angle;
                 }
             }
-            for c in 0..3 {
-                means[c].push(moment[c] / flux[c]);
+            for (means, (moment, flux)) in means.iter_mut().zip(moment.iter().zip(&flux)) {
+                means.push(moment / flux);
             }
         }
         means
     };
     // By midpoints over the spectrum.
     let n = 4000;
-    let (mut flux, mut moment) = ([0.0; 3], [0.0; 3]);
+    let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);
     for i in 0..n {
         let (nm, weight) = observer::at((i as f32 + 0.5) / n as f32);
         let index = cauchy(f64::from(IOR), f64::from(ABBE), f64::from(nm));
         let Some(angle) = through_prism(index, arriving) else { continue };
-        for c in 0..3 {
+        for (c, (flux, moment)) in flux.iter_mut().zip(&mut moment).enumerate() {
             let passed = f64::from(weight[c]) * prism_transmittance(index, arriving);
-            flux[c] += passed;
-            moment[c] += passed * angle;
+            *flux += passed;
+            *moment += passed * angle;
         }
     }
     let expected: [f64; 3] = std::array::from_fn(|c| moment[c] / flux[c]);
