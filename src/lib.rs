@@ -9,6 +9,8 @@ pub mod math;
 
 pub mod random;
 
+pub mod spectrum;
+
 pub mod stat;
 
 pub mod geometry;

@@ -76,4 +76,18 @@ impl Material {
         .into_iter()
         .flatten()
     }
+
+    /// Whether the index of refraction of the solid it fills depends on the wavelength.
+    #[inline]
+    pub fn disperses(&self) -> bool {
+        self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.is_solid_glass()
+    }
+
+    /// Index of refraction at a wavelength (nm), where it disperses: Cauchy's equation with the Abbe number's lines of 486.1, 587.6 and 656.3 nm
+    /// \[KHR_materials_dispersion\].
+    #[inline]
+    pub fn ior_at(&self, nm: f32) -> f32 {
+        let spread = (self.ior - 1.0) * self.dispersion * (1.0 / 20.0);
+        (self.ior + spread * (523_655.0 / (nm * nm) - 1.5168)).max(1.0)
+    }
 }

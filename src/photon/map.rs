@@ -5,6 +5,7 @@
 //! care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
 
 use crate::math::{Rgb, Vec3};
+use crate::spectrum::Band;
 use rayon::prelude::*;
 use wide::{CmpLt, f32x8};
 
@@ -47,6 +48,8 @@ pub struct Photon {
     pub flags: PhotonFlags,
     /// Segments of the light path up to here.
     pub depth: u16,
+    /// Of the light path's wavelength.
+    pub band: Band,
 }
 
 /// Eight positions, structure of arrays; absent photons are infinitely far away.
@@ -296,7 +299,15 @@ mod tests {
                     2 => Vec3::new(5.0, 5.0, 5.0),
                     _ => Vec3::new(u.x, u.y, v) * 10.0,
                 };
-                Photon { p, wi: Vec3::Y, ng: Vec3::Y, flux: Vec3::splat(i as f32), flags: PhotonFlags(0), depth: 2 }
+                Photon {
+                    p,
+                    wi: Vec3::Y,
+                    ng: Vec3::Y,
+                    flux: Vec3::splat(i as f32),
+                    flags: PhotonFlags(0),
+                    depth: 2,
+                    band: Band::WHITE,
+                }
             })
             .collect()
     }
@@ -336,6 +347,7 @@ mod tests {
             flux: Vec3::ONE,
             flags: PhotonFlags(0),
             depth: 2,
+            band: Band::WHITE,
         }]);
         let count = |radius2| {
             let mut n = 0;

@@ -127,6 +127,7 @@ mod tests {
     use super::*;
     use crate::photon::{Photon, PhotonFlags};
     use crate::random::{Domain, Purpose, Stream};
+    use crate::spectrum::Band;
 
     /// Clusters, duplicates and a sheet with two kinds of normals; queries that walk, jump, and change their radius.
     #[test]
@@ -141,7 +142,15 @@ mod tests {
                     _ => Vec3::new(u.x, 1e-3 * v, u.y),
                 };
                 let ng = if i % 3 == 0 { Vec3::Z } else { Vec3::Y };
-                Photon { p, wi: Vec3::Y, ng, flux: Vec3::splat(i as f32), flags: PhotonFlags(0), depth: 2 }
+                Photon {
+                    p,
+                    wi: Vec3::Y,
+                    ng,
+                    flux: Vec3::splat(i as f32),
+                    flags: PhotonFlags(0),
+                    depth: 2,
+                    band: Band::WHITE,
+                }
             })
             .collect();
         let map = PhotonMap::build(photons);

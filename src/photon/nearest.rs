@@ -88,6 +88,7 @@ mod tests {
     use super::*;
     use crate::photon::PhotonFlags;
     use crate::random::{Domain, Purpose, Stream};
+    use crate::spectrum::Band;
 
     #[test]
     fn agrees_with_sorting() {
@@ -103,6 +104,7 @@ mod tests {
                     flux: Vec3::ONE,
                     flags: PhotonFlags(0),
                     depth: 2,
+                    band: Band::WHITE,
                 }
             })
             .collect();

@@ -2,6 +2,7 @@
 
 use super::map::Located;
 use crate::math::{Rgb, Vec3};
+use crate::spectrum::Band;
 
 /// A light-path vertex in a medium.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +18,8 @@ pub struct VolumePhoton {
     pub medium: u32,
     /// Segments of the light path up to here.
     pub depth: u16,
+    /// Of the light path's wavelength.
+    pub band: Band,
 }
 
 /// The normal of all photons in media, which have none: queries with it leave none out.

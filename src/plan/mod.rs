@@ -106,8 +106,7 @@ impl Plan {
             let (name, off) = (effect.name(), asked.switches.off.has(*effect));
             if off && *present {
                 warnings.push(format!("--effects -{name}: left out, though called for by {}", because.join("; ")));
-            } else if *present && !finds(*effect) && asked.max_depth.is_none() && *effect != Effect::Dispersion {
-                // Dispersion, which no method simulates, was told of when the scene was built.
+            } else if *present && !finds(*effect) && asked.max_depth.is_none() {
                 warnings.push(format!("--method {} does not find all light of the effect '{name}'", asked.method));
             } else if asked.switches.on.has(*effect) && !present {
                 warnings.push(format!("--effects +{name}: nothing in the scene calls for it"));

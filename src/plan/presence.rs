@@ -77,7 +77,7 @@ pub(super) const ENVIRONMENT: &str = "the environment";
 pub(super) fn property(effect: Effect, worn: &[Worn]) -> Vec<String> {
     let calls: fn(&Material) -> bool = match effect {
         Effect::Volume => |material| material.is_solid_glass() && material.medium.is_some(),
-        Effect::Dispersion => |material| material.transmission > 0.0 && material.dispersion > 0.0,
+        Effect::Dispersion => Material::disperses,
         Effect::Alpha => |material| material.alpha != Alpha::Opaque,
         Effect::Textures => |material| material.textures().next().is_some(),
         _ => return vec![],

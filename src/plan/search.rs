@@ -28,7 +28,6 @@ impl Search {
     /// could be neither connected to nor run into.
     pub(super) fn finds(self, effect: Effect, sizeless_lights: bool, media_scatter: bool) -> bool {
         match (self, effect) {
-            (_, Effect::Dispersion) => false,
             (Search::EyePaths, Effect::Caustic | Effect::Sds) => !sizeless_lights,
             (Search::LightPaths, Effect::Sds) => false,
             (Search::Connections, Effect::Sds) => !sizeless_lights,

@@ -23,6 +23,7 @@ use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
+use crate::spectrum::Comb;
 use crate::transport::mis::Eta;
 use crate::transport::{
     Bidirectional, Eye, EyeMeasure, Indirect, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
@@ -129,7 +130,11 @@ impl<'a> Passes<'a> {
 
     fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
         let (width, height) = self.camera.size();
-        LightPass::new(self.settings.seed, i, pair.light, width * height, self.settings.max_depth).guided(guide)
+        let Settings { seed, max_depth, .. } = *self.settings;
+        let pass = LightPass::new(seed, i, pair.light, width * height, max_depth).guided(guide);
+        // Others put paths together of one hue alone, whichever it is.
+        let merges = self.shared.is_some_and(|shared| shared.strategies.merge);
+        if merges { pass.with(Comb::slow(seed, i)) } else { pass }
     }
 
     /// The photons that pass `i` leaves, where it was not rendered here.
@@ -197,9 +202,11 @@ impl<'a> Passes<'a> {
                 .map(|(tile, (measures, watch))| {
                     let (mut left, mut arena) = (Left::default(), Bump::new());
                     for places in tiles.groups(tile) {
-                        let starts = shared.eye.starts(&places, streams);
-                        for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                        let mut starts = shared.eye.starts(&places, streams);
+                        for (place, start) in places.iter().flatten().zip(starts.iter_mut().flatten()) {
                             let index = place.index as u32;
+                            // One wavelength for both, so that they can be connected.
+                            start.0.hue = pass.hue(index);
                             arena.reset();
                             let mut vertices = LightVertices::new_in(&arena);
                             shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());

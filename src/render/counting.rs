@@ -131,8 +131,9 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 pixels[place.at].touch() + f64::from(R::radius2(first))
             });
             std::hint::black_box(waiting.sum::<f64>());
-            let independent = eye.starts_through(places, independent[0], independent[1]);
-            let correlated = levels.two_paths.then(|| eye.starts_through(places, correlated[0], correlated[1]));
+            let starts = |[film, streams]: [Streams; 2]| maps[0].tune(eye.starts_through(places, film, streams));
+            let independent = starts(independent);
+            let correlated = levels.two_paths.then(|| starts(correlated));
             for (k, place) in places.iter().enumerate() {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
                 let pixel = &mut pixels[place.at];

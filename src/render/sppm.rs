@@ -17,6 +17,7 @@ use crate::light::Guide;
 use crate::photon::{Kernel, Nearest, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
+use crate::spectrum::Comb;
 use crate::transport::{
     EqualFlux, Eye, EyeMeasure, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path,
 };
@@ -80,8 +81,8 @@ fn eye_pass(
     par_pixels(pixels.par_chunks_mut(band(size.0)), size, Scratch::default, |scratch, pixels, places| {
         let waiting = places.iter().flatten().map(|place| pixels[place.at].touch()).sum::<f64>();
         std::hint::black_box(waiting);
-        let independent = eye.starts(places, independent);
-        let correlated = levels.two_paths.then(|| eye.starts(places, correlated));
+        let independent = maps.tune(eye.starts(places, independent));
+        let correlated = levels.two_paths.then(|| maps.tune(eye.starts(places, correlated)));
         for (k, place) in places.iter().enumerate() {
             let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
             let pixel = &mut pixels[place.at];
@@ -174,6 +175,7 @@ impl<'a> Sppm<'a> {
             let start = cpu_seconds();
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
+            let pass = pass.with(Comb::new(seed, i));
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(0..each, |arena, index, photons| {
                     flux.light_path(self.eye.scene, arena, self.surroundings, &pass, index, photons);
@@ -211,7 +213,7 @@ impl<'a> Sppm<'a> {
     fn build(&self, photons: Photons, i: u64) -> Maps {
         let scatters = self.eye.scene.survey.scattering;
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
-        Maps { surface: PhotonMap::build(photons.surface), volume }
+        Maps { surface: PhotonMap::build(photons.surface), volume, comb: Comb::new(self.settings.seed, i) }
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass<'_> {
@@ -219,6 +221,7 @@ impl<'a> Sppm<'a> {
         LightPass::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
             .caustics_only(self.settings.indirect == Indirect::Paths)
+            .with(Comb::new(seed, i))
     }
 }
 

@@ -1,10 +1,13 @@
-//! What media add to the passes of photon mapping: photons of their own, and bandwidths of their own.
+//! The photons of a pass, and what media add to them: photons of their own, and bandwidths of their own.
 
 use super::settings::Settings;
+use crate::camera::GROUP;
 use crate::estimator::Pixel;
 use crate::estimator::rule::volume::{level_factor, radius_factor};
 use crate::photon::{PhotonMap, VolumePhoton};
-use crate::transport::Volume;
+use crate::random::Stream;
+use crate::spectrum::Comb;
+use crate::transport::{PathStart, Volume};
 
 /// Photons of an iteration.
 pub(super) struct Maps {
@@ -12,12 +15,23 @@ pub(super) struct Maps {
     pub surface: PhotonMap,
     /// In media, if any scatter.
     pub volume: Option<VolumeMap>,
+    /// The wavelengths they have taken.
+    pub comb: Comb,
 }
 
 impl Maps {
     /// Number of photons.
     pub fn len(&self) -> usize {
         self.surface.photons().len() + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
+    }
+
+    /// The starts of eye paths that take no other wavelengths.
+    #[inline]
+    pub fn tune(&self, mut starts: [Option<(PathStart, Stream)>; GROUP]) -> [Option<(PathStart, Stream)>; GROUP] {
+        for (start, _) in starts.iter_mut().flatten() {
+            start.hue = self.comb.nearest(start.hue);
+        }
+        starts
     }
 
     /// The photons in media for some of the levels of `pixel`.

@@ -33,8 +33,8 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     for placed in &description.instances {
         let material = &description.materials[placed.material as usize];
         let warning =
-            format!("material \"{}\": its dispersion is not simulated: all colours refract alike", material.name);
-        if material.dispersion > 0.0 && !warnings.contains(&warning) {
+            format!("material \"{}\": its dispersion is ignored: it is no solid that refracts", material.name);
+        if material.dispersion > 0.0 && !material.disperses() && !warnings.contains(&warning) {
             warnings.push(warning);
         }
     }

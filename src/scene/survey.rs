@@ -17,6 +17,8 @@ pub struct Survey {
     pub media: bool,
     /// Something scatters between surfaces.
     pub scattering: bool,
+    /// Some solid refracts colours differently.
+    pub dispersion: bool,
     /// Some light cannot be hit by a ray.
     pub delta_lights: bool,
     /// Light comes from infinity.
@@ -43,6 +45,7 @@ impl Survey {
                 survey.media |= material.medium.is_some();
                 survey.scattering |= scatters(&material.medium);
                 survey.null_boundaries |= material.ior == 1.0;
+                survey.dispersion |= material.disperses();
             }
         }
         survey.solids = solids > 0;

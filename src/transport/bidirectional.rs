@@ -153,6 +153,8 @@ pub struct LightVertex<'s> {
     pub depth: u32,
     /// Partial sums of the weights.
     pub mis: MisState,
+    /// The path has taken a wavelength, the one its eye path takes if it does.
+    pub dispersed: bool,
 }
 
 impl LightVertex<'_> {

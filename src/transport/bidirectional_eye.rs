@@ -135,7 +135,10 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
-        let value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
+        let mut value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
+        if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
+            value *= wavelength.once();
+        }
         if !is_lit(value) {
             return;
         }

@@ -143,6 +143,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     throughput: vertex.throughput,
                     depth: vertex.depth,
                     mis: self.mis,
+                    dispersed: vertex.wavelength.is_some(),
                 });
             }
             if strategies.camera {
@@ -166,6 +167,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     throughput: vertex.throughput,
                     depth: vertex.depth,
                     mis: self.mis,
+                    dispersed: vertex.wavelength.is_some(),
                 });
             }
             if strategies.camera {

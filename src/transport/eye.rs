@@ -27,6 +27,7 @@ use crate::medium::Flight;
 use crate::photon::{Kernel, Near, Photon, PhotonMap, VolumePhoton};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
+use crate::spectrum::{Hue, Wavelength};
 use crate::trace::Ray;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
@@ -296,11 +297,21 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let reach2 = self.bandwidths.reach2(largest);
         let mut batch = Batch::new(self.kernel, radii, vertex, broad, broad | sharp);
         let (p, bandwidths) = (vertex.surface.p, &mut self.bandwidths);
-        self.photons.gather(self.near, p, vertex.surface.ng, reach2, |photon, distance2| {
-            if u32::from(photon.depth) <= longest {
-                batch.push(photon, distance2, bandwidths);
+        match &vertex.wavelength {
+            None => self.photons.gather(self.near, p, vertex.surface.ng, reach2, |photon, distance2| {
+                if u32::from(photon.depth) <= longest {
+                    batch.push(photon, distance2, bandwidths);
+                }
+            }),
+            Some(wavelength) => {
+                let (photons, near) = (self.photons, &mut *self.near);
+                gather_dispersed(photons, near, vertex, wavelength, reach2, |photon, distance2| {
+                    if u32::from(photon.depth) <= longest {
+                        batch.push(photon, distance2, bandwidths);
+                    }
+                });
             }
-        });
+        }
         let sums = batch.finish(&mut self.bandwidths);
         for (level, radius2) in radii.iter().enumerate() {
             let kernel = vertex.throughput * (FRAC_1_PI / radius2);
@@ -308,6 +319,23 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             self.measure.caustic_photons[level] += kernel * sums[1][level];
         }
     }
+}
+
+/// The photons around a vertex that its path meets, weighted where both have taken a wavelength. Out of the way of paths that have none.
+#[inline(never)]
+fn gather_dispersed(
+    photons: &PhotonMap,
+    near: &mut Near<Photon>,
+    vertex: &Vertex<'_, '_>,
+    wavelength: &Wavelength,
+    reach2: f32,
+    mut push: impl FnMut(&Photon, f32),
+) {
+    photons.gather(near, vertex.surface.p, vertex.surface.ng, reach2, |photon, distance2| {
+        if let Some(weight) = wavelength.meets(photon.band) {
+            push(&Photon { flux: photon.flux * weight, ..*photon }, distance2);
+        }
+    });
 }
 
 impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_, B, K, PATHS> {
@@ -430,6 +458,7 @@ impl Eye<'_> {
             first: Known::Unknown,
             far: false,
             channel: None,
+            hue: Hue::new(draws.one(Purpose::Wavelength)),
         }
     }
 

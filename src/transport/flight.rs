@@ -17,6 +17,7 @@ use crate::math::{Rgb, Vec3};
 use crate::medium::{Collision, Equiangular, Fate, Flight};
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
+use crate::spectrum::Wavelength;
 
 fn arrival(scene: &Scene, span: &Span<'_>, collision: Collision) -> MediumArrival {
     let p = span.origin + span.direction * collision.distance;
@@ -77,6 +78,7 @@ pub(super) struct Split<'a, V> {
     pub depth: u32,
     pub scattered: Option<Scattered>,
     pub from: Vec3,
+    pub wavelength: Option<Wavelength>,
     pub survival_scale: f32,
 }
 
@@ -106,6 +108,7 @@ impl<V> Split<'_, V> {
             flight: Flight::FREE,
             opacity,
             next_event,
+            wavelength: self.wavelength,
             survival_scale: self.survival_scale,
             met,
         }

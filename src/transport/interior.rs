@@ -9,6 +9,7 @@
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
 use crate::scene::Scene;
+use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 
 /// Most solids a path can be inside of at once; further ones are entered as if they replaced the innermost.
@@ -142,6 +143,23 @@ impl Crossing {
     #[inline]
     pub fn is_nothing(&self) -> bool {
         self.before == self.after
+    }
+
+    /// Whether the index of refraction on one of its sides depends on the wavelength.
+    #[inline]
+    pub fn disperses(&self, scene: &Scene) -> bool {
+        [self.before, self.after].into_iter().flatten().any(|m| scene.materials.list[m as usize].disperses())
+    }
+
+    /// Index of refraction behind the surface (its back) over the one before it at a wavelength; `entering`: the path comes from its front.
+    #[inline]
+    pub fn eta(&self, scene: &Scene, entering: bool, wavelength: &Wavelength) -> f32 {
+        let ior = |material: Option<u32>| match material.map(|m| &scene.materials.list[m as usize]) {
+            Some(material) if material.disperses() => material.ior_at(wavelength.nm),
+            _ => ior(scene, material),
+        };
+        let (before, after) = (ior(self.before), ior(self.after));
+        if entering { after / before } else { before / after }
     }
 }
 

@@ -10,6 +10,7 @@ use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags, VolumePhoton};
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
+use crate::spectrum::{Band, Comb, Hue};
 use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
@@ -25,6 +26,7 @@ pub struct LightPass<'a> {
     direction: SobolPair,
     guide: Option<&'a Guide>,
     caustics_only: bool,
+    comb: Option<Comb>,
 }
 
 /// How a light path begins.
@@ -54,7 +56,19 @@ impl<'a> LightPass<'a> {
                 ^ domain as u64);
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
         let (choice, point, direction) = (pair(1), pair(2), pair(3));
-        LightPass { seed, pass, domain, paths, max_depth, choice, point, direction, guide: None, caustics_only: false }
+        LightPass {
+            seed,
+            pass,
+            domain,
+            paths,
+            max_depth,
+            choice,
+            point,
+            direction,
+            guide: None,
+            caustics_only: false,
+            comb: None,
+        }
     }
 
     /// The same with emission guided, if there is a guide.
@@ -65,6 +79,24 @@ impl<'a> LightPass<'a> {
     /// The same with photons of caustics alone, if `only`: light paths end where they would scatter broadly.
     pub fn caustics_only(self, only: bool) -> LightPass<'a> {
         LightPass { caustics_only: only, ..self }
+    }
+
+    /// Whose paths take no other wavelengths than these.
+    #[must_use]
+    pub fn with(self, comb: Comb) -> LightPass<'a> {
+        LightPass { comb: Some(comb), ..self }
+    }
+
+    /// The hue of path `index`.
+    #[inline]
+    pub fn hue(&self, index: u32) -> Hue {
+        self.hue_of(self.stream(u64::from(index)))
+    }
+
+    #[inline]
+    fn hue_of(&self, stream: Stream) -> Hue {
+        let hue = Hue::new(stream.vertex(0).one(Purpose::Wavelength));
+        self.comb.map_or(hue, |comb| comb.nearest(hue))
     }
 
     /// Number of light paths.
@@ -100,6 +132,7 @@ impl<'a> LightPass<'a> {
             // It has come through the medium that fills all space, from infinity.
             flux *= medium.transmittance(f32::INFINITY);
         }
+        let stream = self.stream(u64::from(index));
         Some(Emitted {
             start: PathStart {
                 origin: emission.origin,
@@ -109,8 +142,9 @@ impl<'a> LightPass<'a> {
                 first: Known::Unknown,
                 far: emission.infinite,
                 channel: None,
+                hue: self.hue_of(stream),
             },
-            stream: self.stream(u64::from(index)),
+            stream,
             delta: emission.delta,
             light: emission.light,
             density: emission.density,
@@ -159,6 +193,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flux: vertex.throughput,
                 flags: PhotonFlags(flags),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+                band: Band::of(vertex.wavelength.as_ref()),
             });
         }
         Next::Continue(self.onward)
@@ -174,6 +209,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flux: vertex.arriving,
                 medium: vertex.medium_id(self.scene),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
+                band: Band::of(vertex.wavelength.as_ref()),
             });
         }
         Next::Continue(self.onward)

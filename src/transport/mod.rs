@@ -31,7 +31,7 @@ pub use light::{Emitted, EqualFlux, LightPass, Photons, light_path};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;
 pub use probe::Probe;
-pub use segment::{Arrival, End, MediumArrival, Way, next_surface, transmittance, way};
+pub use segment::{Arrival, End, Known, MediumArrival, Way, next_surface, transmittance, way};
 pub use site::{MediumVertex, Site};
 pub use volume::Volume;
 pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

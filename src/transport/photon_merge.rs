@@ -6,6 +6,7 @@ use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap, same_surface};
+use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
 /// A light-path vertex, as small as merging in the next pass allows.
@@ -27,6 +28,8 @@ pub struct MergePhoton {
     pub depth: u16,
     /// Every bounce since the light was specular (delta or sharp).
     pub caustic: bool,
+    /// Of the light path's wavelength.
+    band: Band,
 }
 
 impl Located for MergePhoton {
@@ -60,6 +63,7 @@ impl MergePhoton {
             merged: mis.merged + mis.last,
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             caustic,
+            band: Band::of(vertex.wavelength.as_ref()),
         }
     }
 
@@ -88,9 +92,11 @@ pub(super) fn merge_photons<R: Record>(
         if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
             return;
         }
+        let meets = vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.meets(photon.band));
+        let Some(weight) = meets else { return };
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);
         // Photons measure irradiance on the geometric surface: the cosine in f belongs to a direction, not to them.
-        let value = vertex.throughput * f * photon.flux / photon.wi.dot(ng).abs();
+        let value = vertex.throughput * f * photon.flux * weight / photon.wi.dot(ng).abs();
         if !is_lit(value) {
             return;
         }

@@ -150,7 +150,8 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     }
     let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
     let eta = if entering { after / before } else { before / after };
-    if eta == 1.0 && !material.emits() {
+    // Of two glasses with one index some wavelengths are refracted all the same.
+    if eta == 1.0 && !material.emits() && !(scene.survey.dispersion && crossing.disperses(scene)) {
         let parameters = material.parameters(surface, &scene.materials.textures, eta);
         if parameters.is_pure_transmission() {
             return Boundary::None(parameters.base_color, crossing.interior);

@@ -8,6 +8,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
 use crate::random::Draws;
 use crate::scene::Scene;
+use crate::spectrum::Wavelength;
 
 /// A vertex of a path in a medium.
 pub struct MediumVertex {
@@ -31,6 +32,8 @@ pub struct MediumVertex {
     pub opacity: f32,
     /// Share of next-event estimation that is this vertex's, where another is drawn for it (`flight.rs`).
     pub next_event: f32,
+    /// The wavelength the path has taken.
+    pub wavelength: Option<Wavelength>,
     pub(super) survival_scale: f32,
 }
 
@@ -66,6 +69,8 @@ pub trait Site {
     fn depth(&self) -> u32;
     /// Random numbers of the vertex.
     fn draws(&self) -> Draws;
+    /// The wavelength the path has taken.
+    fn wavelength(&self) -> Option<&Wavelength>;
     /// Scattering from `wi` times its cosine, and the density of drawing `wi` ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
     /// Density of the way back ([`crate::bsdf::Shading::reverse_pdf`]).
@@ -127,6 +132,11 @@ impl Site for Vertex<'_, '_> {
     #[inline]
     fn draws(&self) -> Draws {
         self.draws
+    }
+
+    #[inline]
+    fn wavelength(&self) -> Option<&Wavelength> {
+        self.wavelength.as_ref()
     }
 
     #[inline]
@@ -198,6 +208,11 @@ impl Site for MediumVertex {
     #[inline]
     fn draws(&self) -> Draws {
         self.draws
+    }
+
+    #[inline]
+    fn wavelength(&self) -> Option<&Wavelength> {
+        self.wavelength.as_ref()
     }
 
     #[inline]

@@ -54,7 +54,9 @@ impl<'a> Volume<'a> {
             if photon.medium != medium || u32::from(photon.depth) > longest {
                 return;
             }
-            let light = photon.flux * phase.pdf_w(vertex.wo, photon.wi);
+            let meets = vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.meets(photon.band));
+            let Some(weight) = meets else { return };
+            let light = photon.flux * weight * phase.pdf_w(vertex.wo, photon.wi);
             for (sum, &radius2) in sums.iter_mut().zip(radius2) {
                 if distance2 < radius2 {
                     *sum += light * K::ball_weight(distance2 / radius2);
@@ -109,6 +111,7 @@ mod tests {
     use crate::medium::{Flight, MediumParameters};
     use crate::photon::kernel;
     use crate::random::{Domain, Purpose, Stream};
+    use crate::spectrum::Band;
     use crate::transport::{Interior, MediumArrival};
 
     const PHOTONS: u64 = 40_000;
@@ -123,6 +126,7 @@ mod tests {
             flux: Rgb::ONE / PHOTONS as f32,
             medium,
             depth: 2 + (i % 2) as u16,
+            band: Band::WHITE,
         }
     }
 
@@ -141,6 +145,7 @@ mod tests {
             flight: Flight::FREE,
             opacity: 1.0,
             next_event: 1.0,
+            wavelength: None,
             survival_scale: 1.0,
         }
     }

@@ -11,6 +11,7 @@ use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
+use crate::spectrum::{Hue, Wavelength};
 use bumpalo::Bump;
 
 /// After this many bounces even a path that loses nothing may end: it goes on with probability [`LATE_SURVIVAL`] at most, so that light
@@ -38,6 +39,8 @@ pub struct PathStart {
     pub far: bool,
     /// The one channel of a path that keeps its weight: what it would lose is the probability that it ends.
     pub channel: Option<usize>,
+    /// The wavelength it takes if it meets dispersive glass.
+    pub hue: Hue,
 }
 
 /// A vertex of a path on a surface. What it refers to by `'a` outlives the walk.
@@ -64,6 +67,8 @@ pub struct Vertex<'v, 'a> {
     pub draws: Draws,
     /// Densities of the last segment's flight through media.
     pub flight: Flight,
+    /// The wavelength the path has taken, here at the latest; its weight is in the throughput.
+    pub wavelength: Option<Wavelength>,
     survival_scale: f32,
 }
 
@@ -156,17 +161,19 @@ pub fn walk<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    // Scenes without scattering media walk as if there were none in the world.
-    if scene.survey.scattering {
-        walk_in_media(scene, arena, start, stream, transport, max_depth, visitor);
+    // Scenes without scattering media or dispersion walk as if there were none in the world.
+    if scene.survey.dispersion {
+        walk_aside::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
+    } else if scene.survey.scattering {
+        walk_aside::<V, false>(scene, arena, start, stream, transport, max_depth, visitor);
     } else {
-        walk_in::<V, false>(scene, arena, start, stream, transport, max_depth, visitor);
+        walk_in::<V, false, false>(scene, arena, start, stream, transport, max_depth, visitor);
     }
 }
 
 /// Out of the way of the other, which is inlined.
 #[inline(never)]
-fn walk_in_media<'a, V: Visitor<'a>>(
+fn walk_aside<'a, V: Visitor<'a>, const DISPERSION: bool>(
     scene: &'a Scene,
     arena: &'a Bump,
     start: &PathStart,
@@ -175,11 +182,11 @@ fn walk_in_media<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    walk_in::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
+    walk_in::<V, true, DISPERSION>(scene, arena, start, stream, transport, max_depth, visitor);
 }
 
 #[inline(always)]
-fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
+fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
     scene: &'a Scene,
     arena: &'a Bump,
     start: &PathStart,
@@ -188,7 +195,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, far, channel } = *start;
+    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, far, channel, hue } = *start;
     let weight = channel.map_or(1.0, |channel| throughput[channel]);
     let mut known = first;
     let mut survival_scale = 1.0 / throughput.max_element();
@@ -197,6 +204,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
     }
     let mut scattered: Option<Scattered> = None;
     let mut in_medium = false;
+    let mut wavelength = None;
     for depth in 1..=max_depth {
         let last = stream.vertex(depth - 1);
         let token = last.token(Purpose::Alpha);
@@ -206,7 +214,9 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
             next_vertex(scene, origin, direction, interior, token, met, &mut Attenuate)
         } else if V::SPLITS {
             let from = origin;
-            let mut split = Split { scene, visitor, throughput, draws: last, depth, scattered, from, survival_scale };
+            let draws = last;
+            let mut split =
+                Split { scene, visitor, throughput, draws, depth, scattered, from, wavelength, survival_scale };
             next_vertex(scene, origin, direction, interior, token, met, &mut split)
         } else {
             let (from_medium, from_infinity) = (in_medium, far && depth == 1);
@@ -236,6 +246,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
                     flight,
                     opacity: 1.0,
                     next_event: 1.0,
+                    wavelength,
                     survival_scale,
                 };
                 // Where the channel that has brought it here scatters nothing, it carries nothing.
@@ -264,8 +275,23 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
             }
             End::Lost => return,
         };
-        let Arrival { ref surface, eta, ref crossing, interior: here, transmittance, distance } = arrival;
+        let Arrival { ref surface, mut eta, ref crossing, interior: here, transmittance, distance } = arrival;
         throughput *= transmittance;
+        if DISPERSION
+            && let Some(crossing) = crossing
+            && crossing.disperses(scene)
+        {
+            // Even where light is only reflected: whether it is depends on the wavelength, and all ways to put a path together must agree that it has one.
+            let taken = wavelength.get_or_insert_with(|| {
+                let taken = match channel {
+                    None => hue.wavelength(),
+                    Some(channel) => hue.wavelength_of(channel, stream.vertex(depth).one(Purpose::Wavelength)),
+                };
+                throughput *= taken.weight;
+                taken
+            });
+            eta = crossing.eta(scene, direction.dot(surface.ng) < 0.0, taken);
+        }
         if let Some(channel) = channel {
             let left = throughput[channel] / weight;
             // Written so that NaN ends the path.
@@ -293,6 +319,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool>(
             interior_behind: behind,
             draws,
             flight,
+            wavelength,
             survival_scale,
         };
         let (set, chance) = match visitor.surface(&vertex, scattered) {

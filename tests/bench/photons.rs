@@ -6,6 +6,7 @@
 use caustique::math::{Rgb, Vec3};
 use caustique::photon::{Nearest, Photon, PhotonFlags, PhotonMap};
 use caustique::random::{Domain, Purpose, Stream};
+use caustique::spectrum::Band;
 use std::time::Instant;
 
 const PHOTONS: u64 = 200_000;
@@ -164,8 +165,15 @@ fn main() {
     );
     for name in ["plane", "caustic", "focus"] {
         let points: Vec<Vec3> = (0..PHOTONS).map(|i| distribution(name, i)).collect();
-        let photon =
-            |&p: &Vec3| Photon { p, wi: Vec3::Y, ng: Vec3::Y, flux: Rgb::ONE, flags: PhotonFlags(0), depth: 2 };
+        let photon = |&p: &Vec3| Photon {
+            p,
+            wi: Vec3::Y,
+            ng: Vec3::Y,
+            flux: Rgb::ONE,
+            flags: PhotonFlags(0),
+            depth: 2,
+            band: Band::WHITE,
+        };
         let t = Instant::now();
         let map = PhotonMap::build(points.iter().map(photon).collect());
         let build_tree = t.elapsed();

@@ -11,6 +11,7 @@ use caustique::photon::{Photon, PhotonFlags, PhotonMap};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
+use caustique::spectrum::Band;
 use caustique::trace::Ray;
 use caustique_embree as embree;
 use std::time::Instant;
@@ -123,7 +124,15 @@ fn main() {
             let u = Stream::new(2, 0, Domain::Test, i).vertex(0);
             let (a, b) = (u.two(Purpose::Pixel), u.one(Purpose::Lobe));
             let flags = PhotonFlags(0);
-            Photon { p: Vec3::new(a.x, b * 0.01, a.y), wi: Vec3::Y, ng: Vec3::Y, flux: Rgb::ONE, flags, depth: 2 }
+            Photon {
+                p: Vec3::new(a.x, b * 0.01, a.y),
+                wi: Vec3::Y,
+                ng: Vec3::Y,
+                flux: Rgb::ONE,
+                flags,
+                depth: 2,
+                band: Band::WHITE,
+            }
         })
         .collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap_or_else(|e| panic!("{e}"));

@@ -44,8 +44,7 @@ fn effects_are_there_for_reasons() {
         (everything.effect(Effect::Caustic).by, everything.effect(Effect::Sds).by),
         (Some("photons"), Some("photons"))
     );
-    // No method disperses.
-    assert!(!everything.effect(Effect::Dispersion).simulated);
+    assert!(everything.effect(Effect::Dispersion).simulated);
     // Without light nothing is lit.
     scene.lights.clear();
     scene.materials[1].emission = Rgb::ZERO;

@@ -90,14 +90,11 @@ fn cut_outs() {
     check(Effect::Alpha, with, without, "material \"Pane\" on \"Pane\"");
 }
 
-/// Dispersion is not simulated: leaving it out takes the warning away.
 #[test]
 fn dispersion() {
-    let mut with = scene(Material { dispersion: 0.5, ..glass(1.5) });
-    assert_eq!(build(with.clone()).warnings.len(), 1);
-    let removed = switch::off(&mut with, EffectSet::from_iter([Effect::Dispersion]));
-    assert_eq!(build(with).warnings, [""; 0]);
-    assert_eq!(removed.because(Effect::Dispersion), ["material \"Pane\" on \"Pane\""]);
+    let without = scene(glass(1.5));
+    let with = scene(Material { dispersion: 0.5, ..glass(1.5) });
+    check(Effect::Dispersion, with, without, "material \"Pane\" on \"Pane\"");
 }
 
 /// The mean of a texture takes its place; cut-outs are another effect and keep theirs.

@@ -51,6 +51,8 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     plan::check_media(args, &scene)?;
     let present = Present::of(&scene);
     self::selection(args, settings, present.volume)?;
+    // Before anything is tried, which takes time.
+    memory::check(settings, camera.size(), channels(settings, present))?;
     let choice = auto(args, &scene, &camera, settings, present);
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
     memory::check(settings, camera.size(), channels(settings, present))?;

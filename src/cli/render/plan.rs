@@ -53,7 +53,7 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
 
 /// Why auto has chosen what it has.
 pub fn why(choice: &Choice) -> String {
-    let Some(trial) = choice.trial() else { return format!("auto: {}", choice.because) };
+    let Some(trial) = choice.trial() else { return format!("auto: {}, for {}", choice.way.name(), choice.because) };
     let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.way != trial.way).collect();
     others.sort_by(|a, b| a.expected.total_cmp(&b.expected));
     let error = |trial: &Trial| {

@@ -1,0 +1,109 @@
+//! The colours of wavelengths.
+//!
+//! The CIE 1931 standard observer \[multi-lobe fits of Wyman, Sloan, Shirley 2013, "Simple Analytic Approximations to the CIE XYZ Color Matching
+//! Functions"\] in linear Rec. 709. What most wavelengths are there is no colour that a screen can show: some channel is
+//! negative. It is cut off at zero, and the three curves are scaled to one integral. Light of flat spectrum stays white, as lamps of RGB scenes have no other;
+//! a photon's flux stays positive, as roulette and the statistics of photons want it; and what is lost is saturation that no picture
+//! could hold. Wavelengths are drawn in proportion to the mean of the three curves, so no channel weighs more than 3.
+
+use crate::math::Rgb;
+use std::sync::LazyLock;
+
+/// The range of wavelengths (nm): beyond it the fits are below 0.2 % of their peaks.
+pub const RANGE: (f64, f64) = (390.0, 720.0);
+
+/// Steps of the table over uniform numbers.
+const STEPS: usize = 256;
+/// Steps of the integrals over wavelengths.
+const FINE: usize = 3300;
+
+/// A lobe: a Gaussian with a width for either side.
+fn lobe(nm: f64, height: f64, peak: f64, below: f64, above: f64) -> f64 {
+    let t = (nm - peak) / if nm < peak { below } else { above };
+    height * (-0.5 * t * t).exp()
+}
+
+/// The observer's X, Y, Z at a wavelength \[(4), table 1\].
+fn xyz(nm: f64) -> [f64; 3] {
+    [
+        lobe(nm, 1.056, 599.8, 37.9, 31.0) + lobe(nm, 0.362, 442.0, 16.0, 26.7) + lobe(nm, -0.065, 501.1, 20.4, 26.2),
+        lobe(nm, 0.821, 568.8, 46.9, 40.5) + lobe(nm, 0.286, 530.9, 16.3, 31.1),
+        lobe(nm, 1.217, 437.0, 11.8, 36.0) + lobe(nm, 0.681, 459.0, 26.0, 13.8),
+    ]
+}
+
+/// Linear Rec. 709 of a wavelength, what is negative cut off; of no particular scale.
+fn rgb(nm: f64) -> [f64; 3] {
+    let [x, y, z] = xyz(nm);
+    [
+        3.240_454 * x - 1.537_139 * y - 0.498_531 * z,
+        -0.969_266 * x + 1.876_011 * y + 0.041_556 * z,
+        0.055_643 * x - 0.204_026 * y + 1.057_225 * z,
+    ]
+    .map(|channel| channel.max(0.0))
+}
+
+/// Wavelengths and weights at equal steps of probability.
+struct Table {
+    nm: [f32; STEPS + 1],
+    weight: [Rgb; STEPS + 1],
+}
+
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    let step = (RANGE.1 - RANGE.0) / FINE as f64;
+    let at = |i: usize| RANGE.0 + step * i as f64;
+    let curves: Vec<[f64; 3]> = (0..=FINE).map(|i| rgb(at(i))).collect();
+    // Trapezoids, everywhere: the table's own integrals are exact then.
+    let integral = |of: &dyn Fn(usize) -> f64, n: usize| (0..n).map(|i| 0.5 * (of(i) + of(i + 1))).sum::<f64>();
+    let sums: [f64; 3] = std::array::from_fn(|c| integral(&|i| curves[i][c], FINE) * step);
+    let curves: Vec<[f64; 3]> = curves.iter().map(|rgb| std::array::from_fn(|c| rgb[c] / sums[c])).collect();
+    let density = |i: usize| curves[i].iter().sum::<f64>() / 3.0;
+    let mut cumulative = vec![0.0];
+    for i in 0..FINE {
+        cumulative.push(cumulative[i] + 0.5 * step * (density(i) + density(i + 1)));
+    }
+    let total = cumulative[FINE];
+    let (mut nm, mut weight) = ([0.0; STEPS + 1], [[0.0f64; 3]; STEPS + 1]);
+    for (k, (nm, weight)) in nm.iter_mut().zip(&mut weight).enumerate() {
+        let wanted = total * k as f64 / STEPS as f64;
+        let after = cumulative.partition_point(|&c| c < wanted).clamp(1, FINE);
+        let (low, high) = (cumulative[after - 1], cumulative[after]);
+        let t = if high > low { ((wanted - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
+        *nm = (at(after - 1) + t * step) as f32;
+        *weight = std::array::from_fn(|c| {
+            let curve = curves[after - 1][c] * (1.0 - t) + curves[after][c] * t;
+            curve / (density(after - 1) * (1.0 - t) + density(after) * t)
+        });
+    }
+    // What the coarse steps have changed of the means.
+    let means: [f64; 3] = std::array::from_fn(|c| integral(&|k| weight[k][c], STEPS) / STEPS as f64);
+    let weight = weight.map(|w| Rgb::from_array(std::array::from_fn(|c| (w[c] / means[c]) as f32)));
+    Table { nm, weight }
+});
+
+/// The wavelength (nm) at `u` in `[0, 1]`, uniform, and what it weighs: on average exactly white.
+#[inline]
+pub fn at(u: f32) -> (f32, Rgb) {
+    let table = &*TABLE;
+    let x = u * STEPS as f32;
+    let k = (x as usize).min(STEPS - 1);
+    let t = x - k as f32;
+    (table.nm[k] + (table.nm[k + 1] - table.nm[k]) * t, table.weight[k] + (table.weight[k + 1] - table.weight[k]) * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The fits are the observer's: peaks and integrals of the CIE's tables (Y: 106.857 nm; X, Z within 1 %).
+    #[test]
+    fn the_observer_is_the_standard_one() {
+        let n = 4700;
+        for (c, integral) in [106.87, 106.86, 106.89].into_iter().enumerate() {
+            let sum: f64 = (0..n).map(|i| xyz(360.0 + 0.1 * f64::from(i))[c]).sum::<f64>() * 0.1;
+            assert!((sum / integral - 1.0).abs() < 0.01, "{c}: {sum}");
+        }
+        let peak = (0..n).map(|i| 360.0 + 0.1 * f64::from(i)).max_by(|a, b| xyz(*a)[1].total_cmp(&xyz(*b)[1]));
+        assert!(peak.is_some_and(|nm| (nm - 555.0).abs() < 5.0), "{peak:?}");
+    }
+}
