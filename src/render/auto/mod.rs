@@ -187,6 +187,7 @@ fn try_all(
     let slope = (trial_cost(2.0 * least) - trial_cost(least)) / least;
     let most = least + (allowed_once - trial_cost(least)).max(0.0) / slope.max(1e-12);
     let small = camera.resized((most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0));
+    let mut values = Vec::new();
     let mut trials: Vec<Trial> = ways
         .iter()
         .map(|(way, settings)| {
@@ -202,7 +203,7 @@ fn try_all(
                 budget: budget - allowed,
                 free,
             };
-            Trial::new(scene, &small, *way, settings, &seconds, &plan)
+            Trial::new(scene, &small, *way, settings, &seconds, &plan, &mut values)
         })
         .collect();
     let photons = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;

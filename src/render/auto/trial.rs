@@ -65,6 +65,29 @@ pub(super) fn settings(of: &Settings) -> Settings {
     }
 }
 
+fn mean(v: DVec3) -> f64 {
+    v.element_sum() / 3.0
+}
+
+/// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of `levels`. A pixel's own mean would not
+/// do: where one bright sample is all that it has, it is as large as its error. It counts where two eye paths agree on it, for lamps stand out.
+fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
+    let smoothest = levels.count - 1;
+    const REACH: usize = 2;
+    let (width, height) = (width as usize, height as usize);
+    let value = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
+        let near = around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x));
+        let mut near: Vec<f64> = near.map(|index| mean(pixels[index].levels[smoothest].mean)).collect();
+        let middle = near.len() / 2;
+        let median = *near.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let own = &pixels[index].levels;
+        if levels.two_paths { median.max(mean(own[0].mean).min(mean(own[smoothest].mean))) } else { median }
+    };
+    (0..pixels.len()).map(value).collect()
+}
+
 /// What a trial is told.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan {
@@ -93,14 +116,13 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(pixels: &[Pixel], levels: Levels) -> Sums {
+    /// `values`: what pixels are relative to.
+    fn of(pixels: &[Pixel], levels: Levels, values: &[f64]) -> Sums {
         let mut sums = Sums::default();
         let own = levels.own();
-        let mean = |v: DVec3| v.element_sum() / 3.0;
-        for pixel in pixels {
+        for (pixel, value) in pixels.iter().zip(values) {
             let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
             let n = f64::from(pixel.iterations);
-            let value = mean(pixel.levels[own].mean);
             let scale = 1.0 / (value * value + DARK);
             for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
                 *sum += mean(level.variance_of_mean(n)) * scale;
@@ -139,8 +161,8 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
 }
 
 impl Trial {
-    /// Tries a way on a small picture. `cost` tells the core-seconds of an iteration of the whole picture, of its light paths too where there are no eye paths;
-    /// `budget` is what the render may take.
+    /// Tries a way on a small picture. `values`: what its pixels are worth, told by the first trial. `cost` tells the core-seconds of an iteration of the whole picture, of its light paths too where there are no eye paths;
+
     pub(super) fn new(
         scene: &Scene,
         small: &Camera,
@@ -148,6 +170,7 @@ impl Trial {
         of: &Settings,
         cost: &impl Fn(&Settings, bool, Option<&Guide>) -> f64,
         plan: &Plan,
+        values: &mut Vec<f64>,
     ) -> Trial {
         let trial = settings(of);
         let stage = Stage::new(scene, small, &trial);
@@ -156,7 +179,10 @@ impl Trial {
             session.step();
         }
         let levels = stage.settings().levels;
-        let sums = Sums::of(session.pixels(), levels);
+        if values.is_empty() {
+            *values = self::values(session.pixels(), small.size(), levels);
+        }
+        let sums = Sums::of(session.pixels(), levels, values);
         let pixels = sums.pixels.max(1.0);
         let done = plan.iterations as f64;
         let total: f64 = sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
