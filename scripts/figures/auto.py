@@ -25,7 +25,7 @@ ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))
 SCENES = os.environ["SCENES"].split(",") if "SCENES" in os.environ else ALL
 METHODS = ["auto", "path", "bdpt", "vcm", "sppm", "cppm"]
 # What converges soonest: elsewhere a long run of vcm, which finds all light.
-SURELY = {"blocks": "bdpt", "fog": "sppm", "godrays": "sppm", "stadium": "auto", "interior": "bdpt", "torus": "path"}
+SURELY = {"blocks": "bdpt", "fog": "sppm", "godrays": "sppm", "stadium": "auto", "interior": "bdpt", "torus": "vcm", "slide": "sppm"}
 
 
 def measure(scene):

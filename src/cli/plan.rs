@@ -60,7 +60,11 @@ fn report(args: &PlanArgs) -> Result<()> {
     let camera = loaded.scene.camera(&view)?;
     let free = Free { photons: true, neighbours: true };
     let max_depth = args.max_depth.unwrap_or(u32::MAX);
-    let make = |way| Some(Settings { max_depth, ..Settings::of(way) });
+    // As a render does that combines levels.
+    let make = |way| {
+        let settings = Settings { max_depth, ..Settings::of(way) };
+        (settings.levels.count > 1).then_some(settings)
+    };
     let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();
     let switches = args.scene.switches();
     let wishes = Wishes { method: args.method, choice: choice.as_ref(), max_depth: args.max_depth, switches };

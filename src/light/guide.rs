@@ -175,8 +175,7 @@ impl Guide {
             }
         }
         let ratio = native / mixed;
-        // Written so that NaN ends it.
-        if !(ratio > 0.0) {
+        if ratio.is_nan() || ratio <= 0.0 {
             return None;
         }
         Some(Guided { emission: EmissionSample { flux: emission.flux * ratio, ..emission }, cell, ratio })

@@ -4,6 +4,7 @@
 //! much squared relative error every photon leaves in the picture: its own share of the pixel, squared, for it is there or not. The pixel's value is
 //! what the round itself finds there.
 
+use super::settings::Settings;
 use super::sppm::chunks;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
 use crate::light::Guide;
@@ -15,9 +16,11 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-const ROUNDS: u64 = 5;
-/// Light paths of a round.
-const LIGHT_PATHS: u32 = 1 << 15;
+pub(super) const ROUNDS: u64 = 5;
+/// Light paths of a round, over those of an iteration, and bounds of their number.
+const LIGHT_PATHS: f64 = 0.25;
+const LEAST: u32 = 1 << 12;
+const MOST: u32 = 1 << 15;
 /// Eye paths of a round, but one in so many pixels at most.
 const EYE_PATHS: u32 = 1 << 13;
 const PIXELS_PER_EYE_PATH: u64 = 4;
@@ -50,10 +53,12 @@ impl Located for Marked {
 }
 
 /// The guide of a view, learnt; `None` where nothing can make caustics.
-pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, seed: u64) -> Option<Guide> {
+pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, settings: &Settings) -> Option<Guide> {
+    let seed = settings.seed;
+    let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
     let mut guide = Guide::new(&eye.scene.lights)?;
     for round in 0..ROUNDS {
-        let (map, paths) = photons(eye, surroundings, seed, round, &guide);
+        let (map, paths) = photons(eye, surroundings, light_paths, seed, round, &guide);
         let error = error(eye, seed, round, &map, guide.cells());
         guide.learn(&error, &paths);
     }
@@ -64,11 +69,12 @@ pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, seed: u64) -> O
 fn photons(
     eye: &Eye<'_>,
     surroundings: &Surroundings,
+    light_paths: u32,
     seed: u64,
     round: u64,
     guide: &Guide,
 ) -> (PhotonMap<Marked>, Vec<f64>) {
-    let pass = LightPass::new(seed, round, Domain::GuideLight, LIGHT_PATHS, eye.max_depth)
+    let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
         .guided(Some(guide))
         .caustics_only(eye.indirect == Indirect::Paths);
     let trace = |paths: std::ops::Range<u32>| {
@@ -84,7 +90,7 @@ fn photons(
         }
         (marked, cells)
     };
-    let parts: Vec<(Vec<Marked>, Vec<u32>)> = chunks(LIGHT_PATHS).map(trace).collect();
+    let parts: Vec<(Vec<Marked>, Vec<u32>)> = chunks(light_paths).map(trace).collect();
     let mut paths = vec![0.0; guide.cells()];
     for &cell in parts.iter().flat_map(|(_, cells)| cells) {
         paths[cell as usize] += 1.0;

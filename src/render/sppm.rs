@@ -157,7 +157,7 @@ impl<'a> Sppm<'a> {
             max_depth: settings.max_depth,
             indirect: settings.indirect,
         };
-        let guide = settings.guided.then(|| learnt(&eye, surroundings, settings.seed)).flatten();
+        let guide = settings.guided.then(|| learnt(&eye, surroundings, settings)).flatten();
         Sppm { eye, settings, surroundings, guide, later2: f32::INFINITY }
     }
 

@@ -130,11 +130,9 @@ fn choose_all(
     (scene, camera): (&Scene, &Camera),
 ) -> (Vec<Run>, Vec<Option<Choice>>) {
     let choose_one = |run: &mut Run| {
-        let usual = run.entry.settings.clone();
-        let Settings { max_depth, seed, .. } = usual;
+        let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
-        let make =
-            |way| run.args.allowed(way).filter(|s| run.args.model.is_none() || s.levels == usual.levels).map(limits);
+        let make = |way| run.args.allowed(way).map(limits);
         let chosen =
             (run.args.method == Method::Auto).then(|| choose(scene, camera, run.args.free(), make)).flatten()?;
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));

@@ -53,7 +53,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     self::selection(args, settings, present.volume)?;
     // Before anything is tried, which takes time.
     memory::check(settings, camera.size(), channels(settings, present))?;
-    let choice = auto(args, &scene, &camera, settings, present);
+    let choice = auto(args, &scene, &camera, present);
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
     memory::check(settings, camera.size(), channels(settings, present))?;
     let plan = plan::plan(&plan::Wishes::of(args, choice.as_ref()), &scene, &camera, &removed);
@@ -126,7 +126,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
 fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, untried: &Settings, present: Present) -> Option<Choice> {
     let levels = |settings: &Settings| args.model.is_none() || settings.levels == untried.levels;
     let layers = |settings: &Settings| selection(args, settings, present.volume).is_ok();
-    let make = |way| args.allowed(way).filter(|settings| levels(settings) && layers(settings));
+    let make = |way| args.allowed(way).filter(layers);
     (args.method == Method::Auto).then(|| choose(scene, camera, args.free(), make)).flatten()
 }
 

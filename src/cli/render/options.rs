@@ -393,7 +393,10 @@ impl RenderArgs {
             Some(Switch::On) => way.guided || !way.method.guides(render::RadiusRule::Memoryless),
             Some(Switch::Off) => !way.guided,
         };
-        if guide { self.settings_of(way).ok() } else { None }
+        let usual = self.settings().ok()?.levels;
+        // What is to be combined, or was asked for, are levels.
+        let combines = usual.count > 1 && !self.no_combine;
+        self.settings_of(way).ok().filter(|settings| guide && (!combines || settings.levels == usual))
     }
 
     fn settings_of(&self, way: Way) -> Result<Settings> {

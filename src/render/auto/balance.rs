@@ -14,6 +14,9 @@ use crate::render::settings::Settings;
 const NEIGHBOURS: (f64, f64) = (0.5, 4.0);
 const PHOTONS: (f64, f64) = (0.04, 4.0);
 
+/// Steps in which either is searched.
+const STEPS: u32 = 48;
+
 /// Factors of the usual settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
@@ -30,15 +33,21 @@ impl Balance {
     /// The factors of least error for a given cost. `fixed` and `photons`: the parts a and b / p of the variance; `squared_bias`: c, all for the usual
     /// settings after as many iterations; costs of an iteration: of its eye paths, and of its light paths.
     pub fn new(fixed: f64, photons: f64, squared_bias: f64, eye_cost: f64, light_cost: f64) -> Balance {
-        // For a given radius, q times as many light paths: (a + b / q) (eye + q light) is least at q^2 = (b eye) / (a light).
-        let ratio = |a: f64, b: f64| if a > 0.0 && b > 0.0 { a / b } else { 1.0 };
-        let q = (ratio(photons, fixed) * ratio(eye_cost, light_cost)).sqrt().clamp(PHOTONS.0, PHOTONS.1);
-        // b / (q f) + c f is least at f^2 = b / (c q); q iterations' worth of photons more or less change n by `slower`.
-        let slower = (eye_cost + q * light_cost) / (eye_cost + light_cost);
-        let f = ratio(photons * slower / q, squared_bias).sqrt();
-        // Within the radius that the usual number of neighbours sets, q times as many photons are found.
-        let neighbours = (f * q).clamp(NEIGHBOURS.0, NEIGHBOURS.1);
-        Balance { neighbours, photons: q }
+        // For the cost of one iteration of the usual settings; neighbours are area times light paths.
+        let error = |neighbours: f64, q: f64| {
+            let n = (eye_cost + light_cost) / (eye_cost + q * light_cost);
+            fixed / n + photons / (n * neighbours) + squared_bias * neighbours / q
+        };
+        let steps = |(low, high): (f64, f64)| {
+            (0..=STEPS).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(STEPS)))
+        };
+        let all = steps(PHOTONS).flat_map(|q| steps(NEIGHBOURS).map(move |neighbours| (neighbours, q)));
+        let usual = (error(1.0, 1.0), Balance::USUAL);
+        let better = |best: (f64, Balance), (neighbours, photons): (f64, f64)| {
+            let error = error(neighbours, photons);
+            if error < best.0 { (error, Balance { neighbours, photons }) } else { best }
+        };
+        all.fold(usual, better).1
     }
 
     /// Leaves alone what the user has asked for.
@@ -57,5 +66,27 @@ impl Balance {
         if let InitialBandwidth::Nearest(k) = &mut settings.initial {
             *k = ((*k as f64 * self.neighbours).round() as usize).clamp(2, MAX_NEIGHBOURS);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where one part rules, the factors go where it falls; where nothing can be had, they stay.
+    #[test]
+    fn factors_follow_what_rules_the_error() {
+        // Noise of photons, hardly any bias: as many neighbours as there may be.
+        assert_eq!(Balance::new(1e-4, 1e-2, 1e-6, 1.0, 1.0).neighbours, NEIGHBOURS.1);
+        // Bias: few.
+        assert_eq!(Balance::new(1e-4, 1e-4, 1e-1, 1.0, 1.0).neighbours, NEIGHBOURS.0);
+        // Light paths that change nothing.
+        assert_eq!(Balance::new(1e-2, 1e-9, 1e-9, 1.0, 1.0).photons, PHOTONS.0);
+        // They cost nothing beside the eye paths.
+        assert_eq!(Balance::new(1e-3, 1e-2, 1e-3, 1.0, 1e-3).photons, PHOTONS.1);
+        assert_eq!(Balance::new(0.0, 0.0, 0.0, 1.0, 1.0), Balance::USUAL);
+        // In between, where b / f + c f is least: f = 2, within a step.
+        let between = Balance::new(1e-9, 4e-3, 1e-3, 1.0, 1e-9);
+        assert!((between.neighbours / between.photons / 2.0 - 1.0).abs() < 0.1 || between.neighbours == NEIGHBOURS.1);
     }
 }

@@ -16,6 +16,7 @@ pub use balance::Balance;
 pub use trial::{Shares, Trial};
 
 use super::control::{Clock, cpu_seconds};
+use super::guiding::ROUNDS;
 use super::method::Method;
 use super::session::{Session, Spent, Stage};
 use super::settings::Settings;
@@ -173,8 +174,11 @@ fn try_all(
         return (Vec::new(), "the one way that these options leave".into());
     }
     let trial_cost = |pixels: f64| -> f64 {
-        let each =
-            |(way, settings): &(Way, Settings)| ITERATIONS.0 as f64 * cost.of(*way, &trial::settings(settings), pixels);
+        let each = |(way, settings): &(Way, Settings)| {
+            // Learning a guide takes about as much as an iteration of a trial every other round.
+            let learning = if way.guided { ROUNDS as f64 / 2.0 } else { 0.0 };
+            (ITERATIONS.0 as f64 + learning) * cost.of(*way, &trial::settings(settings), pixels)
+        };
         ways.iter().map(each).sum()
     };
     let allowed = SHARE * budget;

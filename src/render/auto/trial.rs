@@ -161,8 +161,8 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
 }
 
 impl Trial {
-    /// Tries a way on a small picture. `values`: what its pixels are worth, told by the first trial. `cost` tells the core-seconds of an iteration of the whole picture, of its light paths too where there are no eye paths;
-
+    /// Tries a way on a small picture. `values`: what its pixels are worth, told by the first trial. `cost` tells the core-seconds of an iteration of the
+    /// whole picture, or of its light paths alone.
     pub(super) fn new(
         scene: &Scene,
         small: &Camera,

@@ -1,0 +1,228 @@
+//! Guided emission keeps the light, whatever it has learnt, and finds what unguided emission does not; and the choice among ways to render.
+//!
+//! The light is compared by t tests over independent passes at a family-wise error rate of 0.1 %; each rejects paths whose flux forgets the guide.
+
+mod support;
+
+use caustique::light::Guide;
+use caustique::math::{DVec3, Vec3};
+use caustique::random::Domain;
+use caustique::render::auto::{Choice, Free, Way, choose};
+use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
+use caustique::scene::{Description, Scene};
+use caustique::transport::{Indirect, LightPass, Surroundings};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::stats::{mean_and_error, t_critical};
+
+const PASSES: u64 = 48;
+const PATHS: u32 = 4096;
+/// A ball of glass, a mirror, and beside them.
+const REGIONS: [(Vec3, f32); 4] = [
+    (Vec3::new(-0.5, 0.4, 0.0), 0.3),
+    (Vec3::new(0.6, 0.3, 0.2), 0.25),
+    (Vec3::new(0.0, 1.0, 0.5), 0.3),
+    (Vec3::new(-0.5, 0.75, 0.0), 0.2),
+];
+
+fn targets(description: &mut Description) {
+    add(description, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0), matte(0.5, 0.0));
+    add(description, "ball", sphere(REGIONS[0].0, 0.3, 32), glass(1.5));
+    add(description, "mirror", sphere(REGIONS[1].0, 0.2, 32), mirror());
+    description.cameras.push(look_at(DVec3::new(0.0, 1.5, 4.0), DVec3::new(0.0, 0.3, 0.0), 40.0));
+}
+
+/// Scenes of one kind of light each, and one of all.
+fn lit() -> Vec<(&'static str, Scene)> {
+    type Light = fn(&mut Description);
+    let lamp: Light = |d| {
+        let mesh = quad(Vec3::new(-0.5, 2.0, -0.5), Vec3::X, Vec3::Z);
+        add(d, "lamp", mesh, matte(0.0, 3.0));
+    };
+    let sheet: Light = |d| {
+        let material = caustique::material::Material { double_sided: true, ..matte(0.0, 2.0) };
+        add(d, "sheet", quad(Vec3::new(0.1, 0.2, -0.3), Vec3::Y, Vec3::Z * 0.5), material);
+    };
+    let point: Light = |d| d.lights.push(point_light(DVec3::new(0.2, 1.7, 0.8), 4.0));
+    let kinds = |kind| PunctualLight { kind, ..point_light(DVec3::new(-0.2, 0.5, 3.0), 5.0) };
+    let spot = kinds(PunctualKind::Spot { inner: 0.3, outer: 0.6 });
+    let sky: Light = |d| {
+        let (width, height) = (16, 8);
+        let texels = (0..width * height).map(|i| [0.2 + (i % 5) as f32, 1.0, 0.5]).collect();
+        let source = EnvironmentSource::Image { width, height, texels };
+        d.environment = Some(EnvironmentDescription { source, rotation_deg: 20.0, strength: 1.0 });
+    };
+    let scene = |lights: &[Light], punctual: &[PunctualLight]| {
+        let mut description = Description::default();
+        targets(&mut description);
+        lights.iter().for_each(|light| light(&mut description));
+        description.lights.extend(punctual.iter().cloned());
+        build(description)
+    };
+    vec![
+        ("lamp", scene(&[lamp], &[])),
+        ("sheet of two sides", scene(&[sheet], &[])),
+        ("point", scene(&[point], &[])),
+        ("spot", scene(&[], std::slice::from_ref(&spot))),
+        ("sky", scene(&[sky], &[])),
+        ("all", scene(&[lamp, sheet, point, sky], &[spot])),
+    ]
+}
+
+/// Flux that light paths send through the regions, pass by pass; `honest`: as they carry it.
+fn flux(scene: &Scene, guide: Option<&Guide>, first: u64, honest: bool) -> Vec<[f64; 4]> {
+    let surroundings = Surroundings::new(scene, Vec3::new(0.0, 1.5, 4.0));
+    let pass = |pass| {
+        let pass = LightPass::new(3, first + pass, Domain::Test, PATHS, u32::MAX).guided(guide);
+        let mut sums = [0.0; 4];
+        for emitted in (0..PATHS).filter_map(|index| pass.emit(scene, &surroundings, index)) {
+            let (origin, d) = (emitted.start.origin, emitted.start.direction);
+            let weight = if honest { 1.0 } else { 1.0 / emitted.ratio };
+            for (sum, (center, radius)) in sums.iter_mut().zip(REGIONS) {
+                let to = center - origin;
+                let along = to.dot(d);
+                if along > 0.0 && (to - d * along).length() < radius {
+                    *sum += f64::from(emitted.start.throughput.element_sum() * weight);
+                }
+            }
+        }
+        sums
+    };
+    (0..PASSES).map(pass).collect()
+}
+
+#[test]
+fn guided_light_is_the_same_light() {
+    let scenes = lit();
+    let critical = t_critical(1e-3, scenes.len() * REGIONS.len(), (PASSES - 1) as f64);
+    for (name, scene) in &scenes {
+        let mut guide = Guide::new(&scene.lights).expect("something to aim at");
+        // What it has learnt is nonsense, and must not matter.
+        let error: Vec<f64> = (0..guide.cells()).map(|cell| ((cell * 7 + 3) % 11) as f64).collect();
+        guide.learn(&error, &vec![1.0; error.len()]);
+        assert!((0.199..=0.901).contains(&guide.unguided()), "{name}: {}", guide.unguided());
+        let (native, guided) = (flux(scene, None, 0, true), flux(scene, Some(&guide), 1000, true));
+        let forgetful = flux(scene, Some(&guide), 1000, false);
+        let mut unnoticed = 0;
+        for region in 0..REGIONS.len() {
+            let of = |passes: &[[f64; 4]]| mean_and_error(&passes.iter().map(|sums| sums[region]).collect::<Vec<_>>());
+            let ((a, error_a), (b, error_b), (wrong, error_wrong)) = (of(&native), of(&guided), of(&forgetful));
+            let allowed = critical * error_a.hypot(error_b) + 1e-12;
+            println!("{name}, region {region}: {a:.4} +- {error_a:.4}, guided {b:.4} +- {error_b:.4}");
+            assert!((a - b).abs() <= allowed, "{name}, region {region}: {a} and {b}, allowed {allowed}");
+            unnoticed += usize::from((a - wrong).abs() <= critical * error_a.hypot(error_wrong));
+        }
+        assert!(unnoticed < REGIONS.len(), "{name}: flux that forgets the guide goes unnoticed");
+    }
+}
+
+/// Of cells whose photons leave errors, those of nine times the error get three times the paths; a fifth stays unguided.
+#[test]
+fn cells_follow_the_error_they_leave() {
+    let scene = &lit()[2].1;
+    let mut guide = Guide::new(&scene.lights).expect("something to aim at");
+    assert_eq!(guide.cells(), 3);
+    let share = |guide: &Guide, seed| {
+        let pass = LightPass::new(seed, 0, Domain::Test, 20_000, u32::MAX).guided(Some(guide));
+        let surroundings = Surroundings::new(scene, Vec3::new(0.0, 1.5, 4.0));
+        let mut counts = [0.0f64; 3];
+        for emitted in (0..20_000).filter_map(|index| pass.emit(scene, &surroundings, index)) {
+            counts[emitted.cell] += 1.0 / 20_000.0;
+        }
+        counts
+    };
+    guide.learn(&[0.0, 9.0, 1.0], &[1.0; 3]);
+    let [unguided, first, second] = share(&guide, 1);
+    assert!((unguided - 0.2).abs() < 0.01, "{unguided}");
+    // A tenth of the guided paths keeps to the lamps' power.
+    assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
+    // Nothing seen: nothing learnt.
+    let before = share(&guide, 2);
+    guide.learn(&[1.0, 0.0, 0.0], &[1.0; 3]);
+    assert_eq!(before, share(&guide, 2));
+}
+
+/// A small ball far below a lamp: the noise of its caustic with and without the guide, after as many light paths.
+#[test]
+fn the_caustic_of_a_small_ball_is_found() {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0), matte(0.5, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.12, 0.0), 0.05, 48), glass(1.5));
+    description.lights.push(point_light(DVec3::new(3.0, 10.0, 2.0), 100.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.5, 0.7), DVec3::new(0.0, 0.03, 0.0), 30.0));
+    let scene = build(description);
+    let camera = scene.camera(&square(16)).expect("a camera");
+    let variance = |guided, indirect| {
+        let settings = Settings {
+            photons: 20_000,
+            guided,
+            indirect,
+            levels: Levels::new(1),
+            initial: caustique::estimator::InitialBandwidth::Fixed(0.02),
+            iterations: Some(12),
+            ..Settings::default()
+        };
+        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+        let caustic: f64 = rendered.pixels.iter().map(|p| p.parts.caustic.element_sum() / 12.0).sum();
+        let variance: f64 = rendered.pixels.iter().map(|p| p.levels[0].variance_of_mean(12.0).element_sum()).sum();
+        println!("guided {guided}, {indirect:?}: caustic {caustic:.3}, variance {variance:.4}");
+        (caustic, variance)
+    };
+    let (_, unguided) = variance(false, Indirect::Photons);
+    for indirect in [Indirect::Photons, Indirect::Paths] {
+        let (caustic, guided) = variance(true, indirect);
+        assert!(caustic > 0.0);
+        // Of 20,000 paths to all sides 0.1 meet the ball; guided ones do in thousands.
+        assert!(unguided > 10.0 * guided, "{indirect:?}: {unguided} and {guided}");
+    }
+}
+
+fn glass_room() -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
+    add(&mut description, "lamp", quad(Vec3::new(-0.2, 1.98, -0.2), Vec3::X * 0.4, Vec3::Z * 0.4), matte(0.0, 20.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.45, 0.0), 0.4, 64), glass(1.5));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    build(description)
+}
+
+fn auto(scene: &Scene, threads: usize, iterations: u64) -> Choice {
+    let camera = scene.camera(&square(24)).expect("a camera");
+    let make = |way| Some(Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(way) });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let free = Free { photons: true, neighbours: true };
+    pool.install(|| choose(scene, &camera, free, make)).expect("a choice")
+}
+
+/// The same arguments, the same choice and the same expectations to the last bit, on any number of threads.
+#[test]
+fn the_choice_does_not_depend_on_threads() {
+    let scene = glass_room();
+    let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
+    assert_eq!(one.trials.len(), 6, "{}", one.because);
+    assert_eq!(one.way, three.way);
+    for (a, b) in one.trials.iter().zip(&three.trials) {
+        println!("{}: {:.5}", a.way.name(), a.expected.sqrt());
+        assert_eq!((a.expected.to_bits(), a.balance), (b.expected.to_bits(), b.balance), "{}", a.way.name());
+    }
+    let chosen = one.trial().expect("a trial");
+    assert!(one.trials.iter().all(|trial| trial.expected >= chosen.expected));
+    let shares = chosen.shares;
+    let sum = shares.emission + shares.direct + shares.indirect + shares.caustic + shares.volume;
+    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+}
+
+/// What a scene does not call for is not tried, and a short render tries nothing.
+#[test]
+fn only_what_is_called_for_is_tried() {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
+    description.lights.push(point_light(DVec3::new(0.0, 1.5, 0.0), 1.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    let matte_only = auto(&build(description), 2, 20_000);
+    let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.way.method).collect();
+    assert_eq!(tried, [Method::Sppm, Method::Path, Method::Bdpt]);
+    assert!(matte_only.trials.iter().all(|trial| !trial.way.guided && trial.shares.caustic == 0.0));
+    let short = auto(&glass_room(), 2, 2);
+    assert!(short.trials.is_empty() && short.way == Way::UNTRIED);
+}
