@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Iterations and core-seconds that APPM and CPPM need to reach the error of SPPM after 1,000 iterations, on six scenes: Table 1 of [CPPM 2020].
 
-One level, bandwidths from ten neighbours, the same seeds for all. The paper's 2^16 light paths are 2^13 here: for pictures of 96 pixels across they are still more for
+One level, bandwidths from ten neighbours, the same seeds for all. The paper's 2^16 light paths are 2^12 here: for pictures of 64 pixels across they are still more for
 a pixel than the paper's. Three errors are measured: mean squared error of all light; of photons' light alone; and of what a screen shows (sRGB, 0 to 255), which
-no single bright sample rules. References are halves by SPPM with 2^18 light paths, kept in out/rules; what is measured leaves their noise out.
+no single bright sample rules. References are halves by SPPM with 2^17 light paths, kept in out/rules; what is measured leaves their noise out.
 
-Environment: SCENES (default: all six), ITERATIONS (1000), SEEDS (2), WIDTH (96), PHOTONS (8192) and REFERENCE core-seconds (100). Scenes that are done are kept in out/time_to_target.
+Environment: SCENES (default: all six), ITERATIONS (1000), SEEDS (2), WIDTH (64), PHOTONS (4096) and REFERENCE core-seconds (80). Scenes that are done are kept in out/time_to_target.
 """
 
 import json
@@ -18,9 +18,9 @@ from record import ROOT, record
 OUT = ROOT / "out" / "time_to_target"
 ITERATIONS = int(os.environ.get("ITERATIONS", "1000"))
 SEEDS = int(os.environ.get("SEEDS", "2"))
-WIDTH = int(os.environ.get("WIDTH", "96"))
-PHOTONS = int(os.environ.get("PHOTONS", "8192"))
-REFERENCE = int(os.environ.get("REFERENCE", "100"))
+WIDTH = int(os.environ.get("WIDTH", "64"))
+PHOTONS = int(os.environ.get("PHOTONS", "4096"))
+REFERENCE = int(os.environ.get("REFERENCE", "80"))
 SCENES = os.environ.get("SCENES", "torus,pool,cornell,gems,lamp,blocks").split(",")
 ERRORS = ["all", "photons", "display"]
 

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Light paths an iteration of a reference: its first bandwidths' areas are smaller in proportion, and so is its bias.
-const REFERENCE_PHOTONS: u32 = 1 << 18;
+const REFERENCE_PHOTONS: u32 = 1 << 17;
 
 /// The methods of the paper's comparison.
 pub const METHODS: [Method; 3] = [Method::Sppm, Method::Appm, Method::Cppm];

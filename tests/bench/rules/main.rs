@@ -40,13 +40,13 @@ fn main() {
     let Some((figure, rest)) = arguments.split_first() else { return };
     let pairs = rest.iter().map(|pair| pair.split_once('=').unwrap_or_else(|| panic!("{pair} is not KEY=VALUE")));
     let options = Options(pairs.map(|(key, value)| (key.into(), value.into())).collect());
-    let width = options.number("width", 96.0) as u32;
+    let width = options.number("width", 64.0) as u32;
     let scenes = options.text("scene", "torus");
     let grounds: Vec<Ground> = scenes.split(',').map(|scene| Ground::new(scene, width)).collect();
-    let photons = options.number("photons", 8192.0) as u32;
+    let photons = options.number("photons", 4096.0) as u32;
     let iterations = options.number("iterations", 1000.0) as u64;
     let seeds = options.number("seeds", 4.0) as u64;
-    let reference = options.number("reference", 200.0);
+    let reference = options.number("reference", 80.0);
     let file = PathBuf::from(options.text("file", ""));
     let work = (photons, iterations, seeds);
     let found = match figure.as_str() {
