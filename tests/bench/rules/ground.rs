@@ -164,23 +164,33 @@ impl Reference {
         Errors { all: half(&a.all, &b.all), photons: half(&a.photons, &b.photons), display: 0.0 }
     }
 
+    /// Squared bias of two pictures that differ in their seed alone.
+    pub fn squared_bias(&self, x: &Shot, y: &Shot) -> Errors {
+        let [a, b] = &self.halves;
+        let all = product([&x.all, &y.all], [&a.all, &b.all]);
+        Errors { all, photons: product([&x.photons, &y.photons], [&a.photons, &b.photons]), display: 0.0 }
+    }
+
     /// Errors of a picture without the reference's own.
     pub fn errors(&self, shot: &Shot) -> Errors {
         let [a, b] = &self.halves;
         let values = (3 * shot.all.len()) as f64;
-        let product = |x: &[DVec3], a: &[DVec3], b: &[DVec3]| {
-            x.iter().zip(a).zip(b).map(|((x, a), b)| (x - a).dot(x - b)).sum::<f64>() / values
-        };
         let shown = |v: DVec3| 255.0 * ToneMap::Srgb.display(v.as_vec3(), 0.0).as_dvec3();
         let display = |x: DVec3, y: DVec3| (shown(x) - shown(y)).length_squared();
         let each = shot.all.iter().zip(&a.all).zip(&b.all);
         let sum: f64 = each.map(|((x, a), b)| display(*x, 0.5 * (*a + *b)) - 0.25 * display(*a, *b)).sum();
         Errors {
-            all: product(&shot.all, &a.all, &b.all),
-            photons: product(&shot.photons, &a.photons, &b.photons),
+            all: product([&shot.all; 2], [&a.all, &b.all]),
+            photons: product([&shot.photons; 2], [&a.photons, &b.photons]),
             display: sum / values,
         }
     }
+}
+
+/// Mean over pixels and channels of what pictures differ from references, times each other.
+fn product([x, y]: [&[DVec3]; 2], [a, b]: [&[DVec3]; 2]) -> f64 {
+    let sum: f64 = x.iter().zip(y).zip(a.iter().zip(b)).map(|((x, y), (a, b))| (*x - *a).dot(*y - *b)).sum();
+    sum / (3 * x.len()) as f64
 }
 
 /// Iterations to measure at: growing by a fifth, and the last.

@@ -9,6 +9,7 @@ pub fn race(ground: &Ground, (photons, iterations, seeds): (u32, u64, u64), refe
     let reference = ground.reference(reference_seconds);
     let moments = moments(iterations);
     let mut runs: Vec<Vec<Value>> = METHODS.iter().map(|_| Vec::new()).collect();
+    let mut last: Vec<Vec<Shot>> = METHODS.iter().map(|_| Vec::new()).collect();
     for seed in 0..seeds {
         let stages: Vec<Stage<'_>> = METHODS.iter().map(|m| ground.stage(&settings(*m, photons, seed))).collect();
         let mut sessions: Vec<Session<'_>> = stages.iter().map(Session::new).collect();
@@ -25,14 +26,20 @@ pub fn race(ground: &Ground, (photons, iterations, seeds): (u32, u64, u64), refe
         for (run, points) in runs.iter_mut().zip(points) {
             run.push(points.into());
         }
+        for (last, session) in last.iter_mut().zip(&sessions) {
+            last.push(Shot::of(session));
+        }
         eprintln!("{}: seed {seed} done", ground.name);
     }
     let own = reference.errors_of_halves();
+    let by_method = |last: &Vec<Shot>| Some(reference.squared_bias(last.first()?, last.get(1)?).object());
+    let biases: serde_json::Map<String, Value> =
+        METHODS.iter().zip(&last).map(|(method, last)| (method.name().to_string(), by_method(last).into())).collect();
     let runs: serde_json::Map<String, Value> =
         METHODS.iter().zip(runs).map(|(method, run)| (method.name().to_string(), run.into())).collect();
     json!({
         "scene": ground.name, "size": ground.size(), "photons": photons, "iterations": iterations, "seeds": seeds,
         "reference": {"iterations": reference.iterations, "half": own.object(), "core_seconds": reference_seconds},
-        "columns": ["iterations", "core_seconds", "all", "photons", "display"], "runs": runs,
+        "columns": ["iterations", "core_seconds", "all", "photons", "display"], "runs": runs, "squared_biases": biases,
     })
 }
