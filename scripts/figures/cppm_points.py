@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Bandwidth and error of photons' light against iterations, at a smooth place and at the edge of a caustic, by SPPM, APPM and CPPM: Figure 9 of [CPPM 2020]. Draws docs/points.svg.
 
-Environment: SCENE (pool), PLACES (x,y,x,y in pixels), ITERATIONS (1000), SEEDS (4), WIDTH (64), PHOTONS (4096) and REFERENCE core-seconds (80), kept in out/rules.
+Environment: SCENE (pool), PLACES (x,y,x,y in pixels), ITERATIONS (1000), SEEDS (2), WIDTH (64), PHOTONS (4096) and REFERENCE core-seconds (80), kept in out/rules.
 """
 
 import os
@@ -10,7 +10,7 @@ from _rules import run
 from record import ROOT, record
 
 SETTINGS = {
-    "scene": ("SCENE", "pool"), "places": ("PLACES", "6,4,30,20"), "iterations": ("ITERATIONS", "1000"), "seeds": ("SEEDS", "4"),
+    "scene": ("SCENE", "pool"), "places": ("PLACES", "48,22,45,22"), "iterations": ("ITERATIONS", "1000"), "seeds": ("SEEDS", "2"),
     "width": ("WIDTH", "64"), "photons": ("PHOTONS", "4096"), "reference": ("REFERENCE", "80"),
 }
 

@@ -21,7 +21,7 @@ SEEDS = int(os.environ.get("SEEDS", "2"))
 WIDTH = int(os.environ.get("WIDTH", "64"))
 PHOTONS = int(os.environ.get("PHOTONS", "4096"))
 REFERENCE = int(os.environ.get("REFERENCE", "80"))
-SCENES = os.environ.get("SCENES", "torus,pool,cornell,gems,lamp,blocks").split(",")
+SCENES = os.environ.get("SCENES", "torus,pool,cornell,gems,blocks,slide").split(",")
 ERRORS = ["all", "photons", "display"]
 
 
