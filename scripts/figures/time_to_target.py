@@ -55,7 +55,7 @@ def main():
     print(f"{'scene':<10}{'error':<9}{'sppm':>10}   iterations and core-seconds in percent of sppm's, error after {ITERATIONS} in percent of its")
     for scene in SCENES:
         data = measure(scene)
-        row = {"scene": scene, "size": data["size"], "reference": data["reference"]}
+        row = {"scene": scene, "size": data["size"], "reference": data["reference"], "squared_biases": data["squared_biases"]}
         for column, name in enumerate(ERRORS, 2):
             curves = {method: curve(seeds, column) for method, seeds in data["runs"].items()}
             _, seconds, target = curves["sppm"][-1]

@@ -155,20 +155,20 @@ impl Reference {
         0.5 * (a.photons[pixel] + b.photons[pixel])
     }
 
-    /// Mean squared noise of a half.
-    pub fn errors_of_halves(&self) -> Errors {
+    /// Mean squared noise of a half: of all light, and of photons'.
+    pub fn noise(&self) -> [f64; 2] {
         let [a, b] = &self.halves;
         let half = |a: &[DVec3], b: &[DVec3]| {
             a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum::<f64>() / (6 * a.len()) as f64
         };
-        Errors { all: half(&a.all, &b.all), photons: half(&a.photons, &b.photons), display: 0.0 }
+        [half(&a.all, &b.all), half(&a.photons, &b.photons)]
     }
 
-    /// Squared bias of two pictures that differ in their seed alone.
-    pub fn squared_bias(&self, x: &Shot, y: &Shot) -> Errors {
+    /// Squared bias of two pictures that differ in their seed alone: of all light, and of photons'.
+    pub fn squared_bias(&self, x: &Shot, y: &Shot) -> [f64; 2] {
         let [a, b] = &self.halves;
         let all = product([&x.all, &y.all], [&a.all, &b.all]);
-        Errors { all, photons: product([&x.photons, &y.photons], [&a.photons, &b.photons]), display: 0.0 }
+        [all, product([&x.photons, &y.photons], [&a.photons, &b.photons])]
     }
 
     /// Errors of a picture without the reference's own.

@@ -31,15 +31,14 @@ pub fn race(ground: &Ground, (photons, iterations, seeds): (u32, u64, u64), refe
         }
         eprintln!("{}: seed {seed} done", ground.name);
     }
-    let own = reference.errors_of_halves();
-    let by_method = |last: &Vec<Shot>| Some(reference.squared_bias(last.first()?, last.get(1)?).object());
+    let by_method = |last: &Vec<Shot>| Some(reference.squared_bias(last.first()?, last.get(1)?));
     let biases: serde_json::Map<String, Value> =
-        METHODS.iter().zip(&last).map(|(method, last)| (method.name().to_string(), by_method(last).into())).collect();
+        METHODS.iter().zip(&last).map(|(method, last)| (method.name().to_string(), json!(by_method(last)))).collect();
     let runs: serde_json::Map<String, Value> =
         METHODS.iter().zip(runs).map(|(method, run)| (method.name().to_string(), run.into())).collect();
     json!({
         "scene": ground.name, "size": ground.size(), "photons": photons, "iterations": iterations, "seeds": seeds,
-        "reference": {"iterations": reference.iterations, "half": own.object(), "core_seconds": reference_seconds},
+        "reference": {"iterations": reference.iterations, "half": reference.noise(), "core_seconds": reference_seconds},
         "columns": ["iterations", "core_seconds", "all", "photons", "display"], "runs": runs, "squared_biases": biases,
     })
 }
