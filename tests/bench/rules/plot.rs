@@ -35,14 +35,16 @@ pub fn panels(
             all.iter().filter(|p| p.1 > 0.0).map(of).reduce(f).unwrap_or(1.0)
         };
         let (left, right) = (fold(f64::min, |p| p.0) / 1.1, fold(f64::max, |p| p.0) * 1.1);
-        let (low, high) = (fold(f64::min, |p| p.1) / 1.3, fold(f64::max, |p| p.1) * 1.3);
+        let (least, most) = (fold(f64::min, |p| p.1), fold(f64::max, |p| p.1));
+        // Less than a decade would have hardly a label.
+        let (low, high) = if most < 8.0 * least { (least / 3.0, most * 1.6) } else { (least / 1.3, most * 1.3) };
         let mut chart = ChartBuilder::on(area)
             .margin(14)
             .caption(&panel.title, ("sans-serif", 16))
             .x_label_area_size(34)
             .y_label_area_size(64)
             .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
-        let digits = |v: &f64| format!("{v:.2e}").replace("e0", "");
+        let digits = |v: &f64| if *v < 1.0 { format!("{v:.0e}") } else { format!("{v:.0}") };
         chart.configure_mesh().x_desc(panel.across).y_label_formatter(&digits).light_line_style(TRANSPARENT).draw()?;
         for curve in &panel.curves {
             let (r, g, b) = COLOURS[curve.colour % COLOURS.len()];
