@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Errors of SPPM, APPM and CPPM by the number of neighbours that set the first bandwidth, and of APPM from one first bandwidth everywhere: Figure 11 of [CPPM 2020]. Draws docs/neighbours.svg.
 
-Environment: SCENES (pool,blocks), ITERATIONS (80), SEEDS (2), WIDTH (64), PHOTONS (8192; wide bandwidths meet their cap, a twentieth of the picture) and
+Environment: SCENES (pool,blocks), ITERATIONS (40), SEEDS (1), WIDTH (64), PHOTONS (8192; wide bandwidths meet their cap, a twentieth of the picture) and
 REFERENCE core-seconds (80), kept in out/rules.
 """
 
@@ -10,7 +10,7 @@ import os
 from _rules import run
 from record import ROOT, record
 
-SETTINGS = {"iterations": ("ITERATIONS", "80"), "seeds": ("SEEDS", "2"), "width": ("WIDTH", "64"), "photons": ("PHOTONS", "8192"), "reference": ("REFERENCE", "80")}
+SETTINGS = {"iterations": ("ITERATIONS", "40"), "seeds": ("SEEDS", "1"), "width": ("WIDTH", "64"), "photons": ("PHOTONS", "8192"), "reference": ("REFERENCE", "80")}
 
 
 def mean(errors):
