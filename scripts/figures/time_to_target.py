@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 """Iterations and core-seconds that APPM and CPPM need to reach the error of SPPM after 1,000 iterations, on six scenes: Table 1 of [CPPM 2020].
 
-One level, bandwidths from ten neighbours, the same seeds for all. The paper's 2^16 light paths are 2^12 here: for pictures of 64 pixels across they are still more for
-a pixel than the paper's. Three errors are measured: mean squared error of all light; of photons' light alone; and of what a screen shows (sRGB, 0 to 255), which
-no single bright sample rules. References are halves by SPPM with 2^17 light paths, kept in out/rules; what is measured leaves their noise out.
+One level, bandwidths from ten neighbours, the same seeds for all. The paper's 2^16 light paths are 2^12 here, for pictures of 64 pixels across. Three
+errors are measured: mean squared error of all light; of photons' light alone; and of what a screen shows (sRGB, 0 to 255), which no single bright sample rules. References are halves by SPPM with 2^17 light paths, kept in out/rules; what is measured leaves their noise out.
 
 Environment: SCENES (default: all six), ITERATIONS (1000), SEEDS (2), WIDTH (64), PHOTONS (4096) and REFERENCE core-seconds (80). Scenes that are done are kept in out/time_to_target.
 """

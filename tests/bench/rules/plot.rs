@@ -45,7 +45,17 @@ pub fn panels(
             .y_label_area_size(64)
             .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
         let digits = |v: &f64| if *v < 1.0 { format!("{v:.0e}") } else { format!("{v:.0}") };
-        chart.configure_mesh().x_desc(panel.across).y_label_formatter(&digits).light_line_style(TRANSPARENT).draw()?;
+        let round = |v: &f64| {
+            let text = format!("{v:.0}");
+            if text.starts_with(['1', '2', '5']) { text } else { String::new() }
+        };
+        chart
+            .configure_mesh()
+            .x_desc(panel.across)
+            .x_label_formatter(&round)
+            .y_label_formatter(&digits)
+            .light_line_style(TRANSPARENT)
+            .draw()?;
         for curve in &panel.curves {
             let (r, g, b) = COLOURS[curve.colour % COLOURS.len()];
             let colour = RGBColor(r, g, b);
