@@ -122,9 +122,8 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     summary.interrupted(args)
 }
 
-/// What auto chooses, where it is to: among ways whose pictures have the layers asked for, and the levels that a network asked for combines.
-fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, untried: &Settings, present: Present) -> Option<Choice> {
-    let levels = |settings: &Settings| args.model.is_none() || settings.levels == untried.levels;
+/// What auto chooses, where it is to: among ways whose pictures have the layers asked for.
+fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, present: Present) -> Option<Choice> {
     let layers = |settings: &Settings| selection(args, settings, present.volume).is_ok();
     let make = |way| args.allowed(way).filter(layers);
     (args.method == Method::Auto).then(|| choose(scene, camera, args.free(), make)).flatten()
