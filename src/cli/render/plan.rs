@@ -86,6 +86,12 @@ fn weigh(plan: &mut Plan, trial: &Trial) {
             (effect.energy, effect.error_if_off) = (Some(energy), Some(error));
         }
     }
+    for (effect, seconds) in [Effect::Indirect, Effect::Caustic].into_iter().zip(trial.seconds_of_parts) {
+        let effect = &mut plan.effects[effect as usize];
+        if effect.present {
+            effect.seconds_per_iteration = seconds;
+        }
+    }
 }
 
 /// How a method looks for light.

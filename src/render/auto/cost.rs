@@ -54,4 +54,21 @@ impl Cost {
             }
         }
     }
+
+    /// Core-seconds of an iteration that indirect light takes, and caustics, where one can be done without the other.
+    pub fn parts(&self, way: Way, settings: &Settings, pixels: f64) -> [Option<f64>; 2] {
+        let Lengths { eye, eye_to_broad, .. } = self.lengths;
+        let beyond = (eye - eye_to_broad).max(0.0);
+        let all = self.of(way, settings, pixels);
+        match (way.method, way.indirect) {
+            (Method::Path, _) => [Some(pixels * beyond * EYE_VERTEX), None],
+            // Without caustics there would be no photons.
+            (method, Indirect::Paths) if method.gathers() => {
+                let paths = self.of(Way { method: Method::Path, ..way }, settings, pixels);
+                let eyes = if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
+                [Some(eyes * pixels * beyond * (EYE_VERTEX + GATHER)), Some(all - eyes * paths)]
+            }
+            _ => [None, None],
+        }
+    }
 }

@@ -207,7 +207,10 @@ fn try_all(
                 budget: budget - allowed,
                 free,
             };
-            Trial::new(scene, &small, *way, settings, &seconds, &plan, &mut values)
+            let trial = Trial::new(scene, &small, *way, settings, &seconds, &plan, &mut values);
+            let mut balanced = settings.clone();
+            trial.balance.apply(&mut balanced);
+            Trial { seconds_of_parts: cost.parts(*way, &balanced, pixels), ..trial }
         })
         .collect();
     let photons = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;

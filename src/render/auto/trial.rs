@@ -44,6 +44,8 @@ pub struct Trial {
     pub without: Shares,
     /// Counted core-seconds of an iteration of the whole picture.
     pub seconds_per_iteration: f64,
+    /// Of them those that indirect light takes, and caustics, where one can be done without the other.
+    pub seconds_of_parts: [Option<f64>; 2],
     /// Expected relMSE when the budget is spent.
     pub expected: f64,
     /// What suits it.
@@ -217,6 +219,7 @@ impl Trial {
             shares: Sums::shares(sums.parts.map(|part| part / total)),
             without: Sums::shares(sums.squares.map(|square| relative(square).sqrt())),
             seconds_per_iteration,
+            seconds_of_parts: [None; 2],
             expected: noise + bias,
             balance,
         }
