@@ -66,11 +66,8 @@ impl Lengths {
             }
             [from_eye.all, from_eye.to_broad, from_light.all, from_light.to_broad].map(u64::from)
         };
-        let sums = (0..PATHS)
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(count)
-            .reduce(|| [0; 4], |a, b| std::array::from_fn(|k| a[k] + b[k]));
+        let counts: Vec<[u64; 4]> = (0..PATHS).into_par_iter().with_min_len(CHUNK).map(count).collect();
+        let sums = counts.iter().fold([0; 4], |a, b| std::array::from_fn(|k| a[k] + b[k]));
         let [eye, eye_to_broad, light, light_to_broad] = sums.map(|sum| sum as f64 / f64::from(PATHS));
         Lengths { eye, eye_to_broad, light, light_to_broad }
     }

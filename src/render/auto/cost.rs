@@ -1,4 +1,4 @@
-//! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh auto`); choices depend
+//! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh cost`); choices depend
 //! on their ratios.
 
 use super::Way;

@@ -1,7 +1,7 @@
 //! Choosing how to render: a short pilot tries every candidate on a small picture of the same view, and takes the one that is expected to come
 //! closest within what the render may cost.
 //!
-//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants ([`cost`]). So the same arguments give the
+//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants (`cost`). So the same arguments give the
 //! same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances: noise falls as
 //! 1/n where paths are whole, and as n^-alpha, the squared bias as n^-(1 - alpha), where photons are gathered \[Knaus and Zwicker 2011\].
 //!
