@@ -86,6 +86,10 @@ pub struct RenderArgs {
     /// the same, its noise another. Not for path, pm and the methods that count photons [default: off; auto: on]
     #[arg(long, value_enum, help_heading = "Method")]
     pub guide: Option<Switch>,
+    /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
+    /// [default: photons; auto tries both]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub indirect: Option<Indirect>,
     /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
     pub max_depth: Option<u32>,
@@ -203,6 +207,25 @@ impl Method {
 }
 
 /// Rules by which bandwidths shrink.
+/// Who brings indirect light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Indirect {
+    /// Photons
+    Photons,
+    /// Eye paths, which go on; photons bring caustics alone
+    Paths,
+}
+
+impl From<Indirect> for caustique::transport::Indirect {
+    fn from(indirect: Indirect) -> Self {
+        match indirect {
+            Indirect::Photons => caustique::transport::Indirect::Photons,
+            Indirect::Paths => caustique::transport::Indirect::Paths,
+        }
+    }
+}
+
 /// On or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -349,6 +372,7 @@ impl RenderArgs {
             (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
             (self.cppm_plus && method != render::Method::Cppm, "--cppm-plus"),
             (self.guide == Some(Switch::On) && !method.guides(rule), "--guide"),
+            (self.indirect == Some(Indirect::Paths) && (method != M::Sppm || local), "--indirect"),
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
         if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !matches!(method, M::Sppm | M::Appm)) {
@@ -378,7 +402,8 @@ impl RenderArgs {
 
     /// The way to render that the options ask for; with auto that which needs no trial.
     pub fn way(&self) -> Way {
-        Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), ..Way::UNTRIED }
+        let indirect = self.indirect.map_or(Way::UNTRIED.indirect, Into::into);
+        Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 
     /// What is left to auto.
@@ -393,10 +418,11 @@ impl RenderArgs {
             Some(Switch::On) => way.guided || !way.method.guides(render::RadiusRule::Memoryless),
             Some(Switch::Off) => !way.guided,
         };
+        let indirect = self.indirect.is_none_or(|asked| !way.method.gathers() || way.indirect == asked.into());
         let usual = self.settings().ok()?.levels;
         // What is to be combined, or was asked for, are levels.
         let combines = usual.count > 1 && !self.no_combine;
-        self.settings_of(way).ok().filter(|settings| guide && (!combines || settings.levels == usual))
+        self.settings_of(way).ok().filter(|settings| guide && indirect && (!combines || settings.levels == usual))
     }
 
     fn settings_of(&self, way: Way) -> Result<Settings> {

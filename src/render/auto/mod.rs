@@ -104,7 +104,8 @@ fn candidates(scene: &Scene) -> Vec<Way> {
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
     let mut ways = vec![plain(Method::Sppm)];
     if focusing {
-        ways.push(Way { guided: true, ..plain(Method::Sppm) });
+        // Photons of all light are not guided: of dense ones that carry little and sparse ones that carry much, those set the bandwidth and these are
+        // noise in it.
         if !scattering {
             ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
         }
