@@ -58,7 +58,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     let loaded = scene::read(&args.scene, rayon::current_num_threads())?;
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = loaded.scene.camera(&view)?;
-    let free = Free { photons: true, neighbours: true };
+    let free = Free { photons: false, neighbours: false };
     let max_depth = args.max_depth.unwrap_or(u32::MAX);
     // As a render does that combines levels.
     let make = |way| {

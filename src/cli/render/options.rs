@@ -406,9 +406,18 @@ impl RenderArgs {
         Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 
-    /// What is left to auto.
+    /// What is left to auto: nothing where levels are combined, for the network has learnt on the usual light paths and neighbours.
     pub fn free(&self) -> Free {
-        Free { photons: self.photons.is_none(), neighbours: self.knn.is_none() && self.initial_bandwidth.is_none() }
+        let combines = self.combines();
+        Free {
+            photons: self.photons.is_none() && !combines,
+            neighbours: self.knn.is_none() && self.initial_bandwidth.is_none() && !combines,
+        }
+    }
+
+    /// Whether several levels are to be combined.
+    fn combines(&self) -> bool {
+        self.settings().is_ok_and(|settings| settings.levels.count > 1) && !self.no_combine
     }
 
     /// Settings of a way that auto may choose; `None` where the options rule it out.
@@ -420,9 +429,9 @@ impl RenderArgs {
         };
         let indirect = self.indirect.is_none_or(|asked| !way.method.gathers() || way.indirect == asked.into());
         let usual = self.settings().ok()?.levels;
-        // What is to be combined, or was asked for, are levels.
-        let combines = usual.count > 1 && !self.no_combine;
-        self.settings_of(way).ok().filter(|settings| guide && indirect && (!combines || settings.levels == usual))
+        self.settings_of(way)
+            .ok()
+            .filter(|settings| guide && indirect && (!self.combines() || settings.levels == usual))
     }
 
     fn settings_of(&self, way: Way) -> Result<Settings> {
