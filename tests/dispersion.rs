@@ -20,6 +20,7 @@ use caustique::transport::{
     Interior, LightPass, Next, PathStart, Photons, Scattered, Surroundings, Vertex, Visitor, light_path, walk,
 };
 use glam::DQuat;
+use support::channels::{SIZE, TILES, tiles};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{chi_squared_p, mean_and_error, sidak, t_critical};
 
@@ -417,23 +418,6 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
     let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
     assert_eq!(rendered.rejected(), 0, "{method:?}");
     rendered
-}
-
-const SIZE: u32 = 16;
-const TILE: u32 = 8;
-const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
-
-/// Means of every tile and channel.
-fn tiles(rendered: &Rendered) -> Vec<f64> {
-    let own = rendered.settings.levels.own();
-    let mut sums = vec![0.0; 3 * TILES];
-    for (index, pixel) in (0..).zip(&rendered.pixels) {
-        let tile = (index / SIZE / TILE * (SIZE / TILE) + index % SIZE / TILE) as usize;
-        for c in 0..3 {
-            sums[3 * tile + c] += pixel.levels[own].mean[c] / f64::from(TILE * TILE);
-        }
-    }
-    sums
 }
 
 /// Tile means by seed.

@@ -13,6 +13,7 @@ use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Control, Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
+use support::channels::{SIZE, TILES, tiles};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
 use support::stats::{chi_squared_p, mean_and_error, sidak, t_critical};
 
@@ -289,23 +290,6 @@ fn air_close_to_a_point_light() {
 }
 
 // ---------------------------------------------------------------- agreement
-
-const SIZE: u32 = 16;
-const TILE: u32 = 8;
-const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
-
-/// Tile means of every channel.
-fn tiles(rendered: &Rendered) -> Vec<f64> {
-    let own = rendered.settings.levels.own();
-    let mut sums = vec![0.0; 3 * TILES];
-    for (index, pixel) in (0..).zip(&rendered.pixels) {
-        let tile = (index / SIZE / TILE * (SIZE / TILE) + index % SIZE / TILE) as usize;
-        for c in 0..3 {
-            sums[3 * tile + c] += pixel.levels[own].mean[c] / f64::from(TILE * TILE);
-        }
-    }
-    sums
-}
 
 /// Tiles and channels in which two methods differ by more than chance and `bias` allow.
 fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {

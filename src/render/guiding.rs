@@ -103,18 +103,18 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: u
     let (width, height) = eye.camera.size();
     let pixels = u64::from(width) * u64::from(height);
     let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
+    // Pixels in even steps from a first one drawn anew every round.
+    let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
         let mut error = vec![0.0f64; cells];
         let (mut arena, mut nearest) = (Bump::new(), Nearest::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
             let stream = Stream::new(seed, round, Domain::GuideEye, u64::from(index));
-            // Pixels in even steps from a first one drawn anew every round.
-            let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
             let pixel = ((f64::from(index) + f64::from(offset)) * pixels as f64 / f64::from(paths)) as u64;
             let pixel = pixel.min(pixels - 1);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
-            if let Some(probe) = eye.probe(&arena, &eye.start(at, stream), stream) {
+            if let Some(probe) = eye.probe(&arena, &(eye.start(at, stream), stream)) {
                 weigh(eye, map, &mut nearest, &probe, &mut error);
             }
         }
@@ -130,14 +130,15 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: u
 
 /// Adds what the photons around a probe leave in its pixel.
 fn weigh(eye: &Eye<'_>, map: &PhotonMap<Marked>, nearest: &mut Nearest<Marked>, probe: &Probe, error: &mut [f64]) {
-    let cap = SCREEN_CAP * span(eye.camera, probe.length);
-    let radius2 = nearest.radius2(map, probe.p, probe.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
+    let point = &probe.point;
+    let cap = SCREEN_CAP * span(eye.camera, point.length);
+    let radius2 = nearest.radius2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
     let scale = probe.weight / (PI * radius2);
     let mut light = Vec::with_capacity(NEIGHBOURS);
     let mut sum = Rgb::ZERO;
-    map.within(probe.p, radius2, |marked, _| {
+    map.within(point.p, radius2, |marked, _| {
         let photon = &marked.photon;
-        if photon.ng.dot(probe.ng) > 0.0 {
+        if photon.ng.dot(point.ng) > 0.0 {
             let found = scale * photon.flux;
             sum += found;
             light.push((marked.cell, luminance(found)));

@@ -29,7 +29,6 @@ use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::spectrum::{Hue, Wavelength};
 use crate::trace::Ray;
-use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 use wide::f32x8;
 
@@ -558,42 +557,5 @@ impl Eye<'_> {
         let measure = gather.measure;
         scratch.arena.reset();
         measure
-    }
-
-    /// The first vertex of an eye path whose lobes gather photons.
-    pub fn gather_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
-        let mut find = FindGatherPoint { found: None, length: 0.0 };
-        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
-        find.found
-    }
-}
-
-/// Where an eye path would gather photons first.
-#[derive(Clone, Copy, Debug)]
-pub struct GatherPoint {
-    /// World position.
-    pub p: Vec3,
-    /// Unit geometric normal; [`crate::photon::NO_NORMAL`] in a medium.
-    pub ng: Vec3,
-    /// Length of the eye path.
-    pub length: f32,
-}
-
-struct FindGatherPoint {
-    found: Option<GatherPoint>,
-    length: f32,
-}
-
-impl<'a> Visitor<'a> for FindGatherPoint {
-    const SPLITS: bool = true;
-
-    fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
-        self.length += vertex.distance;
-        let lobes = vertex.shading.bsdf.lobes();
-        if lobes.has(LobeSet::BROAD) {
-            self.found = Some(GatherPoint { p: vertex.surface.p, ng: vertex.surface.ng, length: self.length });
-            return Next::Stop;
-        }
-        Next::Continue(lobes)
     }
 }

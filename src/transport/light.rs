@@ -173,6 +173,13 @@ struct Deposit<'a> {
     unreachable: bool,
 }
 
+impl<'a> Deposit<'a> {
+    /// Of a light path just begun.
+    fn new(scene: &'a Scene, photons: &'a mut Photons, onward: LobeSet, emitted: &Emitted) -> Deposit<'a> {
+        Deposit { scene, photons, onward, caustic: true, unreachable: emitted.delta }
+    }
+}
+
 impl<'a> Visitor<'a> for Deposit<'_> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
@@ -228,7 +235,7 @@ pub fn light_path(
 ) -> Option<usize> {
     let emitted = pass.emit(scene, surroundings, index)?;
     let onward = if pass.caustics_only { LobeSet::SHARP | LobeSet::DELTA } else { LobeSet::ALL };
-    let mut deposit = Deposit { scene, photons, onward, caustic: true, unreachable: emitted.delta };
+    let mut deposit = Deposit::new(scene, photons, onward, &emitted);
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
     Some(emitted.cell)
 }
@@ -274,8 +281,7 @@ impl EqualFlux {
         let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
         for copy in 0..copies {
             let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
-            let mut deposit =
-                Deposit { scene, photons, onward: LobeSet::ALL, caustic: true, unreachable: emitted.delta };
+            let mut deposit = Deposit::new(scene, photons, LobeSet::ALL, &emitted);
             walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
             arena.reset();
         }

@@ -23,14 +23,14 @@ pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, S
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Left, LightVertices, Splat};
 pub use direct::{balance, direct_light};
-pub use eye::{Bandwidths, Eye, EyeMeasure, Features, FirstHit, Found, GatherPoint, Indirect, LevelRadii, MAX_LEVELS};
+pub use eye::{Bandwidths, Eye, EyeMeasure, Features, FirstHit, Found, Indirect, LevelRadii, MAX_LEVELS};
 pub use gather::Scratch;
 pub use interior::{Crossing, Interior, Surroundings};
 pub use lengths::Lengths;
 pub use light::{Emitted, EqualFlux, LightPass, Photons, light_path};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;
-pub use probe::Probe;
+pub use probe::{GatherPoint, Probe};
 pub use segment::{Arrival, End, Known, MediumArrival, Way, next_surface, transmittance, way};
 pub use site::{MediumVertex, Site};
 pub use volume::Volume;

@@ -6,52 +6,77 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::random::Stream;
-use crate::scene::Scene;
 use bumpalo::Bump;
+use std::f32::consts::FRAC_1_PI;
 
-/// The first vertex of an eye path that gathers photons.
+/// Where an eye path would gather photons first.
 #[derive(Clone, Copy, Debug)]
-pub struct Probe {
+pub struct GatherPoint {
     /// World position.
     pub p: Vec3,
-    /// Unit geometric normal.
+    /// Unit geometric normal; [`crate::photon::NO_NORMAL`] in a medium.
     pub ng: Vec3,
     /// Length of the eye path.
     pub length: f32,
+}
+
+/// The first vertex of an eye path that gathers photons on a surface, and its light.
+#[derive(Clone, Copy, Debug)]
+pub struct Probe {
+    /// Where it is.
+    pub point: GatherPoint,
     /// Radiance that a photon adds to the pixel, per flux over area: that of a Lambertian surface of the same albedo.
     pub weight: Rgb,
     /// Radiance that direct light adds to the pixel.
     pub direct: Rgb,
 }
 
-struct Find<'a> {
-    scene: &'a Scene,
-    found: Option<Probe>,
+/// Looks for the vertex, and at it.
+struct Find<F, T> {
+    look: F,
+    found: Option<(GatherPoint, T)>,
     length: f32,
 }
 
-impl<'a> Visitor<'a> for Find<'_> {
+impl<'a, T, F: FnMut(&Vertex<'_, '_>) -> T> Visitor<'a> for Find<F, T> {
     const SPLITS: bool = true;
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         self.length += vertex.distance;
         let lobes = vertex.shading.bsdf.lobes();
-        if !lobes.has(LobeSet::BROAD) {
-            return Next::Continue(lobes);
+        if lobes.has(LobeSet::BROAD) {
+            let point = GatherPoint { p: vertex.surface.p, ng: vertex.surface.ng, length: self.length };
+            self.found = Some((point, (self.look)(vertex)));
+            return Next::Stop;
         }
-        let weight = vertex.throughput * vertex.shading.albedo(LobeSet::BROAD) * std::f32::consts::FRAC_1_PI;
-        let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
-        let (p, ng) = (vertex.surface.p, vertex.surface.ng);
-        self.found = Some(Probe { p, ng, length: self.length, weight, direct });
-        Next::Stop
+        Next::Continue(lobes)
     }
 }
 
 impl Eye<'_> {
-    /// Looks where an eye path first gathers photons on a surface.
-    pub fn probe(&self, arena: &Bump, start: &PathStart, stream: Stream) -> Option<Probe> {
-        let mut find = Find { scene: self.scene, found: None, length: 0.0 };
-        walk(self.scene, arena, start, stream, Transport::Radiance, self.max_depth, &mut find);
+    /// The first vertex of an eye path whose lobes gather photons.
+    pub fn gather_point(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<GatherPoint> {
+        self.find(arena, start, |_| ()).map(|(point, ())| point)
+    }
+
+    /// The same with its light.
+    pub fn probe(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<Probe> {
+        let look = |vertex: &Vertex<'_, '_>| {
+            let weight = vertex.throughput * vertex.shading.albedo(LobeSet::BROAD) * FRAC_1_PI;
+            let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
+            (weight, direct)
+        };
+        self.find(arena, start, look).map(|(point, (weight, direct))| Probe { point, weight, direct })
+    }
+
+    fn find<T>(
+        &self,
+        arena: &Bump,
+        (start, stream): &(PathStart, Stream),
+        look: impl FnMut(&Vertex<'_, '_>) -> T,
+    ) -> Option<(GatherPoint, T)> {
+        let mut find = Find { look, found: None, length: 0.0 };
+        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
     }
 }

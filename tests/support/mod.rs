@@ -8,6 +8,7 @@ pub fn bsdf(p: &Parameters, tables: &EnergyTables) -> Bsdf<'static> {
     Bsdf::new(p, Box::leak(Box::new(Interface::new(p, tables))))
 }
 
+pub mod channels;
 pub mod field;
 pub mod glb;
 pub mod scenes;

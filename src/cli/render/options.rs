@@ -83,7 +83,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, help_heading = "Method")]
     pub kernel: Option<Kernel>,
     /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
-    /// the same, its noise another. Not for path, pm and the methods that count photons [default: off; auto: on]
+    /// the same, its noise another. Not for path, pm and the methods that count photons [default: off; auto tries both]
     #[arg(long, value_enum, help_heading = "Method")]
     pub guide: Option<Switch>,
     /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
@@ -206,7 +206,6 @@ impl Method {
     }
 }
 
-/// Rules by which bandwidths shrink.
 /// Who brings indirect light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -236,6 +235,7 @@ pub enum Switch {
     Off,
 }
 
+/// Rules by which bandwidths shrink.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RadiusRule {

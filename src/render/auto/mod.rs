@@ -196,22 +196,14 @@ fn try_all(
     let mut trials: Vec<Trial> = ways
         .iter()
         .map(|(way, settings)| {
-            let seconds = |settings: &Settings, light: bool, guide: Option<&Guide>| {
-                let guided = guide.map(|guide| counts(scene, camera, untried, Some(guide)));
-                guided.unwrap_or(cost).of(*way, settings, if light { 0.0 } else { pixels })
-            };
             let (width, height) = small.size();
             let once = cost.of(*way, &trial::settings(settings), f64::from(width) * f64::from(height));
             let iterations = (allowed / (ways.len() as f64 * once)) as u64;
-            let plan = trial::Plan {
-                iterations: iterations.clamp(ITERATIONS.0, ITERATIONS.1),
-                budget: budget - allowed,
-                free,
-            };
-            let trial = Trial::new(scene, &small, *way, settings, &seconds, &plan, &mut values);
-            let mut balanced = settings.clone();
-            trial.balance.apply(&mut balanced);
-            Trial { seconds_of_parts: cost.parts(*way, &balanced, pixels), ..trial }
+            let iterations = iterations.clamp(ITERATIONS.0, ITERATIONS.1);
+            let plan = trial::Plan { iterations, budget: budget - allowed, free, pixels };
+            let guided = |guide: &Guide| counts(scene, camera, untried, Some(guide));
+            let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
+            Trial::new(scene, &small, *way, settings, cost_with, &plan, &mut values)
         })
         .collect();
     let photons = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;

@@ -1,5 +1,6 @@
 //! One candidate tried on a small picture.
 
+use super::cost::Cost;
 use super::{Balance, Free, Way};
 use crate::camera::Camera;
 use crate::estimator::{Pixel, SquaredError};
@@ -99,6 +100,8 @@ pub(super) struct Plan {
     pub budget: f64,
     /// Settings that may be balanced.
     pub free: Free,
+    /// Pixels of the whole picture.
+    pub pixels: f64,
 }
 
 /// Standard errors by which a variance is taken to be larger than it looks: rare bright samples make it look smaller more often than larger.
@@ -163,14 +166,14 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
 }
 
 impl Trial {
-    /// Tries a way on a small picture. `values`: what its pixels are worth, told by the first trial. `cost` tells the core-seconds of an iteration of the
-    /// whole picture, or of its light paths alone.
+    /// Tries a way on a small picture. `values`: what its pixels are worth, told by the first trial. `cost_with` counts work with
+    /// the guide that the trial has learnt, if any.
     pub(super) fn new(
         scene: &Scene,
         small: &Camera,
         way: Way,
         of: &Settings,
-        cost: &impl Fn(&Settings, bool, Option<&Guide>) -> f64,
+        cost_with: impl Fn(Option<&Guide>) -> Cost,
         plan: &Plan,
         values: &mut Vec<f64>,
     ) -> Trial {
@@ -200,14 +203,14 @@ impl Trial {
             // The same neighbours in a smaller area.
             squared_bias *= PHOTONS * BLURRED;
         }
-        let guide = session.guide();
-        let (all, light) = (cost(of, false, guide), cost(of, true, guide));
+        let cost = cost_with(session.guide());
+        let (all, light) = (cost.of(way, of, plan.pixels), cost.of(way, of, 0.0));
         let mut balance =
             if gathers { Balance::new(fixed, photons, squared_bias, all - light, light) } else { Balance::USUAL };
         balance.keep(plan.free);
         let mut balanced = of.clone();
         balance.apply(&mut balanced);
-        let seconds_per_iteration = cost(&balanced, false, guide);
+        let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
         let alpha = of.alpha;
         let area = balance.neighbours / balance.photons;
@@ -219,7 +222,7 @@ impl Trial {
             shares: Sums::shares(sums.parts.map(|part| part / total)),
             without: Sums::shares(sums.squares.map(|square| relative(square).sqrt())),
             seconds_per_iteration,
-            seconds_of_parts: [None; 2],
+            seconds_of_parts: cost.parts(way, &balanced, plan.pixels),
             expected: noise + bias,
             balance,
         }
