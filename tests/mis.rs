@@ -10,7 +10,7 @@ mod support;
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
-use caustique::light::{EmissionDensity, Emitter};
+use caustique::light::{EmissionDensity, Emitter, Receiver};
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::medium::{Flight, HenyeyGreenstein};
@@ -59,6 +59,12 @@ struct Met<'s> {
     emitted: Option<EmissionDensity>,
 }
 
+impl Met<'_> {
+    fn receiver(&self) -> Receiver {
+        Receiver { p: self.p, in_medium: self.scatters.in_medium() }
+    }
+}
+
 /// Writes down a walk.
 struct Notes<'a> {
     scene: &'a Scene,
@@ -68,7 +74,8 @@ struct Notes<'a> {
 
 impl<'a> Visitor<'a> for Notes<'a> {
     fn surface(&mut self, v: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
-        let emitted = self.scene.lights.emitted(&self.scene.materials, v.surface, v.wo).map(|e| e.1);
+        let from = self.met.last().map_or(Receiver::surface(v.from), Met::receiver);
+        let emitted = self.scene.lights.emitted(&self.scene.materials, &from, v.surface, v.wo).map(|e| e.1);
         self.met.push(Met {
             p: v.surface.p,
             ng: v.surface.ng,
@@ -245,7 +252,7 @@ impl<'s> Whole<'s> {
     fn density(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: Eta) -> f64 {
         let k = self.nodes.len();
         let smooth = |j: usize| !self.nodes[j].delta;
-        let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.direct);
+        let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.start);
         let eye = |n: usize| (n..k).map(|j| self.eye_pdf_a(j)).product::<f64>();
         match strategy {
             Strategy::Hit if self.light.delta => 0.0,
@@ -253,7 +260,7 @@ impl<'s> Whole<'s> {
                 let measure = if self.light.infinite { 1.0 } else { f64::from(self.light.cos) / self.distance2[0] };
                 self.scatters(0, true) * measure * self.flies(0, false) * eye(0)
             }
-            Strategy::NextEvent if smooth(0) => light(0) * eye(0),
+            Strategy::NextEvent if smooth(0) => f64::from(self.light.direct) * eye(0),
             Strategy::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
             Strategy::Camera if smooth(k - 1) => light_paths * light(k),
             Strategy::Merge(m) => {
@@ -293,7 +300,8 @@ impl<'s> Whole<'s> {
             mis.scatter(cos, forward, reverse, merges)
         };
         let (mut lights, mut eyes) = (Vec::new(), vec![MisState::default(); k]);
-        let mut mis = MisState::light(&self.light);
+        let chosen = if bug == Some(Bug::Chosen) { 1.0 } else { self.light.direct / self.light.start };
+        let mut mis = MisState::light(&self.light).received(chosen);
         for j in 0..k {
             let distance2 = if j == 0 && self.light.infinite { 1.0 } else { self.distance2[j] as f32 };
             mis = mis.arrive(distance2, cosine(self.nodes[j].cos[0])).fly(flight(j, false));
@@ -330,7 +338,8 @@ impl<'s> Whole<'s> {
                     let solid = if self.light.infinite || self.light.delta { 1.0 } else { d2 / self.light.cos };
                     let reach = if self.light.infinite { 1.0 } else { 1.0 / d2 };
                     let Flight { forward, reverse: back } = self.flight(0);
-                    let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32 * forward;
+                    let chosen = self.light.start / self.light.direct;
+                    let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32 * forward * chosen;
                     let pdfs = (reverse(0, true) * back, reverse(0, false));
                     mis::next_event(&eyes[0], pdfs, (self.light.direct * solid, arrival), self.light.delta).weight(eta)
                 }
@@ -372,9 +381,11 @@ enum Bug {
     DirectMerged,
     /// Flight through media forgotten.
     Flight,
+    /// Lights chosen for a point as they are for emission.
+    Chosen,
 }
 
-const BUGS: [Bug; 4] = [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::Flight];
+const BUGS: [Bug; 5] = [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::Flight, Bug::Chosen];
 
 /// What the library has said.
 #[derive(Default)]
@@ -450,8 +461,12 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         let camera_pdf_w = f64::from(camera.pdf_w(start.direction) * pixels);
         let square = |d: f32| f64::from(d) * f64::from(d);
         for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
-            let density = emitted.as_ref().map(|e| e.density);
-            let infinity = EmissionDensity { direct: 0.0, onward: 0.0, cos: 1.0, infinite: true, delta: false };
+            let density = emitted.as_ref().zip(from_light.first()).map(|(e, met)| EmissionDensity {
+                direct: e.density.start * scene.lights.chosen_for(&met.receiver(), e.light),
+                ..e.density
+            });
+            let infinity =
+                EmissionDensity { direct: 0.0, start: 0.0, onward: 0.0, cos: 1.0, infinite: true, delta: false };
             let mut whole = Whole {
                 light: density.unwrap_or(infinity),
                 nodes: vec![],
@@ -468,7 +483,9 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let direction = eye_notes.escaped.expect("an escape");
                     let met = from_eye[from_eye.len() - 1];
                     whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
-                    scene.lights.escape(direction, |_, pdf| whole.light.direct = pdf);
+                    scene.lights.escape(&met.receiver(), direction, |_, direct, start| {
+                        (whole.light.direct, whole.light.start) = (direct, start);
+                    });
                     whole.segment(1.0, None);
                     whole.append(from_eye[..from_eye.len()].iter().rev(), true);
                     ("hit", Strategy::Hit)
@@ -484,25 +501,36 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let met = &from_eye[t as usize - 1];
                     let draws = stream.vertex(t);
                     let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-                    let sample = scene.lights.sample_direct(&scene.shapes, &scene.materials, met.p, choice, point);
+                    let sample = {
+                        let receiver = met.receiver();
+                        scene.lights.sample_direct(&scene.shapes, &scene.materials, &receiver, choice, point)
+                    };
                     let sample = sample.expect("a light sample");
                     let mut distance2 = 1.0;
+                    let emitters = scene.lights.emitters();
+                    let environment = (0..).zip(emitters).find(|(_, e)| e.is_infinite()).map(|(light, _)| light);
                     whole.light = match sample.target {
                         None => EmissionDensity {
                             direct: sample.pdf_w,
+                            start: sample.pdf_w
+                                / environment.map_or(1.0, |light| scene.lights.chosen_for(&met.receiver(), light)),
                             onward: scene.lights.entry_pdf_a(met.p, sample.wi),
                             ..infinity
                         },
                         Some(target) if sample.delta => {
                             distance2 = f64::from(target.distance_squared(met.p));
                             let onward = 0.25 * std::f32::consts::FRAC_1_PI;
-                            EmissionDensity { direct: 1.0, onward, cos: 1.0, infinite: false, delta: true }
+                            EmissionDensity { direct: 1.0, start: 1.0, onward, cos: 1.0, infinite: false, delta: true }
                         }
                         Some(target) => {
-                            // The lamp is flat and of one brightness: any of its triangles will do.
-                            let lamp = scene.lights.emitters().iter().find_map(|emitter| match emitter {
-                                Emitter::Triangle { instance, primitive, .. } => {
-                                    scene.shapes.surface(*instance, *primitive, [0.3, 0.3])
+                            // The lamp is flat and of one brightness, but each of its triangles has a probability of its own.
+                            let lamp = emitters.iter().find_map(|emitter| match emitter {
+                                Emitter::Triangle { instance, primitive, corners: [a, b, c], .. } => {
+                                    let (n, to) = (b.cross(*c), target - *a);
+                                    let x = to.cross(*c).dot(n) / n.length_squared();
+                                    let y = b.cross(to).dot(n) / n.length_squared();
+                                    let inside = x >= -1e-4 && y >= -1e-4 && x + y <= 1.0 + 1e-4;
+                                    inside.then(|| scene.shapes.surface(*instance, *primitive, [x, y])).flatten()
                                 }
                                 _ => None,
                             });
@@ -510,7 +538,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                             // Shadow rays end a little off the lamp: back along its normal.
                             let p = target - lamp.ng * (target - lamp.p).dot(lamp.ng);
                             distance2 = f64::from(p.distance_squared(met.p));
-                            let emitted = scene.lights.emitted(&scene.materials, &lamp, -sample.wi);
+                            let emitted = scene.lights.emitted(&scene.materials, &met.receiver(), &lamp, -sample.wi);
                             emitted.expect("light from the lamp").1
                         }
                     };
@@ -584,7 +612,16 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     assert!(tally.techniques.len() >= 4 && tally.weights > 1000, "{what}: too little happened");
     let media = scene.survey.scattering;
     assert_eq!(tally.in_media > tally.weights / 4, media, "{what}: {} paths through media", tally.in_media);
-    for (bug, worst) in BUGS.into_iter().zip(tally.bugs).filter(|(bug, _)| *bug != Bug::Flight || media) {
+    for (bug, worst) in BUGS.into_iter().zip(tally.bugs) {
+        // Some need a scene that has what they forget.
+        let possible = match bug {
+            Bug::Flight => media,
+            Bug::Chosen => scene.lights.emitters().len() > 1,
+            _ => true,
+        };
+        if !possible {
+            continue;
+        }
         assert!(worst > 100.0 * TOLERANCE, "{what}: {bug:?} goes unnoticed ({worst})");
     }
 }
@@ -625,6 +662,19 @@ fn point_light_and_glass() {
 /// An environment image over rough metal: light from infinity.
 #[test]
 fn under_an_environment() {
+    check("environment", &build(outdoors()), 0.1, 4000);
+}
+
+/// A lamp as well, so that every point has probabilities of its own to choose between them.
+#[test]
+fn lamp_under_an_environment() {
+    let mut description = outdoors();
+    let lamp = quad(Vec3::new(-0.8, 1.2, -0.6), Vec3::X * 0.6, Vec3::Z * 0.4);
+    add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.2, 20.0) });
+    check("lamp and environment", &build(description), 0.1, 4000);
+}
+
+fn outdoors() -> Description {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-1.5, 0.0, -1.5), Vec3::Z * 3.0, Vec3::X * 3.0);
     add(&mut description, "floor", floor, matte(0.5, 0.0));
@@ -636,7 +686,7 @@ fn under_an_environment() {
     let source = EnvironmentSource::Image { width: 32, height: 16, texels };
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 30.0, strength: 1.0 });
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.4, 0.0), 40.0));
-    check("environment", &build(description), 0.1, 4000);
+    description
 }
 
 /// Coloured fog in a room with a mirror and a ball of clear glass: vertices in the medium, segments through it, and nothing in the ball.

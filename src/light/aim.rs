@@ -210,6 +210,7 @@ mod tests {
                     infinite: true,
                     density: EmissionDensity {
                         direct: 1.0,
+                        start: 1.0,
                         onward: 1.0 / whole,
                         cos: 1.0,
                         infinite: true,

@@ -3,6 +3,7 @@
 use super::aim::Targets;
 use super::cdf::Cdf;
 use super::emitter::{Emitter, Sky, spot_falloff};
+use super::receiver::{Choice, Receiver};
 use crate::geometry::{Shapes, Surface, spawn};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, warp};
@@ -29,7 +30,7 @@ pub struct DirectSample {
     /// The light cannot be hit by a ray.
     pub delta: bool,
     /// Density per area of a surface that faces `wi` with which light paths emitted from this point of the light (from this direction, if it is
-    /// at infinity) arrive.
+    /// at infinity) arrive, times the probability of choosing the light for emission over that of choosing it here.
     pub arrival_pdf_a: f32,
 }
 
@@ -37,8 +38,10 @@ pub struct DirectSample {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionDensity {
     /// Density of [`Lights::sample_direct`]: of the point per area, or of the direction per solid angle for light from infinity; for a delta
-    /// light the probability of choosing it.
+    /// light the probability of choosing it. It differs from `start` by the choice of the light alone, which depends on the receiver.
     pub direct: f32,
+    /// The same of [`Lights::sample_emission`].
+    pub start: f32,
     /// Density of the rest of emission: of the direction per solid angle, or of the entry per area for light from infinity.
     pub onward: f32,
     /// Cosine at the light; 1 at infinity and for points.
@@ -71,7 +74,7 @@ pub struct EmissionSample {
 /// The lights of a scene.
 pub struct Lights {
     emitters: Vec<Emitter>,
-    choice: Option<Cdf>,
+    choice: Option<Choice>,
     /// Index of the first emitter of an instance, `u32::MAX` for instances that do not emit; and then the emitter of each
     /// of its triangles, relative to it (`u32::MAX` for those without area).
     first: Vec<u32>,
@@ -150,7 +153,8 @@ impl Lights {
         // A lamp beside the sun is weak as seen from the whole scene, and the brightest thing on its own table: a share of the paths goes
         // to all lights alike. It also keeps every probability above the resolution of the random numbers.
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
-        let choice = Cdf::new(powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 }));
+        let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
+        let choice = Choice::new(&emitters, &sky, floored);
         Lights { emitters, choice, first, relative, suns, environment, sky, targets: Targets::new(shapes, materials) }
     }
 
@@ -176,7 +180,14 @@ impl Lights {
 
     /// The choice of lights by power; `None` if there is none.
     pub(super) fn choice(&self) -> Option<&Cdf> {
-        self.choice.as_ref()
+        self.choice.as_ref().map(Choice::power)
+    }
+
+    /// Probability of choosing a light for a receiver over that of choosing it for emission.
+    #[inline]
+    pub fn chosen_for(&self, receiver: &Receiver, light: u32) -> f32 {
+        let Some(choice) = &self.choice else { return 1.0 };
+        choice.pdf(receiver, light as usize) / choice.power().pdf(light as usize)
     }
 
     /// The emitters of every lamp, the triangles of an instance or a light alone, and the probability of choosing one of them.
@@ -186,7 +197,7 @@ impl Lights {
             _ => false,
         };
         let below = |end: usize| {
-            self.choice.as_ref().map_or(0.0, |choice| if end == self.emitters.len() { 1.0 } else { choice.below(end) })
+            self.choice().map_or(0.0, |choice| if end == self.emitters.len() { 1.0 } else { choice.below(end) })
         };
         self.emitters.chunk_by(same).scan(0, move |first, emitters| {
             let range = *first..*first + emitters.len();
@@ -215,17 +226,32 @@ impl Lights {
         }
     }
 
-    /// A light chosen by power, seen from `p`. `None` where the one chosen does not shine on `p`.
+    /// A light chosen for a receiver, seen from there. `None` where the one chosen does not shine on it.
     #[inline]
     pub fn sample_direct(
         &self,
         shapes: &Shapes,
         materials: &Materials,
-        p: Vec3,
+        receiver: &Receiver,
         choice: f32,
         u: Vec2,
     ) -> Option<DirectSample> {
-        let (index, probability, _) = self.choice.as_ref()?.sample(choice);
+        let (index, probability) = self.choice.as_ref()?.sample(receiver, choice)?;
+        let mut sample = self.seen_from(shapes, materials, receiver.p, (index, probability), u)?;
+        sample.arrival_pdf_a *= self.choice()?.pdf(index) / probability;
+        Some(sample)
+    }
+
+    /// The light of an index, chosen with a probability, seen from `p`.
+    #[inline]
+    fn seen_from(
+        &self,
+        shapes: &Shapes,
+        materials: &Materials,
+        p: Vec3,
+        (index, probability): (usize, f32),
+        u: Vec2,
+    ) -> Option<DirectSample> {
         match &self.emitters[index] {
             Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
                 // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near the plane rounding
@@ -302,10 +328,10 @@ impl Lights {
         }
     }
 
-    /// The point of a light to which [`Lights::sample_direct`] goes with these numbers, wherever from. `None` for light from infinity.
+    /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers. `None` for light from infinity.
     #[inline]
     pub fn point(&self, choice: f32, u: Vec2) -> Option<Vec3> {
-        let (index, ..) = self.choice.as_ref()?.sample(choice);
+        let (index, ..) = self.choice()?.sample(choice);
         match &self.emitters[index] {
             Emitter::Triangle { corners, .. } => {
                 let b = warp::triangle_uniform(u);
@@ -317,12 +343,12 @@ impl Lights {
     }
 
     /// Radiance that a surface hit by a ray sends back along it, and the density per solid angle with which
-    /// [`Lights::sample_direct`] from the ray's origin `p` would have found that point.
+    /// [`Lights::sample_direct`] would have found that point from the ray's origin.
     #[inline]
-    pub fn hit(&self, materials: &Materials, p: Vec3, surface: &Surface) -> Option<(Rgb, f32)> {
-        let to = surface.p - p;
+    pub fn hit(&self, materials: &Materials, from: &Receiver, surface: &Surface) -> Option<(Rgb, f32)> {
+        let to = surface.p - from.p;
         let distance2 = to.length_squared();
-        let (radiance, density) = self.emitted(materials, surface, -to / distance2.sqrt())?;
+        let (radiance, density) = self.emitted(materials, from, surface, -to / distance2.sqrt())?;
         Some((radiance, density.direct * distance2 / density.cos))
     }
 
@@ -344,9 +370,15 @@ impl Lights {
         self.targets.density(&self.sky, p, wi)
     }
 
-    /// Radiance of a surface along `wo` and the densities of starting a light path there that way.
+    /// Radiance of a surface along `wo`, where `from` is, and the densities of starting a light path there that way.
     #[inline]
-    pub fn emitted(&self, materials: &Materials, surface: &Surface, wo: Vec3) -> Option<(Rgb, EmissionDensity)> {
+    pub fn emitted(
+        &self,
+        materials: &Materials,
+        from: &Receiver,
+        surface: &Surface,
+        wo: Vec3,
+    ) -> Option<(Rgb, EmissionDensity)> {
         let first = self.first[surface.instance as usize];
         if first == u32::MAX {
             return None;
@@ -363,24 +395,30 @@ impl Lights {
         }
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures);
         let cos = cos.abs();
-        let direct = self.choice.as_ref()?.pdf(index) / area;
+        let choice = self.choice.as_ref()?;
+        let [direct, start] = [choice.pdf(from, index), choice.power().pdf(index)].map(|chosen| chosen / area);
         let onward = Self::lambertian(cos, *two_sided);
-        Some((radiance, EmissionDensity { direct, onward, cos, infinite: false, delta: false }))
+        Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
-    /// Calls `each(radiance, density)` for every light at infinity that a ray leaving the scene along `d` meets.
+    /// Calls `each(radiance, direct, start)` for every light at infinity that a ray leaving the scene from a receiver along `d` meets, with the densities of
+    /// [`EmissionDensity`].
     #[inline]
-    pub fn escape(&self, d: Vec3, mut each: impl FnMut(Rgb, f32)) {
+    pub fn escape(&self, from: &Receiver, d: Vec3, mut each: impl FnMut(Rgb, f32, f32)) {
         let Some(choice) = &self.choice else { return };
+        let mut met = |radiance: Rgb, index: u32, pdf: f32| {
+            let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
+            each(radiance, direct * pdf, start * pdf);
+        };
         if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment) {
-            each(environment.radiance(d), choice.pdf(index as usize) * environment.pdf_w(d));
+            met(environment.radiance(d), index, environment.pdf_w(d));
         }
         for &index in &self.suns {
             if let Emitter::Sun { frame, irradiance, one_minus_cos } = &self.emitters[index as usize] {
                 // 1 - cos from the chord: exact for narrow cones, where the cosine itself has no digits left.
                 if 0.5 * (d - frame.n).length_squared() < *one_minus_cos {
-                    let pdf = choice.pdf(index as usize) * warp::cone_uniform_pdf_w(*one_minus_cos);
-                    each(Emitter::sun_radiance(*irradiance, *one_minus_cos), pdf);
+                    let pdf = warp::cone_uniform_pdf_w(*one_minus_cos);
+                    met(Emitter::sun_radiance(*irradiance, *one_minus_cos), index, pdf);
                 }
             }
         }
@@ -396,7 +434,7 @@ impl Lights {
         point: Vec2,
         direction: Vec2,
     ) -> Option<EmissionSample> {
-        let (index, probability, rest) = self.choice.as_ref()?.sample(choice);
+        let (index, probability, rest) = self.choice()?.sample(choice);
         let emitter = &self.emitters[index];
         // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine at the light.
         let (origin, d, flux, [direct, onward, cos]) = match emitter {
@@ -457,7 +495,8 @@ impl Lights {
         let flux = flux / probability;
         let infinite = emitter.is_infinite();
         let delta = emitter.is_delta();
-        let density = EmissionDensity { direct: direct * probability, onward, cos, infinite, delta };
+        let start = direct * probability;
+        let density = EmissionDensity { direct: start, start, onward, cos, infinite, delta };
         (flux.is_finite() && flux.max_element() > 0.0).then_some(EmissionSample {
             origin,
             direction: d,

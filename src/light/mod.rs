@@ -6,6 +6,8 @@ mod emitter;
 mod environment;
 pub mod guide;
 mod lights;
+mod receiver;
+mod tree;
 
 pub use aim::Targets;
 pub use cdf::Cdf;
@@ -13,3 +15,4 @@ pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;
 pub use lights::{DirectSample, EmissionDensity, EmissionSample, Lights};
+pub use receiver::Receiver;

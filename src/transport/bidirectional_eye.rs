@@ -8,7 +8,7 @@ use super::photon_merge::{MergePhoton, merge_photons};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
-use crate::light::EmissionDensity;
+use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::photon::PhotonMap;
@@ -31,7 +31,7 @@ struct EyeWalk<'a, R> {
     mis: MisState,
     trail: Trail,
     /// The last vertex.
-    last: Vec3,
+    last: Receiver,
     /// Its depth.
     depth: u32,
     measure: EyeMeasure,
@@ -103,7 +103,9 @@ impl<R: Record> EyeWalk<'_, R> {
         let scene = self.shared.eye.scene;
         let draws = vertex.draws();
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, vertex.p(), choice, point) else {
+        let Some(light) =
+            scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
+        else {
             return;
         };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
@@ -187,7 +189,9 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos).fly(vertex.flight);
-        if let Some((radiance, density)) = eye.scene.lights.emitted(&eye.scene.materials, vertex.surface, vertex.wo) {
+        if let Some((radiance, density)) =
+            eye.scene.lights.emitted(&eye.scene.materials, &self.last, vertex.surface, vertex.wo)
+        {
             self.run_into(vertex.throughput * radiance, vertex.depth, vertex.surface.p, scattered, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
@@ -215,7 +219,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
             }
         }
         self.trail.leave(smooth);
-        self.last = vertex.surface.p;
+        self.last = vertex.receiver();
         // Without connections and merging only what mirrors and clear glass show is left to find.
         Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
@@ -236,7 +240,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
             self.connect_all(vertex);
         }
         self.trail.leave_medium();
-        self.last = vertex.met.p;
+        self.last = vertex.receiver();
         // As on surfaces: only mirrors and clear glass show what light tracing does not find.
         if strategies.connect || strategies.merge { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }
@@ -254,9 +258,9 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.depth += 1;
         self.mis = self.mis.fly(flight);
         let lights = &self.shared.eye.scene.lights;
-        let onward = lights.entry_pdf_a(self.last, direction);
-        lights.escape(direction, |radiance, direct| {
-            let density = EmissionDensity { direct, onward, cos: 1.0, infinite: true, delta: false };
+        let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
+        lights.escape(&last, direction, |radiance, direct, start| {
+            let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
             self.run_into(throughput * radiance, 0, direction, scattered, &density);
         });
     }
@@ -279,7 +283,7 @@ impl Bidirectional<'_> {
             meets,
             mis: MisState::camera(self.light_paths, pdf_w),
             trail: Trail::START,
-            last: start.origin,
+            last: Receiver::surface(start.origin),
             depth: 0,
             measure: EyeMeasure::default(),
             record,

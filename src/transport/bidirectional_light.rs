@@ -8,6 +8,7 @@ use super::photon_merge::MergePhoton;
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::light::Receiver;
 use crate::math::{Rgb, is_lit};
 use crate::medium::Flight;
 use crate::random::Purpose;
@@ -66,6 +67,8 @@ pub struct Left {
 struct LightWalk<'a, 's, R> {
     shared: &'a Bidirectional<'a>,
     mis: MisState,
+    /// Where it comes from.
+    light: u32,
     infinite: bool,
     caustic: bool,
     photons_only: bool,
@@ -76,9 +79,12 @@ struct LightWalk<'a, 's, R> {
 
 impl<R: Record> LightWalk<'_, '_, R> {
     #[inline]
-    fn arrive(&mut self, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
+    fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
+        if scattered.is_none() {
+            self.mis = self.mis.received(self.shared.eye.scene.lights.chosen_for(at, self.light));
+        }
         self.mis = self.mis.arrive(distance2, cos).fly(flight);
     }
 
@@ -128,7 +134,13 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         if let Some(scattered) = scattered {
             self.caustic &= scattered.lobe != LobeSet::BROAD;
         }
-        self.arrive(vertex.distance, vertex.wo.dot(vertex.surface.ng).abs(), vertex.flight, scattered);
+        self.arrive(
+            &vertex.receiver(),
+            vertex.distance,
+            vertex.wo.dot(vertex.surface.ng).abs(),
+            vertex.flight,
+            scattered,
+        );
         let lobes = vertex.shading.bsdf.lobes();
         // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders of materials.
         if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
@@ -158,7 +170,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         let Bidirectional { eye, strategies, .. } = self.shared;
         // What has come through a medium is no caustic's any more.
         self.caustic = false;
-        self.arrive(vertex.met.distance, 1.0, vertex.flight, scattered);
+        self.arrive(&vertex.receiver(), vertex.met.distance, 1.0, vertex.flight, scattered);
         if !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
                 self.vertices.push(LightVertex {
@@ -225,6 +237,7 @@ impl<'s> Bidirectional<'s> {
         let mut visitor = LightWalk {
             shared: self,
             mis: MisState::light(&emitted.density),
+            light: emitted.light,
             infinite: emitted.density.infinite,
             caustic: true,
             photons_only,

@@ -49,7 +49,8 @@ pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) 
     let draws = vertex.draws();
     let choice = draws.one(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
-    let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, vertex.p(), choice, point) else {
+    let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
+    else {
         return Rgb::ZERO;
     };
     let mut scattered = Rgb::ZERO;
@@ -80,11 +81,14 @@ fn second_strategy(scene: &Scene, vertex: &impl Site, set: LobeSet) -> Rgb {
     let mut light = Rgb::ZERO;
     match next_surface(scene, origin, sample.wi, interior, draws.token(Purpose::SecondAlpha), &Known::Unknown) {
         End::Surface(arrival) => {
-            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, vertex.p(), &arrival.surface) {
+            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), &arrival.surface) {
                 light = radiance * arrival.transmittance * weight(pdf);
             }
         }
-        End::Escaped(left) => scene.lights.escape(sample.wi, |radiance, pdf| light += radiance * left * weight(pdf)),
+        End::Escaped(left) => {
+            let add = |radiance, pdf, _| light += radiance * left * weight(pdf);
+            scene.lights.escape(&vertex.receiver(), sample.wi, add);
+        }
         End::Medium(_) | End::Lost => {}
     }
     sample.weight * light

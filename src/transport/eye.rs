@@ -18,10 +18,12 @@ use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::segment::Known;
 use super::site::MediumVertex;
+use super::site::Site;
 use super::volume::Volume;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
+use crate::light::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::Flight;
 use crate::photon::{Kernel, Near, Photon, PhotonMap, VolumePhoton};
@@ -218,7 +220,7 @@ struct Gather<'a, B, K, const PATHS: bool> {
     /// The path has scattered broadly.
     broadly: bool,
     /// The last vertex.
-    last: Vec3,
+    last: Receiver,
 }
 
 impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
@@ -345,13 +347,13 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let (surface, shading) = (vertex.surface, vertex.shading);
         if scattered.is_none() {
             self.measure.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
-            self.last = vertex.from;
+            self.last = Receiver::surface(vertex.from);
         }
         self.length += vertex.distance;
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, self.last, surface) {
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, surface) {
             self.run_into(radiance, vertex.throughput, pdf, scattered);
         }
-        self.last = surface.p;
+        self.last = vertex.receiver();
         let lobes = shading.bsdf.lobes();
         let smooth = lobes & LobeSet::SMOOTH;
         // Lamps and other surfaces that scatter nothing have features, too.
@@ -423,7 +425,8 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     #[inline]
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
         let scene = self.scene;
-        scene.lights.escape(direction, |radiance, pdf| self.run_into(radiance, throughput, pdf, scattered));
+        let last = self.last;
+        scene.lights.escape(&last, direction, |radiance, pdf, _| self.run_into(radiance, throughput, pdf, scattered));
     }
 }
 
@@ -551,7 +554,7 @@ impl Eye<'_> {
             length: 0.0,
             stage: Stage::Clear,
             broadly: false,
-            last: Vec3::ZERO,
+            last: Receiver::surface(Vec3::ZERO),
         };
         walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
         let measure = gather.measure;

@@ -79,10 +79,11 @@ pub struct MisState {
 }
 
 impl MisState {
-    /// A light path's start \[(31), (32), (48) to (52)\]. A delta light cannot be run into.
+    /// A light path's start \[(31), (32), (48) to (52)\]; next-event estimation is as probable as emission until [`MisState::received`] says otherwise.
+    /// A delta light cannot be run into.
     #[inline]
     pub fn light(start: &EmissionDensity) -> MisState {
-        let plain = if start.delta { 0.0 } else { start.cos / (start.direct * start.onward) };
+        let plain = if start.delta { 0.0 } else { start.cos / (start.start * start.onward) };
         MisState { d_vcm: 1.0 / start.onward, plain, merged: 0.0, last: 0.0 }
     }
 
@@ -107,6 +108,13 @@ impl MisState {
             merged: self.merged * inverse,
             last: self.last * inverse,
         }
+    }
+
+    /// At the first vertex: `chosen` is the probability that next-event estimation from there chooses the light over that of emission.
+    #[must_use]
+    #[inline]
+    pub fn received(self, chosen: f32) -> MisState {
+        MisState { d_vcm: self.d_vcm * chosen, ..self }
     }
 
     /// Flight through media to where the path has arrived: densities per length, or probabilities, that all it takes besides direction has in
@@ -162,14 +170,14 @@ fn and_merge(side: Ratios, merges: bool) -> Ratios {
 /// An eye path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is never merged.
 #[inline]
 pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
-    let emission = light.direct * light.onward;
+    let emission = light.start * light.onward;
     Ratios { plain: 1.0 + light.direct * eye.d_vcm + emission * eye.plain, merged: emission * eye.merged }
 }
 
 /// Next-event estimation \[(44), (45)\].
 ///
 /// `pdf_w`, `reverse_pdf_w`: densities at the eye vertex of the direction to the light and back; `light_pdf_w`: that of next-event
-/// estimation (the choice of the light included); `arrival_pdf_a`: of emission from the light's point per area of the eye vertex. A delta light
+/// estimation (the choice of the light included); `arrival_pdf_a`: of emission from the light's point per area of the eye vertex, the choice of the light over that of next-event estimation included. A delta light
 /// cannot be run into. Direct light is never merged.
 #[inline]
 pub fn next_event(

@@ -9,6 +9,7 @@ use super::eye::{Eye, EyeMeasure};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
+use crate::light::Receiver;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::random::{Purpose, Stream};
@@ -20,7 +21,7 @@ struct PathTracer<'a, R> {
     max_depth: u32,
     measure: EyeMeasure,
     trail: Trail,
-    last: Vec3,
+    last: Receiver,
     /// Depth of the last vertex.
     depth: u32,
     record: &'a mut R,
@@ -39,7 +40,9 @@ impl<R: Record> PathTracer<'_, R> {
     fn next_event(&self, vertex: &impl Site) -> (Rgb, f32) {
         let (scene, draws) = (self.scene, vertex.draws());
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let Some(light) = scene.lights.sample_direct(&scene.shapes, &scene.materials, vertex.p(), choice, point) else {
+        let Some(light) =
+            scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
+        else {
             return (Rgb::ZERO, 1.0);
         };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
@@ -81,13 +84,13 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         look(&mut self.trail, vertex, scattered, &mut self.measure);
         self.depth = vertex.depth;
-        let from = if scattered.is_none() { vertex.from } else { self.last };
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, from, vertex.surface) {
+        let from = if scattered.is_none() { Receiver::surface(vertex.from) } else { self.last };
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface) {
             let part = self.trail.hit(scattered.map(|s| s.lobe));
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { eye: self.depth }, part, vertex.throughput * radiance * weight, weight);
         }
-        self.last = vertex.surface.p;
+        self.last = vertex.receiver();
         self.lit(vertex);
         self.trail.leave(vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH));
         Next::Continue(LobeSet::ALL)
@@ -96,7 +99,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         look_in_medium(&mut self.trail, vertex, scattered, &mut self.measure);
         self.depth = vertex.depth;
-        self.last = vertex.met.p;
+        self.last = vertex.receiver();
         self.lit(vertex);
         self.trail.leave_medium();
         Next::Continue(LobeSet::ALL)
@@ -108,7 +111,8 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         }
         let part = self.trail.hit(scattered.map(|s| s.lobe));
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
-        scene.lights.escape(direction, |light, pdf| {
+        let last = self.last;
+        scene.lights.escape(&last, direction, |light, pdf, _| {
             let weight = Self::weight(scattered, pdf);
             self.add(technique, part, throughput * light * weight, weight);
         });
@@ -123,7 +127,7 @@ pub fn path_measure(
     record: &mut impl Record,
 ) -> EyeMeasure {
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
-    let (scene, max_depth, last) = (eye.scene, eye.max_depth, start.origin);
+    let (scene, max_depth, last) = (eye.scene, eye.max_depth, Receiver::surface(start.origin));
     let mut tracer = PathTracer { scene, max_depth, measure, trail, last, depth: 0, record };
     walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure

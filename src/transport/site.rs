@@ -4,6 +4,7 @@ use super::interior::Interior;
 use super::segment::{MediumArrival, Way, way};
 use super::walk::Vertex;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::light::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
 use crate::random::Draws;
@@ -85,6 +86,11 @@ pub trait Site {
     fn interiors(&self) -> [Interior; 2];
     /// Whether `w` is on the other side than `wo`.
     fn crosses(&self, w: Vec3) -> bool;
+    /// As what receives light straight from lights.
+    #[inline]
+    fn receiver(&self) -> Receiver {
+        Receiver { p: self.p(), in_medium: Self::IN_MEDIUM }
+    }
     /// See [`Vertex::survival`].
     fn survival(&self, set: LobeSet) -> f32;
     /// See [`MediumVertex::next_event`].

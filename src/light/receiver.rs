@@ -1,0 +1,140 @@
+//! Where light is received, and the choice of a light for it.
+
+use super::cdf::Cdf;
+use super::emitter::{Emitter, Sky};
+use super::tree::LightTree;
+use crate::math::{Vec3, luminance};
+use std::f32::consts::PI;
+
+/// Share of the choices that go by power wherever the light is received: what a near lamp behind a wall takes from the others has this bound.
+const BY_POWER: f32 = 0.2;
+/// Least share of the other choices for lights at infinity, and for all others, where there are both.
+const LEAST_SHARE: f32 = 0.125;
+
+/// A point that receives light.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Where.
+    pub p: Vec3,
+    /// It is in a medium. Lights are chosen for it by power alone: points on the way through a medium are drawn by the lamp, which has
+    /// to be chosen before them.
+    pub in_medium: bool,
+}
+
+impl Receiver {
+    /// A point of a surface.
+    #[inline]
+    pub fn surface(p: Vec3) -> Receiver {
+        Receiver { p, in_medium: false }
+    }
+}
+
+/// Which light is asked for light.
+pub(super) struct Choice {
+    power: Cdf,
+    /// Where there is more to choose from than the halves of one rectangle.
+    near: Option<Near>,
+}
+
+/// By what arrives.
+struct Near {
+    tree: LightTree,
+    /// Lights at infinity, and the irradiance they may bring.
+    infinite: Option<(Cdf, f32)>,
+}
+
+impl Choice {
+    /// `None` if no light gives any light; `powers` are those of the emitters, with a floor.
+    pub fn new(emitters: &[Emitter], sky: &Sky, powers: impl Iterator<Item = f64>) -> Option<Choice> {
+        let power = Cdf::new(powers)?;
+        let near = several(emitters).then(|| LightTree::new(emitters)).flatten().map(|tree| {
+            let irradiance = |emitter: &Emitter| match emitter {
+                Emitter::Sun { irradiance, .. } => luminance(*irradiance),
+                Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean()) * PI),
+                _ => 0.0,
+            };
+            let with_total = |cdf: Cdf| {
+                let total = cdf.total() as f32;
+                (cdf, total)
+            };
+            let infinite = Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter))));
+            Near { tree, infinite: infinite.map(with_total) }
+        });
+        Some(Choice { power, near })
+    }
+
+    /// By power alone, as emission is chosen.
+    #[inline]
+    pub fn power(&self) -> &Cdf {
+        &self.power
+    }
+
+    /// A light and its probability.
+    #[inline]
+    pub fn sample(&self, at: &Receiver, u: f32) -> Option<(usize, f32)> {
+        let Some(near) = self.near.as_ref().filter(|_| !at.in_medium) else {
+            let (index, pdf, _) = self.power.sample(u);
+            return Some((index, pdf));
+        };
+        if u < BY_POWER {
+            let (index, pdf, _) = self.power.sample(u / BY_POWER);
+            return Some((index, BY_POWER * pdf + (1.0 - BY_POWER) * near.pdf(at.p, index)));
+        }
+        let u = ((u - BY_POWER) / (1.0 - BY_POWER)).min(1.0f32.next_down());
+        let (index, pdf) = near.sample(at.p, u)?;
+        Some((index, BY_POWER * self.power.pdf(index) + (1.0 - BY_POWER) * pdf))
+    }
+
+    /// Probability of choosing a light.
+    #[inline]
+    pub fn pdf(&self, at: &Receiver, index: usize) -> f32 {
+        let power = self.power.pdf(index);
+        match &self.near {
+            Some(near) if !at.in_medium => BY_POWER * power + (1.0 - BY_POWER) * near.pdf(at.p, index),
+            _ => power,
+        }
+    }
+}
+
+/// Whether it matters which emitter is chosen.
+fn several(emitters: &[Emitter]) -> bool {
+    match emitters {
+        [Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }] => a != b,
+        _ => emitters.len() > 1,
+    }
+}
+
+impl Near {
+    /// Share of the lights at infinity.
+    #[inline]
+    fn share(&self, p: Vec3) -> f32 {
+        let Some((_, irradiance)) = &self.infinite else { return 0.0 };
+        let near = self.tree.importance(p);
+        if near > 0.0 { (irradiance / (irradiance + near)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) } else { 1.0 }
+    }
+
+    #[inline]
+    fn sample(&self, p: Vec3, u: f32) -> Option<(usize, f32)> {
+        let share = self.share(p);
+        match &self.infinite {
+            Some((infinite, _)) if u < share => {
+                let (index, pdf, _) = infinite.sample(u / share);
+                Some((index, share * pdf))
+            }
+            _ => {
+                let rest = ((u - share) / (1.0 - share)).min(1.0f32.next_down());
+                let (index, pdf) = self.tree.sample(p, rest)?;
+                Some((index, (1.0 - share) * pdf))
+            }
+        }
+    }
+
+    #[inline]
+    fn pdf(&self, p: Vec3, index: usize) -> f32 {
+        let share = self.share(p);
+        match &self.infinite {
+            Some((infinite, _)) if infinite.pdf(index) > 0.0 => share * infinite.pdf(index),
+            _ => (1.0 - share) * self.tree.pdf(p, index),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Light straight from many lamps, under a sky: what a point gets is known in closed form, whichever lamp is asked.
+
+#[path = "support/scenes.rs"]
+#[allow(dead_code)]
+mod scenes;
+#[path = "support/stats.rs"]
+#[allow(dead_code)]
+mod stats;
+
+use caustique::light::{DirectSample, Receiver};
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::random::{Domain, Purpose, Stream};
+use caustique::scene::Scene;
+use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
+use scenes::{add, build, matte, point_light, quad};
+use stats::{mean_and_error, sidak, t_critical};
+use std::f64::consts::PI;
+
+const SKY: f32 = 0.02;
+/// Reciprocal of the error rate of a whole test.
+const RATE: f64 = 1e-4;
+
+/// Lamps of 20 by 20 cm in a grid 2 m above a floor, facing it, and point lights in the gaps, with a dim sky.
+fn hall() -> (Description, Vec<[DVec3; 4]>, Vec<(DVec3, f64)>) {
+    let mut description = Description::default();
+    let floor = quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0);
+    add(&mut description, "floor", floor, matte(0.5, 0.0));
+    let (mut panels, mut points) = (Vec::new(), Vec::new());
+    for i in 0..6u8 {
+        for j in 0..6u8 {
+            let (x, z) = (f64::from(i) * 3.0 - 7.5, f64::from(j) * 3.0 - 7.5);
+            let corner = DVec3::new(x, 2.0, z);
+            let panel = quad(corner.as_vec3(), Vec3::X * 0.2, Vec3::Z * 0.2);
+            add(&mut description, "panel", panel, matte(0.0, 1.0 + f32::from(i)));
+            let [right, up] = [DVec3::X * 0.2, DVec3::Z * 0.2];
+            panels.push([corner, corner + right, corner + right + up, corner + up]);
+            let p = DVec3::new(x + 1.3, 1.0 + 0.2 * f64::from(j), z + 1.7);
+            let intensity = 0.05 * f32::from(1 + j);
+            description.lights.push(point_light(p, intensity));
+            points.push((p, f64::from(intensity)));
+        }
+    }
+    let source = EnvironmentSource::Color(Rgb::splat(SKY));
+    description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+    (description, panels, points)
+}
+
+/// Irradiance at `p`, facing up, from a polygon of radiance 1 whose corners go round as seen from there \[Lambert 1760\].
+fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
+    let n = corners.len();
+    let edge = |k: usize| {
+        let (a, b) = ((corners[k] - p).normalize(), (corners[(k + 1) % n] - p).normalize());
+        a.dot(b).clamp(-1.0, 1.0).acos() * a.cross(b).normalize().y
+    };
+    0.5 * (0..n).map(edge).sum::<f64>().abs()
+}
+
+/// Irradiance at `p` on the floor, estimated `n` times; `share` says by which probability each is divided, over the true one.
+fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectSample) -> f64) -> Vec<f64> {
+    let one = |i: u64| {
+        let draws = Stream::new(11, 0, Domain::Test, i).vertex(1);
+        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let light = scene.lights.sample_direct(&scene.shapes, &scene.materials, receiver, choice, point);
+        light.map_or(0.0, |light| {
+            let cos = f64::from(light.wi.y.max(0.0));
+            f64::from(light.radiance.x) * cos / f64::from(light.pdf_w) * share(&light)
+        })
+    };
+    (0..n).map(one).collect()
+}
+
+#[test]
+fn irradiance_is_that_of_all_lamps_and_the_nearest_are_asked_most() {
+    let (description, panels, points) = hall();
+    let scene = build(description);
+    let critical = t_critical(sidak(RATE, 8), 1, 50_000.0);
+    let mut least: f64 = f64::INFINITY;
+    for k in 0..8u8 {
+        let p = DVec3::new(1.9 * f64::from(k) - 7.0, 0.0, 6.5 - 1.7 * f64::from(k));
+        let lamps: f64 =
+            (0..6).flat_map(|i| [f64::from(i) + 1.0; 6]).zip(&panels).map(|(l, c)| l * polygon(p, c)).sum();
+        let bulbs: f64 = points.iter().map(|(at, i)| i * (*at - p).y / (*at - p).length().powi(3)).sum();
+        // The lamps hide nothing here: no shadow ray is asked.
+        let expected = lamps + bulbs + PI * f64::from(SKY);
+        let receiver = Receiver::surface(p.as_vec3());
+        let values = estimates(&scene, &receiver, 50_000, |_| 1.0);
+        let (mean, error) = mean_and_error(&values);
+        assert!((mean - expected).abs() < critical * error, "at {p}: {mean} +- {error}, expected {expected}");
+        // By power alone, as points in media are lit.
+        let by_power = Receiver { in_medium: true, ..receiver };
+        let powers = estimates(&scene, &by_power, 50_000, |_| 1.0);
+        let (mean, power_error) = mean_and_error(&powers);
+        assert!(
+            (mean - expected).abs() < critical * power_error,
+            "at {p}: {mean} +- {power_error}, expected {expected}"
+        );
+        least = least.min((power_error / error).powi(2));
+        // Planted: the sky divided by the probability of choosing it for emission.
+        let sky = (0..).zip(scene.lights.emitters()).find(|(_, e)| e.is_infinite()).map_or(0, |(i, _)| i);
+        let chosen = f64::from(scene.lights.chosen_for(&receiver, sky));
+        let wrong = |light: &DirectSample| if light.target.is_none() { chosen } else { 1.0 };
+        let values = estimates(&scene, &receiver, 50_000, wrong);
+        let (mean, error) = mean_and_error(&values);
+        assert!((mean - expected).abs() > critical * error, "at {p}: a wrong probability goes unnoticed");
+    }
+    println!("variance by power over that by what arrives: {least:.1} at least");
+    assert!(least > 3.0, "the nearest lamps are not asked more often: {least}");
+}
