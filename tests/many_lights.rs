@@ -82,7 +82,7 @@ fn irradiance_is_that_of_all_lamps_and_the_nearest_are_asked_most() {
         let bulbs: f64 = points.iter().map(|(at, i)| i * (*at - p).y / (*at - p).length().powi(3)).sum();
         // The lamps hide nothing here: no shadow ray is asked.
         let expected = lamps + bulbs + PI * f64::from(SKY);
-        let receiver = Receiver::surface(p.as_vec3());
+        let receiver = Receiver { n: Vec3::Y, ..Receiver::anywhere(p.as_vec3()) };
         let values = estimates(&scene, &receiver, 50_000, |_| 1.0);
         let (mean, error) = mean_and_error(&values);
         assert!((mean - expected).abs() < critical * error, "at {p}: {mean} +- {error}, expected {expected}");

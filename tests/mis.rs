@@ -21,7 +21,7 @@ use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
     Bidirectional, Eye, Indirect, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next, PathStart,
-    Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, walk,
+    Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -61,7 +61,11 @@ struct Met<'s> {
 
 impl Met<'_> {
     fn receiver(&self) -> Receiver {
-        Receiver { p: self.p, in_medium: self.scatters.in_medium() }
+        let n = match &self.scatters {
+            Scatters::Surface(shading) => lit_side(shading, self.ng, self.wo),
+            Scatters::Medium(_) => Vec3::ZERO,
+        };
+        Receiver { p: self.p, n, in_medium: self.scatters.in_medium() }
     }
 }
 
@@ -74,7 +78,7 @@ struct Notes<'a> {
 
 impl<'a> Visitor<'a> for Notes<'a> {
     fn surface(&mut self, v: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
-        let from = self.met.last().map_or(Receiver::surface(v.from), Met::receiver);
+        let from = self.met.last().map_or(Receiver::anywhere(v.from), Met::receiver);
         let emitted = self.scene.lights.emitted(&self.scene.materials, &from, v.surface, v.wo).map(|e| e.1);
         self.met.push(Met {
             p: v.surface.p,

@@ -129,6 +129,12 @@ impl<'a> Bsdf<'a> {
         }
     }
 
+    /// Light from one side may leave on the other, not by a delta lobe.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        matches!(self, Bsdf::Layered(layered) if layered.glass > 0.0)
+    }
+
     /// Classes of lobes that are there.
     #[inline]
     pub fn lobes(&self) -> LobeSet {

@@ -135,10 +135,17 @@ fn kind(emitter: &Emitter) -> &'static str {
     }
 }
 
+/// Names of a kind that the text lists.
+const SHOWN: usize = 24;
+
 fn scene_text(path: &Path, object: &Value) -> String {
     let names = |key: &str| {
         let names: Vec<&str> = object[key].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-        if names.is_empty() { "none".to_string() } else { format!("{}: {}", names.len(), names.join(", ")) }
+        match names.len() {
+            0 => "none".to_string(),
+            n if n <= SHOWN => format!("{n}: {}", names.join(", ")),
+            n => format!("{n}: {} and {} more (all of them with --json)", names[..SHOWN].join(", "), n - SHOWN),
+        }
     };
     let mut text = format!("{}\n", path.display());
     text += &format!(

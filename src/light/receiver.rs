@@ -16,16 +16,18 @@ const LEAST_SHARE: f32 = 0.125;
 pub struct Receiver {
     /// Where.
     pub p: Vec3,
+    /// Unit normal on the side that light has to come from; zero where it may come from anywhere.
+    pub n: Vec3,
     /// It is in a medium. Lights are chosen for it by power alone: points on the way through a medium are drawn by the lamp, which has
     /// to be chosen before them.
     pub in_medium: bool,
 }
 
 impl Receiver {
-    /// A point of a surface.
+    /// A point lit from anywhere, outside of media.
     #[inline]
-    pub fn surface(p: Vec3) -> Receiver {
-        Receiver { p, in_medium: false }
+    pub fn anywhere(p: Vec3) -> Receiver {
+        Receiver { p, n: Vec3::ZERO, in_medium: false }
     }
 }
 
@@ -78,10 +80,10 @@ impl Choice {
         };
         if u < BY_POWER {
             let (index, pdf, _) = self.power.sample(u / BY_POWER);
-            return Some((index, BY_POWER * pdf + (1.0 - BY_POWER) * near.pdf(at.p, index)));
+            return Some((index, BY_POWER * pdf + (1.0 - BY_POWER) * near.pdf(at, index)));
         }
         let u = ((u - BY_POWER) / (1.0 - BY_POWER)).min(1.0f32.next_down());
-        let (index, pdf) = near.sample(at.p, u)?;
+        let (index, pdf) = near.sample(at, u)?;
         Some((index, BY_POWER * self.power.pdf(index) + (1.0 - BY_POWER) * pdf))
     }
 
@@ -90,7 +92,7 @@ impl Choice {
     pub fn pdf(&self, at: &Receiver, index: usize) -> f32 {
         let power = self.power.pdf(index);
         match &self.near {
-            Some(near) if !at.in_medium => BY_POWER * power + (1.0 - BY_POWER) * near.pdf(at.p, index),
+            Some(near) if !at.in_medium => BY_POWER * power + (1.0 - BY_POWER) * near.pdf(at, index),
             _ => power,
         }
     }
@@ -107,15 +109,15 @@ fn several(emitters: &[Emitter]) -> bool {
 impl Near {
     /// Share of the lights at infinity.
     #[inline]
-    fn share(&self, p: Vec3) -> f32 {
+    fn share(&self, at: &Receiver) -> f32 {
         let Some((_, irradiance)) = &self.infinite else { return 0.0 };
-        let near = self.tree.importance(p);
+        let near = self.tree.importance(at);
         if near > 0.0 { (irradiance / (irradiance + near)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) } else { 1.0 }
     }
 
     #[inline]
-    fn sample(&self, p: Vec3, u: f32) -> Option<(usize, f32)> {
-        let share = self.share(p);
+    fn sample(&self, at: &Receiver, u: f32) -> Option<(usize, f32)> {
+        let share = self.share(at);
         match &self.infinite {
             Some((infinite, _)) if u < share => {
                 let (index, pdf, _) = infinite.sample(u / share);
@@ -123,18 +125,18 @@ impl Near {
             }
             _ => {
                 let rest = ((u - share) / (1.0 - share)).min(1.0f32.next_down());
-                let (index, pdf) = self.tree.sample(p, rest)?;
+                let (index, pdf) = self.tree.sample(at, rest)?;
                 Some((index, (1.0 - share) * pdf))
             }
         }
     }
 
     #[inline]
-    fn pdf(&self, p: Vec3, index: usize) -> f32 {
-        let share = self.share(p);
+    fn pdf(&self, at: &Receiver, index: usize) -> f32 {
+        let share = self.share(at);
         match &self.infinite {
             Some((infinite, _)) if infinite.pdf(index) > 0.0 => share * infinite.pdf(index),
-            _ => (1.0 - share) * self.tree.pdf(p, index),
+            _ => (1.0 - share) * self.tree.pdf(at, index),
         }
     }
 }

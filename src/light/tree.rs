@@ -6,6 +6,7 @@
 //! certain to send nothing is never chosen.
 
 use super::emitter::Emitter;
+use super::receiver::Receiver;
 use crate::math::{Vec3, luminance};
 use std::f32::consts::PI;
 
@@ -15,6 +16,9 @@ const BUCKETS: usize = 12;
 const BALANCED_FROM: u32 = 40;
 /// Nearer lights (m2) count as if they were that far, so that sums stay finite.
 const LEAST_DISTANCE2: f32 = 1e-12;
+/// What light along a surface counts for over light from above, since it may be reflected well; and from behind, where a normal is no longer sure.
+const GRAZING: f32 = 0.1;
+const BEHIND: f32 = 0.01;
 /// What is not in the tree.
 const NONE: u32 = u32::MAX;
 
@@ -144,27 +148,36 @@ impl Node {
         }
     }
 
-    /// Irradiance that the cluster may bring to a surface at `p` that faces it (W/m2, luminance); 0 only where it is certain to bring none.
+    /// Irradiance that the cluster may bring to a receiver (W/m2, luminance), about; 0 only where it is certain to bring none.
     #[inline]
-    fn importance(&self, p: Vec3) -> f32 {
-        let to = p - self.center;
+    fn importance(&self, at: &Receiver) -> f32 {
+        let to = at.p - self.center;
         let distance2 = to.length_squared();
         let inverse = 1.0 / distance2.max(self.radius2).max(LEAST_DISTANCE2);
         if distance2 <= self.radius2 {
             return self.intensity * inverse;
         }
-        let cos = self.axis.dot(to) * inverse.sqrt();
+        let inverse_distance = inverse.sqrt();
+        let cos = self.axis.dot(to) * inverse_distance;
         let cos = if self.two_sided { cos.abs() } else { cos };
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         // The angle beyond the cone of the axes, then beyond that of the sphere as well.
         let (cos, sin) = less(cos, sin, self.cos_spread, self.sin_spread);
         let sin2_sphere = self.radius2 * inverse;
-        let (cos, _) = less(cos, sin, (1.0 - sin2_sphere).max(0.0).sqrt(), sin2_sphere.sqrt());
+        let (cos_sphere, sin_sphere) = ((1.0 - sin2_sphere).max(0.0).sqrt(), sin2_sphere.sqrt());
+        let (cos, _) = less(cos, sin, cos_sphere, sin_sphere);
         if cos <= self.cos_reach {
             return 0.0;
         }
         // A spot may reach further than a right angle from its axis.
-        self.intensity * inverse * cos.max(0.05)
+        let intensity = self.intensity * inverse * cos.max(0.05);
+        if at.n == Vec3::ZERO {
+            return intensity;
+        }
+        let cos = -at.n.dot(to) * inverse_distance;
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let (cos, _) = less(cos, sin, cos_sphere, sin_sphere);
+        intensity * if cos > 0.0 { GRAZING + (1.0 - GRAZING) * cos } else { BEHIND }
     }
 }
 
@@ -210,19 +223,19 @@ impl LightTree {
         Some(tree)
     }
 
-    /// Irradiance that all lights may bring to a surface at `p` (W/m2, luminance).
+    /// Irradiance that all lights may bring to a receiver (W/m2, luminance).
     #[inline]
-    pub fn importance(&self, p: Vec3) -> f32 {
-        self.nodes[0].importance(p)
+    pub fn importance(&self, at: &Receiver) -> f32 {
+        self.nodes[0].importance(at)
     }
 
     /// An emitter and its probability; `None` where none shines.
     #[inline]
-    pub fn sample(&self, p: Vec3, mut u: f32) -> Option<(usize, f32)> {
+    pub fn sample(&self, at: &Receiver, mut u: f32) -> Option<(usize, f32)> {
         let (mut node, mut pdf) = (&self.nodes[0], 1.0);
         while node.children != 0 {
             let [a, b] = self.children(node.children);
-            let (first, second) = (a.importance(p), b.importance(p));
+            let (first, second) = (a.importance(at), b.importance(at));
             let sum = first + second;
             if !(sum > 0.0) {
                 return None;
@@ -244,7 +257,7 @@ impl LightTree {
 
     /// Probability of choosing an emitter.
     #[inline]
-    pub fn pdf(&self, p: Vec3, emitter: usize) -> f32 {
+    pub fn pdf(&self, at: &Receiver, emitter: usize) -> f32 {
         let mut node = self.leaves[emitter];
         if node == NONE {
             return 0.0;
@@ -253,7 +266,7 @@ impl LightTree {
         while node != 0 {
             let parent = self.nodes[node as usize].parent;
             let first = self.nodes[parent as usize].children;
-            let importance = self.children(first).map(|child| child.importance(p));
+            let importance = self.children(first).map(|child| child.importance(at));
             let own = importance[(node - first) as usize];
             if !(own > 0.0) {
                 return 0.0;
@@ -377,22 +390,24 @@ mod tests {
         for i in 0..50 {
             let draws = Stream::new(5, 0, Domain::Test, i).vertex(0);
             let p = draws.two(Purpose::Pixel).extend(draws.one(Purpose::Lobe)) * 12.0 - 1.0;
-            let sum: f32 = (0..emitters.len()).map(|k| tree.pdf(p, k)).sum();
+            let n = warp::sphere_uniform(draws.two(Purpose::Lens));
+            let at = Receiver { n: if i % 3 == 0 { Vec3::ZERO } else { n }, ..Receiver::anywhere(p) };
+            let sum: f32 = (0..emitters.len()).map(|k| tree.pdf(&at, k)).sum();
             let n = 4096;
             let (mut count, mut none) = (vec![0u32; emitters.len()], 0);
             for k in 0..n {
                 // A cluster may promise light that neither half has.
-                let Some((index, pdf)) = tree.sample(p, (k as f32 + 0.5) / n as f32) else {
+                let Some((index, pdf)) = tree.sample(&at, (k as f32 + 0.5) / n as f32) else {
                     none += 1;
                     continue;
                 };
-                assert!((pdf - tree.pdf(p, index)).abs() <= 1e-4 * pdf, "{pdf} {}", tree.pdf(p, index));
+                assert!((pdf - tree.pdf(&at, index)).abs() <= 1e-4 * pdf, "{pdf} {}", tree.pdf(&at, index));
                 count[index] += 1;
             }
             assert!((sum + none as f32 / n as f32 - 1.0).abs() < 2e-3, "{sum} and {none} at {p}");
             for (index, &count) in count.iter().enumerate() {
                 // Numbers in equal steps: each interval of choice misses less than one at either end.
-                let expected = tree.pdf(p, index) * n as f32;
+                let expected = tree.pdf(&at, index) * n as f32;
                 assert!((count as f32 - expected).abs() <= 2.0, "{count} {expected}");
             }
         }
@@ -407,8 +422,9 @@ mod tests {
         for i in 0..500 {
             let draws = Stream::new(6, 0, Domain::Test, i).vertex(0);
             let p = draws.two(Purpose::Pixel).extend(draws.one(Purpose::Lobe)) * 14.0 - 2.0;
+            let at = Receiver::anywhere(p);
             for (index, emitter) in emitters.iter().enumerate() {
-                let pdf = tree.pdf(p, index);
+                let pdf = tree.pdf(&at, index);
                 if shines(emitter, p) {
                     shining += 1;
                     assert!(pdf > 0.0, "{emitter:?} from {p}");
@@ -420,7 +436,7 @@ mod tests {
         assert!(shining > 30_000 && never > 3_000, "{shining} {never}");
         let lamp = |x: f32| Emitter::Point { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::ONE };
         let tree = LightTree::new(&[lamp(0.0), lamp(10.0)]).unwrap();
-        assert!((tree.pdf(Vec3::new(1.0, 0.0, 0.0), 0) - 81.0 / 82.0).abs() < 1e-5);
+        assert!((tree.pdf(&Receiver::anywhere(Vec3::X), 0) - 81.0 / 82.0).abs() < 1e-5);
     }
 
     #[test]
@@ -428,7 +444,7 @@ mod tests {
         let lamp = Emitter::Point { p: Vec3::ONE, intensity: Rgb::ONE };
         let tree = LightTree::new(&vec![lamp; 1000]).unwrap();
         for p in [Vec3::ONE, Vec3::ZERO] {
-            assert!((tree.pdf(p, 17) - 1e-3).abs() < 1e-6);
+            assert!((tree.pdf(&Receiver::anywhere(p), 17) - 1e-3).abs() < 1e-6);
         }
         assert!(LightTree::new(&[Emitter::Environment]).is_none());
     }

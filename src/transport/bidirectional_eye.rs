@@ -283,7 +283,7 @@ impl Bidirectional<'_> {
             meets,
             mis: MisState::camera(self.light_paths, pdf_w),
             trail: Trail::START,
-            last: Receiver::surface(start.origin),
+            last: Receiver::anywhere(start.origin),
             depth: 0,
             measure: EyeMeasure::default(),
             record,

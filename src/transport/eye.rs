@@ -347,7 +347,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let (surface, shading) = (vertex.surface, vertex.shading);
         if scattered.is_none() {
             self.measure.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
-            self.last = Receiver::surface(vertex.from);
+            self.last = Receiver::anywhere(vertex.from);
         }
         self.length += vertex.distance;
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, surface) {
@@ -554,7 +554,7 @@ impl Eye<'_> {
             length: 0.0,
             stage: Stage::Clear,
             broadly: false,
-            last: Receiver::surface(Vec3::ZERO),
+            last: Receiver::anywhere(Vec3::ZERO),
         };
         walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
         let measure = gather.measure;

@@ -32,6 +32,6 @@ pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;
 pub use probe::{GatherPoint, Probe};
 pub use segment::{Arrival, End, Known, MediumArrival, Way, next_surface, transmittance, way};
-pub use site::{MediumVertex, Site};
+pub use site::{MediumVertex, Site, lit_side};
 pub use volume::Volume;
 pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

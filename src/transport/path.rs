@@ -84,7 +84,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         look(&mut self.trail, vertex, scattered, &mut self.measure);
         self.depth = vertex.depth;
-        let from = if scattered.is_none() { Receiver::surface(vertex.from) } else { self.last };
+        let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface) {
             let part = self.trail.hit(scattered.map(|s| s.lobe));
             let weight = Self::weight(scattered, pdf);
@@ -127,7 +127,7 @@ pub fn path_measure(
     record: &mut impl Record,
 ) -> EyeMeasure {
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
-    let (scene, max_depth, last) = (eye.scene, eye.max_depth, Receiver::surface(start.origin));
+    let (scene, max_depth, last) = (eye.scene, eye.max_depth, Receiver::anywhere(start.origin));
     let mut tracer = PathTracer { scene, max_depth, measure, trail, last, depth: 0, record };
     walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure

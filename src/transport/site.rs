@@ -3,7 +3,7 @@
 use super::interior::Interior;
 use super::segment::{MediumArrival, Way, way};
 use super::walk::Vertex;
-use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
@@ -87,10 +87,7 @@ pub trait Site {
     /// Whether `w` is on the other side than `wo`.
     fn crosses(&self, w: Vec3) -> bool;
     /// As what receives light straight from lights.
-    #[inline]
-    fn receiver(&self) -> Receiver {
-        Receiver { p: self.p(), in_medium: Self::IN_MEDIUM }
-    }
+    fn receiver(&self) -> Receiver;
     /// See [`Vertex::survival`].
     fn survival(&self, set: LobeSet) -> f32;
     /// See [`MediumVertex::next_event`].
@@ -117,8 +114,26 @@ pub trait Site {
     }
 }
 
+/// The normal on the side that a surface seen from `wo` is lit from; zero if it is from both, or if the surface may send most of what it gets along itself
+/// to the eye.
+#[inline]
+pub fn lit_side(shading: &Shading<'_>, ng: Vec3, wo: Vec3) -> Vec3 {
+    if shading.bsdf.transmits() || shading.bsdf.lobes().has(LobeSet::SHARP) {
+        Vec3::ZERO
+    } else if ng.dot(wo) < 0.0 {
+        -ng
+    } else {
+        ng
+    }
+}
+
 impl Site for Vertex<'_, '_> {
     const IN_MEDIUM: bool = false;
+
+    #[inline]
+    fn receiver(&self) -> Receiver {
+        Receiver { n: lit_side(self.shading, self.surface.ng, self.wo), ..Receiver::anywhere(self.surface.p) }
+    }
 
     #[inline]
     fn p(&self) -> Vec3 {
@@ -195,6 +210,11 @@ pub(super) fn phase_sample(phase: &HenyeyGreenstein, wo: Vec3, u: Vec2) -> BsdfS
 
 impl Site for MediumVertex {
     const IN_MEDIUM: bool = true;
+
+    #[inline]
+    fn receiver(&self) -> Receiver {
+        Receiver { p: self.met.p, n: Vec3::ZERO, in_medium: true }
+    }
 
     #[inline]
     fn p(&self) -> Vec3 {

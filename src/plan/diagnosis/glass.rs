@@ -137,7 +137,7 @@ fn towards_light(scene: &Scene, p: Vec3, k: u32) -> Option<(Vec3, f32)> {
     const STEPS: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
     let choice = (k as f32 + 0.5) / SAMPLES as f32;
     let u = (STEPS * k as f32).fract();
-    let light = scene.lights.sample_direct(&scene.shapes, &scene.materials, &Receiver::surface(p), choice, u)?;
+    let light = scene.lights.sample_direct(&scene.shapes, &scene.materials, &Receiver::anywhere(p), choice, u)?;
     // The end of the way is off the light's own surface.
     let distance = light.target.map_or(f32::INFINITY, |target| target.distance(p) * 0.9999);
     (light.radiance.max_element() > 0.0).then_some((light.wi, distance))
