@@ -4,7 +4,7 @@
 One level, no combiner, no other option. All runs of a scene take turns in one `converge`; auto's pilot is in its time. They are compared at the largest
 number of core-seconds that all have spent. References are made by two halves of one long run, kept in out/auto, and their own squared error is taken off.
 
-CAUSTIQUE_BIN is the program. SCENES, SECONDS (10), REFERENCE_SECONDS (120) and WIDTH (320) shorten a trial; figures say what they were made with.
+CAUSTIQUE_BIN is the program. SCENES, RUN_SECONDS (10), REFERENCE_SECONDS (120) and WIDTH (320) shorten a trial; figures say what they were made with.
 """
 
 import json
@@ -18,7 +18,7 @@ from record import record
 ROOT = Path(__file__).resolve().parents[2]
 BIN = os.environ.get("CAUSTIQUE_BIN", ROOT / "target/release/caustique")
 OUT = ROOT / "out" / "auto"
-SECONDS = float(os.environ.get("SECONDS", "10"))
+SECONDS = float(os.environ.get("RUN_SECONDS", "10"))
 REFERENCE = float(os.environ.get("REFERENCE_SECONDS", "120"))
 WIDTH = int(os.environ.get("WIDTH", "320"))
 ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))

@@ -33,6 +33,8 @@ struct Bounds {
     /// Greatest angle between a light's axis and what it sends (rad).
     reach: f32,
     two_sided: bool,
+    /// All of them send as much as the cosine says, not the same up to `reach`.
+    cosine: bool,
     /// Sum of the lights' greatest radiant intensities (W/sr, luminance).
     intensity: f32,
 }
@@ -47,6 +49,7 @@ impl Bounds {
             spread,
             reach,
             two_sided: false,
+            cosine: false,
             intensity,
         };
         let bounds = match emitter {
@@ -54,7 +57,7 @@ impl Bounds {
                 let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
                 let intensity = luminance(*radiance) * area;
                 let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
-                Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, ..bounds }
+                Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
             }
             Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
             Emitter::Spot { p, frame, intensity, cos_outer, .. } => {
@@ -78,6 +81,7 @@ impl Bounds {
             spread,
             reach: self.reach.max(other.reach),
             two_sided: self.two_sided || other.two_sided,
+            cosine: self.cosine && other.cosine,
             intensity: self.intensity + other.intensity,
         }
     }
@@ -123,6 +127,7 @@ struct Node {
     sin_spread: f32,
     cos_reach: f32,
     two_sided: bool,
+    cosine: bool,
     /// The emitter of a leaf.
     emitter: u32,
     /// The first of two children side by side; 0 in a leaf.
@@ -142,6 +147,7 @@ impl Node {
             sin_spread: if bounds.spread >= PI { 0.0 } else { sin_spread },
             cos_reach: bounds.reach.cos(),
             two_sided: bounds.two_sided,
+            cosine: bounds.cosine,
             emitter: NONE,
             children: 0,
             parent,
@@ -169,8 +175,7 @@ impl Node {
         if cos <= self.cos_reach {
             return 0.0;
         }
-        // A spot may reach further than a right angle from its axis.
-        let intensity = self.intensity * inverse * cos.max(0.05);
+        let intensity = self.intensity * inverse * if self.cosine { cos } else { 1.0 };
         if at.n == Vec3::ZERO {
             return intensity;
         }

@@ -25,11 +25,18 @@ const CONNECTION: f64 = 0.35e-6;
 /// Photons merged at a vertex.
 const MERGE: f64 = 1.0e-6;
 
+/// What counting photons adds to gathering them.
+const COUNTING: f64 = 0.15e-6;
+/// Times as much where media scatter: vertices on the way, which are not counted, and paths that are longer.
+const MEDIA: f64 = 2.2;
+
 /// The counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cost {
     /// Mean numbers of vertices of paths.
     pub lengths: Lengths,
+    /// There are media that scatter.
+    pub scattering: bool,
 }
 
 impl Cost {
@@ -39,34 +46,37 @@ impl Cost {
         let paths = pixels * if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
         let photons = f64::from(settings.photons);
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
-        match (way.method, way.indirect) {
+        let gather = GATHER + if way.method == Method::Cppm { COUNTING } else { 0.0 };
+        let seconds = match (way.method, way.indirect) {
             (Method::Path, _) => pixels * (EYE_PATH + eye * EYE_VERTEX),
             (method, Indirect::Photons) if method.gathers() => {
-                paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + GATHER)) + photons * (start + light * LIGHT_VERTEX)
+                paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + gather)) + photons * (start + light * LIGHT_VERTEX)
             }
             (method, Indirect::Paths) if method.gathers() => {
-                paths * (EYE_PATH + eye * (EYE_VERTEX + GATHER)) + photons * (start + light_to_broad * LIGHT_VERTEX)
+                paths * (EYE_PATH + eye * (EYE_VERTEX + gather)) + photons * (start + light_to_broad * LIGHT_VERTEX)
             }
             (method, _) => {
                 let merges = if method.has_bandwidths() { MERGE } else { 0.0 };
                 let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
                 paths * (both + eye * (EYE_VERTEX + light * CONNECTION + merges))
             }
-        }
+        };
+        seconds * if self.scattering { MEDIA } else { 1.0 }
     }
 
     /// Core-seconds of an iteration that indirect light takes, and caustics, where one can be done without the other.
     pub fn parts(&self, way: Way, settings: &Settings, pixels: f64) -> [Option<f64>; 2] {
         let Lengths { eye, eye_to_broad, .. } = self.lengths;
         let beyond = (eye - eye_to_broad).max(0.0);
+        let media = if self.scattering { MEDIA } else { 1.0 };
         let all = self.of(way, settings, pixels);
         match (way.method, way.indirect) {
-            (Method::Path, _) => [Some(pixels * beyond * EYE_VERTEX), None],
+            (Method::Path, _) => [Some(media * pixels * beyond * EYE_VERTEX), None],
             // Without caustics there would be no photons.
             (method, Indirect::Paths) if method.gathers() => {
                 let paths = self.of(Way { method: Method::Path, ..way }, settings, pixels);
                 let eyes = if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
-                [Some(eyes * pixels * beyond * (EYE_VERTEX + GATHER)), Some(all - eyes * paths)]
+                [Some(media * eyes * pixels * beyond * (EYE_VERTEX + GATHER)), Some(all - eyes * paths)]
             }
             _ => [None, None],
         }

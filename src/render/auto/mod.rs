@@ -33,8 +33,8 @@ const SHARE: f64 = 0.05;
 const PIXELS: (f64, f64) = (768.0, 4096.0);
 /// Iterations of a candidate: as many as its share of the pilot allows.
 const ITERATIONS: (u64, u64) = (6, 64);
-/// What a second of `--time` is taken for (core-seconds), whatever the machine.
-const CORES: f64 = 4.0;
+/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of any.
+const CORES: f64 = 2.0;
 /// What a render until an error is reached is taken for (core-seconds).
 const UNLIMITED: f64 = 1000.0;
 /// A candidate that finds less than this share of the caustics that photons find has not seen them all, and its noise is not known.
@@ -97,12 +97,12 @@ impl Choice {
     }
 }
 
-/// The ways worth trying in a scene.
-fn candidates(scene: &Scene) -> Vec<Way> {
+/// The ways worth trying in a scene; `gathering` is the method where photons bring all light.
+fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
     let focusing = !scene.lights.targets().spheres().is_empty();
     let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering);
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
-    let mut ways = vec![plain(Method::Sppm)];
+    let mut ways = vec![plain(gathering)];
     if focusing {
         // Photons of all light are not guided: of dense ones that carry little and sparse ones that carry much, those set the bandwidth and these are
         // noise in it.
@@ -148,7 +148,7 @@ fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Gu
     let surroundings = Surroundings::new(scene, camera.position());
     let Settings { max_depth, seed, .. } = *settings;
     let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons };
-    Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide) }
+    Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide), scattering: scene.survey.scattering }
 }
 
 fn try_all(
@@ -169,8 +169,12 @@ fn try_all(
         (None, Some(seconds)) => seconds * CORES,
         (None, None) => UNLIMITED,
     };
+    // Bandwidths that shrink only where photons do not look uniform are better ones. Of several levels each would shrink on its own, and the combiner has
+    // learnt on levels that keep their ratios.
+    let counted = make(Way { method: Method::Cppm, ..Way::UNTRIED }).is_some_and(|settings| settings.levels.count == 1);
+    let gathering = if counted { Method::Cppm } else { Method::Sppm };
     let ways: Vec<(Way, Settings)> =
-        candidates(scene).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect();
+        candidates(scene, gathering).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect();
     if ways.len() < 2 {
         return (Vec::new(), "the one way that these options leave".into());
     }
