@@ -26,6 +26,8 @@ pub struct Camera {
     focus_distance: f32,
     width: u32,
     height: u32,
+    /// Share of a pixel's side that its rays cover.
+    covered: f32,
 }
 
 /// A ray from the film.
@@ -64,6 +66,7 @@ impl Camera {
             focus_distance: lens.1,
             width: size.0,
             height: size.1,
+            covered: 1.0,
         }
     }
 
@@ -71,6 +74,18 @@ impl Camera {
     pub fn resized(&self, factor: f64) -> Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         Camera { width: scaled(self.width), height: scaled(self.height), ..*self }
+    }
+
+    /// A sample of this camera's pixels, `factor` times as many a side and spread evenly over the film: each sees as much as a pixel does here. For methods that
+    /// send nothing to the film from elsewhere.
+    pub fn sparse(&self, factor: f64) -> Camera {
+        Camera { covered: self.covered * factor.min(1.0) as f32, ..self.resized(factor) }
+    }
+
+    /// The point of the film, in pixels, for a point of the unit square in pixel `(x, y)`.
+    #[inline]
+    pub fn film(&self, (x, y): (u32, u32), u: Vec2) -> Vec2 {
+        Vec2::new(x as f32, y as f32) + 0.5 + (u - 0.5) * self.covered
     }
 
     /// Width and height of the film in pixels.

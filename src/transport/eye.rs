@@ -24,7 +24,7 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::light::Receiver;
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::photon::{Kernel, Near, Photon, PhotonMap, VolumePhoton};
 use crate::random::{Purpose, Stream, Streams};
@@ -450,7 +450,7 @@ impl Eye<'_> {
     #[inline]
     pub fn start(&self, pixel: (u32, u32), stream: Stream) -> PathStart {
         let draws = stream.vertex(0);
-        let film = Vec2::new(pixel.0 as f32, pixel.1 as f32) + draws.two(Purpose::Pixel);
+        let film = self.camera.film(pixel, draws.two(Purpose::Pixel));
         let ray = self.camera.ray(film, draws.two(Purpose::Lens));
         PathStart {
             origin: ray.origin,

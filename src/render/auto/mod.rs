@@ -13,6 +13,7 @@ mod cost;
 mod trial;
 
 pub use balance::Balance;
+use trial::Sample;
 pub use trial::{Shares, Trial};
 
 use super::control::{Clock, cpu_seconds};
@@ -97,9 +98,13 @@ impl Choice {
     }
 }
 
+fn focuses(scene: &Scene) -> bool {
+    !scene.lights.targets().spheres().is_empty()
+}
+
 /// The ways worth trying in a scene; `gathering` is the method where photons bring all light.
 fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
-    let focusing = !scene.lights.targets().spheres().is_empty();
+    let focusing = focuses(scene);
     let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering);
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
     let mut ways = vec![plain(gathering)];
@@ -178,44 +183,54 @@ fn try_all(
     if ways.len() < 2 {
         return (Vec::new(), "the one way that these options leave".into());
     }
-    let trial_cost = |pixels: f64| -> f64 {
+    let trial_cost = |pixels: f64, photons: f64| -> f64 {
         let each = |(way, settings): &(Way, Settings)| {
             // Learning a guide takes about as much as an iteration of a trial every other round.
             let learning = if way.guided { ROUNDS as f64 / 2.0 } else { 0.0 };
-            (ITERATIONS.0 as f64 + learning) * cost.of(*way, &trial::settings(settings), pixels)
+            (ITERATIONS.0 as f64 + learning) * cost.of(*way, &trial::settings(settings, photons), pixels)
         };
         ways.iter().map(each).sum()
     };
     let allowed = SHARE * budget;
     let least = PIXELS.0.min(pixels);
-    if trial_cost(least) > allowed {
+    let few = trial::PHOTONS.0;
+    if trial_cost(least, few) > allowed {
         return (Vec::new(), "the render is too short to try others".into());
     }
     // The cost grows linearly with pixels. Half of it goes to what makes all equal: cheap ones run for longer.
     let allowed_once = 0.5 * allowed;
-    let slope = (trial_cost(2.0 * least) - trial_cost(least)) / least;
-    let most = least + (allowed_once - trial_cost(least)).max(0.0) / slope.max(1e-12);
-    let small = camera.resized((most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0));
+    let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
+    let most = least + (allowed_once - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
+    let factor = (most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0);
+    let (small, sparse) = (camera.resized(factor), camera.sparse(factor));
+    let small_pixels = f64::from(small.size().0) * f64::from(small.size().1);
+    // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
+    let spare = allowed_once / trial_cost(small_pixels, few);
+    let photons = (few * spare).clamp(few, trial::PHOTONS.1);
+    let plan = trial::Plan { photons, focusing: focuses(scene), budget: budget - allowed, free, pixels };
     let mut values = Vec::new();
-    let mut trials: Vec<Trial> = ways
+    let samples: Vec<Sample> = ways
         .iter()
         .map(|(way, settings)| {
-            let (width, height) = small.size();
-            let once = cost.of(*way, &trial::settings(settings), f64::from(width) * f64::from(height));
+            let once = cost.of(*way, &trial::settings(settings, photons), small_pixels);
             let iterations = (allowed / (ways.len() as f64 * once)) as u64;
             let iterations = iterations.clamp(ITERATIONS.0, ITERATIONS.1);
-            let plan = trial::Plan { iterations, budget: budget - allowed, free, pixels };
+            // What light paths send to the film needs pixels that cover it.
+            let bidirectional = matches!(way.method, Method::Bdpt | Method::Vcm);
+            let small = if bidirectional { &small } else { &sparse };
             let guided = |guide: &Guide| counts(scene, camera, untried, Some(guide));
             let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
-            Trial::new(scene, &small, *way, settings, cost_with, &plan, &mut values)
+            Sample::new(scene, small, (*way, settings), cost_with, (&plan, iterations), &mut values)
         })
         .collect();
-    let photons = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;
-    let caustics = trials.iter().filter(photons).map(|trial| trial.shares.caustic).fold(0.0, f64::max);
-    for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
-        if trial.shares.caustic < FOUND * caustics {
-            trial.expected = f64::INFINITY;
-        }
-    }
+    let photons = |sample: &&Sample| sample.way.method.gathers() && sample.way.indirect == Indirect::Photons;
+    let caustics = samples.iter().filter(photons).map(|sample| sample.shares().caustic).fold(0.0, f64::max);
+    let trials = samples.iter().map(|sample| {
+        let trial = Trial::new(sample, &plan);
+        let connects = matches!(sample.way.method, Method::Path | Method::Bdpt);
+        let blind = connects && trial.shares.caustic < FOUND * caustics;
+        Trial { expected: if blind { f64::INFINITY } else { trial.expected }, ..trial }
+    });
+    let trials: Vec<Trial> = trials.collect();
     (trials, "least expected error".into())
 }

@@ -12,13 +12,17 @@ use crate::render::settings::{Levels, Settings, Shard};
 use crate::scene::Scene;
 use crate::transport::MAX_LEVELS;
 
-/// Light paths of a trial over those of the render. As many neighbours are then found in as many times the area.
-const PHOTONS: f64 = 0.125;
+/// Light paths of a trial over those of the render, at least and at most. As many neighbours are then found in as many times the area.
+pub(super) const PHOTONS: (f64, f64) = (0.125, 1.0);
 /// Squared bias over that which levels tell: at an edge, neighbouring levels differ by less than either is wrong. As measured on a scene with many edges.
 const BLURRED: f64 = 3.0;
 /// Squared error of what bandwidths rule where they follow the photons' counts, over that where they follow the iteration's number: about what the diffuse box
 /// and the box with glass show after ten seconds, and less than the paper says of long renders [CPPM 2020, Table 1].
 const COUNTED: f64 = 0.7;
+/// Squared error of gathering over what a pilot tells of it where mirrors and glass focus light: caustics are finer than bandwidths, which then hide from the levels
+/// how much they blur. As measured on the scenes with glass after ten seconds, one level alone, where it is between one and four. Of several levels the
+/// combiner makes up for it: there gathering does better than the pilot tells.
+const FOCUSED: f64 = 2.0;
 /// Added to a pixel's squared value: relMSE.
 const DARK: f64 = 0.01;
 
@@ -56,14 +60,14 @@ pub struct Trial {
     pub balance: Balance,
 }
 
-/// Settings of a trial: those of the render with fewer photons, and all levels, which tell the bias.
-pub(super) fn settings(of: &Settings) -> Settings {
+/// Settings of a trial: those of the render with a share of its photons, and all levels, which tell the bias.
+pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
     // Bandwidths that follow counts tell neither noise nor bias apart.
     let method = if of.method == Method::Cppm { Method::Sppm } else { of.method };
     Settings {
         method,
         levels: Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 }),
-        photons: ((f64::from(of.photons) * PHOTONS) as u32).max(1),
+        photons: ((f64::from(of.photons) * photons) as u32).max(1),
         iterations: None,
         time: None,
         target_error: None,
@@ -99,8 +103,10 @@ fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<
 /// What a trial is told.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan {
-    /// Iterations to try.
-    pub iterations: u64,
+    /// Share of the light paths.
+    pub photons: f64,
+    /// Mirrors and glass focus light.
+    pub focusing: bool,
     /// What the render may take (core-seconds).
     pub budget: f64,
     /// Settings that may be balanced.
@@ -111,6 +117,9 @@ pub(super) struct Plan {
 
 /// Standard errors by which a variance is taken to be larger than it looks: rare bright samples make it look smaller more often than larger.
 const CAUTION: f64 = 1.0;
+
+/// Share of the pixels that are left out, those of the largest variance: a bright sample in a hundred or so of pixels says next to nothing about how often there is one.
+const WORST: f64 = 0.01;
 
 /// Sums over pixels of relative squares.
 #[derive(Default)]
@@ -130,8 +139,18 @@ impl Sums {
     fn of(pixels: &[Pixel], levels: Levels, values: &[f64]) -> Sums {
         let mut sums = Sums::default();
         let own = levels.own();
+        let relative = |(pixel, value): (&Pixel, &f64)| {
+            mean(pixel.levels[own].variance_of_mean(f64::from(pixel.iterations))) / (value * value + DARK)
+        };
+        let mut variances: Vec<f64> = pixels.iter().zip(values).map(relative).collect();
+        let worst = (variances.len() as f64 * WORST) as usize;
+        let last = variances.len().saturating_sub(1 + worst);
+        let most = variances.select_nth_unstable_by(last, f64::total_cmp).1.to_owned();
         for (pixel, value) in pixels.iter().zip(values) {
             let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
+            if relative((pixel, value)) > most {
+                continue;
+            }
             let n = f64::from(pixel.iterations);
             let scale = 1.0 / (value * value + DARK);
             for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
@@ -170,46 +189,83 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
     (own - photons, photons)
 }
 
-impl Trial {
-    /// Tries a way on a small picture. `values`: what its pixels are worth, told by the first trial. `cost_with` counts work with
-    /// the guide that the trial has learnt, if any.
+/// A way tried on a small picture.
+pub(super) struct Sample {
+    pub way: Way,
+    /// Settings of the render.
+    of: Settings,
+    cost: Cost,
+    /// Iterations.
+    done: f64,
+    own: usize,
+    sums: Sums,
+}
+
+impl Sample {
+    /// Tries a way for some iterations. `values`: what pixels are worth, told by the first sample. `cost_with` counts work with the guide that it has
+    /// learnt, if any.
     pub(super) fn new(
         scene: &Scene,
         small: &Camera,
-        way: Way,
-        of: &Settings,
+        (way, of): (Way, &Settings),
         cost_with: impl Fn(Option<&Guide>) -> Cost,
-        plan: &Plan,
+        (plan, iterations): (&Plan, u64),
         values: &mut Vec<f64>,
-    ) -> Trial {
-        let trial = settings(of);
+    ) -> Sample {
+        let trial = settings(of, plan.photons);
         let stage = Stage::new(scene, small, &trial);
         let mut session = Session::new(&stage);
-        for _ in 0..plan.iterations {
+        for _ in 0..iterations {
             session.step();
         }
         let levels = stage.settings().levels;
         if values.is_empty() {
             *values = self::values(session.pixels(), small.size(), levels);
         }
-        let sums = Sums::of(session.pixels(), levels, values);
-        let pixels = sums.pixels.max(1.0);
-        let done = plan.iterations as f64;
-        let total: f64 = sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let relative = |x: f64| x / pixels;
+        let own = levels.own();
+        Sample {
+            way,
+            of: of.clone(),
+            cost: cost_with(session.guide()),
+            done: iterations as f64,
+            own,
+            sums: Sums::of(session.pixels(), levels, values),
+        }
+    }
+
+    fn relative(&self, sum: f64) -> f64 {
+        sum / self.sums.pixels.max(1.0)
+    }
+
+    /// Relative variance of what it has come to.
+    pub(super) fn variance(&self) -> f64 {
+        self.relative(self.sums.variance[self.own])
+    }
+
+    /// Share of the picture's light by part.
+    pub(super) fn shares(&self) -> Shares {
+        let total: f64 = self.sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        Sums::shares(self.sums.parts.map(|part| part / total))
+    }
+}
+
+impl Trial {
+    /// What a sample promises.
+    pub(super) fn new(sample: &Sample, plan: &Plan) -> Trial {
+        let Sample { way, of, cost, done, sums, .. } = sample;
+        let relative = |sum: f64| sample.relative(sum);
         let gathers = of.method.gathers();
-        let (fixed, photons) =
-            if gathers { split(&sums.variance.map(relative)) } else { (relative(sums.variance[levels.own()]), 0.0) };
-        let variance = relative(sums.variance[levels.own()]);
-        let spread = (relative(sums.variance2) - variance * variance).max(0.0).sqrt() / pixels.sqrt();
-        let fixed = fixed + CAUTION * spread;
+        let variance = sample.variance();
+        let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };
+        let spread = (relative(sums.variance2) - variance * variance).max(0.0) / sums.pixels.max(1.0);
+        let fixed = fixed + CAUTION * spread.sqrt();
+        let (all, light) = (cost.of(*way, of, plan.pixels), cost.of(*way, of, 0.0));
+        let alpha = of.alpha;
         let mut squared_bias = relative(sums.squared_bias).max(0.0);
         if gathers {
             // The same neighbours in a smaller area.
-            squared_bias *= PHOTONS * BLURRED;
+            squared_bias *= plan.photons * BLURRED;
         }
-        let cost = cost_with(session.guide());
-        let (all, light) = (cost.of(way, of, plan.pixels), cost.of(way, of, 0.0));
         let mut balance =
             if gathers { Balance::new(fixed, photons, squared_bias, all - light, light) } else { Balance::USUAL };
         balance.keep(plan.free);
@@ -220,21 +276,22 @@ impl Trial {
         }
         let mut balanced = of.clone();
         balance.apply(&mut balanced);
-        let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
+        let seconds_per_iteration = cost.of(*way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
-        let alpha = of.alpha;
         let area = balance.neighbours / balance.photons;
         let gathered = if gathers { photons / (balance.neighbours * n.powf(alpha)) } else { 0.0 };
         let bias = squared_bias * area / n.powf(1.0 - alpha);
         let bias = if of.method == Method::Path { 0.0 } else { bias };
         let ruled = (gathered + bias) * if counted { COUNTED } else { 1.0 };
         Trial {
-            way,
-            shares: Sums::shares(sums.parts.map(|part| part / total)),
+            way: *way,
+
+            shares: sample.shares(),
             without: Sums::shares(sums.squares.map(|square| relative(square).sqrt())),
             seconds_per_iteration,
-            seconds_of_parts: cost.parts(way, &balanced, plan.pixels),
-            expected: fixed / n + ruled,
+            seconds_of_parts: cost.parts(*way, &balanced, plan.pixels),
+            expected: (fixed / n + ruled)
+                * if gathers && plan.focusing && of.levels.count == 1 { FOCUSED } else { 1.0 },
             balance,
         }
     }
