@@ -110,7 +110,7 @@ impl Camera {
 
     /// Whether a lens blurs.
     pub fn has_lens(&self) -> bool {
-        self.lens_radius > 0.0
+        !cfg!(feature = "bare") && self.lens_radius > 0.0
     }
 
     /// Film point in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size.
@@ -131,7 +131,7 @@ impl Camera {
                 (p.extend(0.0), p.extend(-self.focus_distance))
             }
         };
-        if self.lens_radius > 0.0 {
+        if self.has_lens() {
             origin += (warp::disc_concentric(lens) * self.lens_radius).extend(0.0);
         }
         CameraRay {
@@ -159,7 +159,7 @@ impl Camera {
     pub fn sample(&self, p: Vec3, lens: Vec2) -> Option<CameraSample> {
         let Projection::Perspective(half) = self.projection else { return None };
         let mut lens_local = Vec3::ZERO;
-        if self.lens_radius > 0.0 {
+        if self.has_lens() {
             lens_local = (warp::disc_concentric(lens) * self.lens_radius).extend(0.0);
         }
         let lens_world = self.position + self.rotation * lens_local;

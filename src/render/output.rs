@@ -23,7 +23,7 @@ pub struct Present {
 impl Present {
     /// In `scene`.
     pub fn of(scene: &Scene) -> Present {
-        Present { environment: scene.lights.sky().environment.is_some(), volume: scene.survey.scattering }
+        Present { environment: scene.lights.sky().environment.is_some(), volume: scene.survey.scattering() }
     }
 }
 

@@ -211,7 +211,7 @@ impl<'a> Sppm<'a> {
 
     /// Maps of the photons of iteration `i`.
     fn build(&self, photons: Photons, i: u64) -> Maps {
-        let scatters = self.eye.scene.survey.scattering;
+        let scatters = self.eye.scene.survey.scattering();
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
         Maps { surface: PhotonMap::build(photons.surface), volume, comb: Comb::new(self.settings.seed, i) }
     }
@@ -239,7 +239,7 @@ impl Iterate for Sppm<'_> {
             self.later2 = usual_radius2(&map, k);
         }
         let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
-        if self.eye.scene.survey.scattering {
+        if self.eye.scene.survey.scattering() {
             let pilot = PhotonMap::build(pilot.volume);
             let bandwidths = initial_volume_bandwidths(&self.eye, initial, seed, &pilot);
             for (pixel, bandwidth) in pixels.iter_mut().zip(bandwidths) {

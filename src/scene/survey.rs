@@ -13,19 +13,44 @@ pub struct Survey {
     pub solids: bool,
     /// Rays may cross boundaries that do not scatter: index-matched solids, or solids inside others.
     pub null_boundaries: bool,
-    /// Something absorbs or scatters between surfaces.
-    pub media: bool,
-    /// Something scatters between surfaces.
-    pub scattering: bool,
-    /// Some solid refracts colours differently.
-    pub dispersion: bool,
+    media: bool,
+    scattering: bool,
+    dispersion: bool,
     /// Some light cannot be hit by a ray.
     pub delta_lights: bool,
     /// Light comes from infinity.
     pub infinite_lights: bool,
 }
 
+/// The program has all effects. Without some of them, only to measure what they cost scenes that do not call for them, it refuses scenes that do.
+const COMPLETE: bool = !cfg!(feature = "bare");
+
 impl Survey {
+    /// Something absorbs or scatters between surfaces.
+    #[inline(always)]
+    pub fn media(&self) -> bool {
+        COMPLETE && self.media
+    }
+
+    /// Something scatters between surfaces.
+    #[inline(always)]
+    pub fn scattering(&self) -> bool {
+        COMPLETE && self.scattering
+    }
+
+    /// Some solid refracts colours differently.
+    #[inline(always)]
+    pub fn dispersion(&self) -> bool {
+        COMPLETE && self.dispersion
+    }
+
+    /// What the scene calls for and the program lacks.
+    pub(super) fn lacking(&self, materials: &Materials, lenses: bool) -> Option<&'static str> {
+        let textures = !materials.textures.is_empty();
+        let all = [(self.media, "media"), (self.dispersion, "dispersion"), (textures, "textures"), (lenses, "lenses")];
+        all.into_iter().find(|(called_for, _)| !COMPLETE && *called_for).map(|(_, name)| name)
+    }
+
     /// Looks through the scene.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());

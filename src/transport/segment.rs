@@ -151,7 +151,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
     let eta = if entering { after / before } else { before / after };
     // Of two glasses with one index some wavelengths are refracted all the same.
-    if eta == 1.0 && !material.emits() && !(scene.survey.dispersion && crossing.disperses(scene)) {
+    if eta == 1.0 && !material.emits() && !(scene.survey.dispersion() && crossing.disperses(scene)) {
         let parameters = material.parameters(surface, &scene.materials.textures, eta);
         if parameters.is_pure_transmission() {
             return Boundary::None(parameters.base_color, crossing.interior);
@@ -202,7 +202,7 @@ pub(super) fn next_vertex(
             },
         };
         let t = met.map_or(f32::INFINITY, |hit| hit.t);
-        if scene.survey.media
+        if scene.survey.media()
             && let Some(medium) = interior.medium(scene)
         {
             let (origin, left, beyond) = (ray.origin, transmittance, surface.as_ref());
@@ -245,11 +245,11 @@ impl Way {
     /// Goes on through `distance` of what fills the space.
     #[inline]
     fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
-        if scene.survey.media
+        if scene.survey.media()
             && let Some(medium) = interior.medium(scene)
         {
             self.left *= medium.transmittance(distance);
-            if scene.survey.scattering {
+            if scene.survey.scattering() {
                 self.flight = self.flight.through(&medium, distance, starts, ends);
             }
         }

@@ -162,9 +162,9 @@ pub fn walk<'a, V: Visitor<'a>>(
     visitor: &mut V,
 ) {
     // Scenes without scattering media or dispersion walk as if there were none in the world.
-    if scene.survey.dispersion {
+    if scene.survey.dispersion() {
         walk_aside::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
-    } else if scene.survey.scattering {
+    } else if scene.survey.scattering() {
         walk_aside::<V, false>(scene, arena, start, stream, transport, max_depth, visitor);
     } else {
         walk_in::<V, false, false>(scene, arena, start, stream, transport, max_depth, visitor);

@@ -114,7 +114,7 @@ fn search(method: render::Method) -> Search {
 /// Media scatter, and the method gathers photons on surfaces only.
 pub fn check_media(args: &RenderArgs, scene: &Scene) -> Result<()> {
     let method = args.method.chosen();
-    if !scene.survey.scattering || !matches!(method, render::Method::Pm | render::Method::Bpm) {
+    if !scene.survey.scattering() || !matches!(method, render::Method::Pm | render::Method::Bpm) {
         return Ok(());
     }
     let cause = format!("--method {} does not render media that scatter light", method.name());

@@ -13,7 +13,6 @@ mod cost;
 mod trial;
 
 pub use balance::Balance;
-use trial::Sample;
 pub use trial::{Shares, Trial};
 
 use super::control::{Clock, cpu_seconds};
@@ -105,7 +104,7 @@ fn focuses(scene: &Scene) -> bool {
 /// The ways worth trying in a scene; `gathering` is the method where photons bring all light.
 fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
     let focusing = focuses(scene);
-    let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering);
+    let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering());
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
     let mut ways = vec![plain(gathering)];
     if focusing {
@@ -153,7 +152,7 @@ fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Gu
     let surroundings = Surroundings::new(scene, camera.position());
     let Settings { max_depth, seed, .. } = *settings;
     let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons };
-    Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide), scattering: scene.survey.scattering }
+    Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide), scattering: scene.survey.scattering() }
 }
 
 fn try_all(
@@ -209,7 +208,7 @@ fn try_all(
     let photons = (few * spare).clamp(few, trial::PHOTONS.1);
     let plan = trial::Plan { photons, focusing: focuses(scene), budget: budget - allowed, free, pixels };
     let mut values = Vec::new();
-    let samples: Vec<Sample> = ways
+    let mut trials: Vec<Trial> = ways
         .iter()
         .map(|(way, settings)| {
             let once = cost.of(*way, &trial::settings(settings, photons), small_pixels);
@@ -220,17 +219,15 @@ fn try_all(
             let small = if bidirectional { &small } else { &sparse };
             let guided = |guide: &Guide| counts(scene, camera, untried, Some(guide));
             let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
-            Sample::new(scene, small, (*way, settings), cost_with, (&plan, iterations), &mut values)
+            Trial::new(scene, small, (*way, settings), cost_with, (&plan, iterations), &mut values)
         })
         .collect();
-    let photons = |sample: &&Sample| sample.way.method.gathers() && sample.way.indirect == Indirect::Photons;
-    let caustics = samples.iter().filter(photons).map(|sample| sample.shares().caustic).fold(0.0, f64::max);
-    let trials = samples.iter().map(|sample| {
-        let trial = Trial::new(sample, &plan);
-        let connects = matches!(sample.way.method, Method::Path | Method::Bdpt);
-        let blind = connects && trial.shares.caustic < FOUND * caustics;
-        Trial { expected: if blind { f64::INFINITY } else { trial.expected }, ..trial }
-    });
-    let trials: Vec<Trial> = trials.collect();
+    let gathers = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;
+    let caustics = trials.iter().filter(gathers).map(|trial| trial.shares.caustic).fold(0.0, f64::max);
+    for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
+        if trial.shares.caustic < FOUND * caustics {
+            trial.expected = f64::INFINITY;
+        }
+    }
     (trials, "least expected error".into())
 }

@@ -129,9 +129,12 @@ struct Sums {
     /// Of squares of the own level's.
     variance2: f64,
     squared_bias: f64,
+    /// Number of pixels in these.
+    pixels: f64,
+    /// The parts, and their squares, of all pixels.
     parts: [f64; 5],
     squares: [f64; 5],
-    pixels: f64,
+    all: f64,
 }
 
 impl Sums {
@@ -148,16 +151,8 @@ impl Sums {
         let most = variances.select_nth_unstable_by(last, f64::total_cmp).1.to_owned();
         for (pixel, value) in pixels.iter().zip(values) {
             let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
-            if relative((pixel, value)) > most {
-                continue;
-            }
             let n = f64::from(pixel.iterations);
             let scale = 1.0 / (value * value + DARK);
-            for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
-                *sum += mean(level.variance_of_mean(n)) * scale;
-            }
-            sums.variance2 += (mean(error.variance) * scale).powi(2);
-            sums.squared_bias += mean(error.squared_bias) * scale;
             let parts = &pixel.parts;
             let parts = [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume];
             for (k, part) in parts.into_iter().enumerate() {
@@ -165,6 +160,15 @@ impl Sums {
                 sums.parts[k] += mean(part);
                 sums.squares[k] += mean(part * part) * scale;
             }
+            sums.all += 1.0;
+            if relative((pixel, value)) > most {
+                continue;
+            }
+            for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
+                *sum += mean(level.variance_of_mean(n)) * scale;
+            }
+            sums.variance2 += (mean(error.variance) * scale).powi(2);
+            sums.squared_bias += mean(error.squared_bias) * scale;
             sums.pixels += 1.0;
         }
         sums
@@ -189,21 +193,9 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
     (own - photons, photons)
 }
 
-/// A way tried on a small picture.
-pub(super) struct Sample {
-    pub way: Way,
-    /// Settings of the render.
-    of: Settings,
-    cost: Cost,
-    /// Iterations.
-    done: f64,
-    own: usize,
-    sums: Sums,
-}
-
-impl Sample {
-    /// Tries a way for some iterations. `values`: what pixels are worth, told by the first sample. `cost_with` counts work with the guide that it has
-    /// learnt, if any.
+impl Trial {
+    /// Tries a way on a small picture for some iterations. `values`: what its pixels are worth, told by the first trial. `cost_with` counts work with
+    /// the guide that the trial has learnt, if any.
     pub(super) fn new(
         scene: &Scene,
         small: &Camera,
@@ -211,7 +203,7 @@ impl Sample {
         cost_with: impl Fn(Option<&Guide>) -> Cost,
         (plan, iterations): (&Plan, u64),
         values: &mut Vec<f64>,
-    ) -> Sample {
+    ) -> Trial {
         let trial = settings(of, plan.photons);
         let stage = Stage::new(scene, small, &trial);
         let mut session = Session::new(&stage);
@@ -222,44 +214,17 @@ impl Sample {
         if values.is_empty() {
             *values = self::values(session.pixels(), small.size(), levels);
         }
-        let own = levels.own();
-        Sample {
-            way,
-            of: of.clone(),
-            cost: cost_with(session.guide()),
-            done: iterations as f64,
-            own,
-            sums: Sums::of(session.pixels(), levels, values),
-        }
-    }
-
-    fn relative(&self, sum: f64) -> f64 {
-        sum / self.sums.pixels.max(1.0)
-    }
-
-    /// Relative variance of what it has come to.
-    pub(super) fn variance(&self) -> f64 {
-        self.relative(self.sums.variance[self.own])
-    }
-
-    /// Share of the picture's light by part.
-    pub(super) fn shares(&self) -> Shares {
-        let total: f64 = self.sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        Sums::shares(self.sums.parts.map(|part| part / total))
-    }
-}
-
-impl Trial {
-    /// What a sample promises.
-    pub(super) fn new(sample: &Sample, plan: &Plan) -> Trial {
-        let Sample { way, of, cost, done, sums, .. } = sample;
-        let relative = |sum: f64| sample.relative(sum);
+        let sums = Sums::of(session.pixels(), levels, values);
+        let cost = cost_with(session.guide());
+        let (done, pixels) = (iterations as f64, sums.pixels.max(1.0));
+        let relative = |sum: f64| sum / pixels;
+        let total: f64 = sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let gathers = of.method.gathers();
-        let variance = sample.variance();
+        let variance = relative(sums.variance[levels.own()]);
         let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };
-        let spread = (relative(sums.variance2) - variance * variance).max(0.0) / sums.pixels.max(1.0);
+        let spread = (relative(sums.variance2) - variance * variance).max(0.0) / pixels;
         let fixed = fixed + CAUTION * spread.sqrt();
-        let (all, light) = (cost.of(*way, of, plan.pixels), cost.of(*way, of, 0.0));
+        let (all, light) = (cost.of(way, of, plan.pixels), cost.of(way, of, 0.0));
         let alpha = of.alpha;
         let mut squared_bias = relative(sums.squared_bias).max(0.0);
         if gathers {
@@ -276,7 +241,7 @@ impl Trial {
         }
         let mut balanced = of.clone();
         balance.apply(&mut balanced);
-        let seconds_per_iteration = cost.of(*way, &balanced, plan.pixels);
+        let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
         let area = balance.neighbours / balance.photons;
         let gathered = if gathers { photons / (balance.neighbours * n.powf(alpha)) } else { 0.0 };
@@ -284,12 +249,11 @@ impl Trial {
         let bias = if of.method == Method::Path { 0.0 } else { bias };
         let ruled = (gathered + bias) * if counted { COUNTED } else { 1.0 };
         Trial {
-            way: *way,
-
-            shares: sample.shares(),
-            without: Sums::shares(sums.squares.map(|square| relative(square).sqrt())),
+            way,
+            shares: Sums::shares(sums.parts.map(|part| part / total)),
+            without: Sums::shares(sums.squares.map(|square| (square / sums.all.max(1.0)).sqrt())),
             seconds_per_iteration,
-            seconds_of_parts: cost.parts(*way, &balanced, plan.pixels),
+            seconds_of_parts: cost.parts(way, &balanced, plan.pixels),
             expected: (fixed / n + ruled)
                 * if gathers && plan.focusing && of.levels.count == 1 { FOCUSED } else { 1.0 },
             balance,
