@@ -71,6 +71,8 @@ pub trait Site {
     fn draws(&self) -> Draws;
     /// The wavelength the path has taken.
     fn wavelength(&self) -> Option<&Wavelength>;
+    /// Its lobes that are not delta.
+    fn smooth(&self) -> LobeSet;
     /// Scattering from `wi` times its cosine, and the density of drawing `wi` ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
     /// Density of the way back ([`crate::bsdf::Shading::reverse_pdf`]).
@@ -137,6 +139,11 @@ impl Site for Vertex<'_, '_> {
     #[inline]
     fn wavelength(&self) -> Option<&Wavelength> {
         self.wavelength.as_ref()
+    }
+
+    #[inline]
+    fn smooth(&self) -> LobeSet {
+        self.shading.bsdf.lobes() & LobeSet::SMOOTH
     }
 
     #[inline]
@@ -213,6 +220,11 @@ impl Site for MediumVertex {
     #[inline]
     fn wavelength(&self) -> Option<&Wavelength> {
         self.wavelength.as_ref()
+    }
+
+    #[inline]
+    fn smooth(&self) -> LobeSet {
+        LobeSet::BROAD
     }
 
     #[inline]
