@@ -56,7 +56,14 @@ fn by_photons(
 fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let interior = Interior::at(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons, classes: ClassSet::ALL };
+    let eye = Eye {
+        scene,
+        camera: &camera,
+        interior,
+        max_depth: u32::MAX,
+        indirect: Indirect::Photons,
+        classes: ClassSet::ALL,
+    };
     (0..seeds)
         .map(|seed| {
             tiles(|index| {

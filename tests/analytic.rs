@@ -74,7 +74,14 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
     let interior = Interior::at(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons, classes: ClassSet::ALL };
+    let eye = Eye {
+        scene,
+        camera: &camera,
+        interior,
+        max_depth: u32::MAX,
+        indirect: Indirect::Photons,
+        classes: ClassSet::ALL,
+    };
     (0..seeds)
         .map(|seed| {
             let mut sum = 0.0;

@@ -420,7 +420,14 @@ struct Tally {
 fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let surroundings = Surroundings::new(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior: surroundings.eye, max_depth: 12, indirect: Indirect::Photons, classes: ClassSet::ALL };
+    let eye = Eye {
+        scene,
+        camera: &camera,
+        interior: surroundings.eye,
+        max_depth: 12,
+        indirect: Indirect::Photons,
+        classes: ClassSet::ALL,
+    };
     let pixels = (SIZE * SIZE) as f32;
     let strategies = Strategies::vcm(true);
     let shared =

@@ -3,8 +3,8 @@
 use super::number::{finite, not_negative, rgb};
 use super::say;
 use caustique::error::{Error, Kind, Result};
-use caustique::plan::switch::{self, Removed};
 use caustique::plan::Switches;
+use caustique::plan::switch::{self, Removed};
 use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Scene, environment_file, gltf};
 use clap::ValueEnum;

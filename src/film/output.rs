@@ -80,7 +80,8 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, classes, volume, volume_radius_factor } = *shape;
+    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, classes, volume, volume_radius_factor } =
+        *shape;
     let mut columns = vec![
         Column {
             name: String::new(),

@@ -387,6 +387,15 @@ impl Beam {
     const MEDIUM: u8 = 1 << 4;
     const SIZELESS: u8 = 1 << 5;
 
+    /// How many there can be.
+    pub const COUNT: usize = 1 << 6;
+
+    /// Below [`Beam::COUNT`].
+    #[inline]
+    pub fn index(self) -> usize {
+        usize::from(self.0) % Beam::COUNT
+    }
+
     /// From a light that has a size, by narrow lobes alone.
     pub const FOCUSED: Beam = Beam(Tail::Narrow as u8);
     /// The same, and then by a broad lobe.

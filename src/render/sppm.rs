@@ -177,7 +177,8 @@ impl<'a> Sppm<'a> {
             let start = cpu_seconds();
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
-            let pass = pass.with(Comb::new(seed, i)).wanting(self.settings.of_photons(self.eye.scene), Indirect::Photons);
+            let pass =
+                pass.with(Comb::new(seed, i)).wanting(self.settings.of_photons(self.eye.scene), Indirect::Photons);
             let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(0..each, |arena, index, photons| {

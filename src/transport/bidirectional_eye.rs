@@ -146,8 +146,8 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
-        let shares = connected(vertex, light, self.trail.sight, (d, f_eye, f_light), eye.classes);
-        if shares.is_empty() {
+        let shares = || connected(vertex, light, self.trail.sight, (d, f_eye, f_light), eye.classes);
+        if !eye.classes.is_all() && shares().is_empty() {
             return;
         }
         let mut value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
@@ -180,7 +180,7 @@ impl<R: Record> EyeWalk<'_, R> {
         );
         let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
         self.record.contribution(technique, value, light.p(), ratios);
-        for (class, share) in shares.iter() {
+        for (class, share) in shares().iter() {
             self.add(technique, class, value * way.left * share, ratios);
         }
     }

@@ -2,12 +2,12 @@
 
 use super::bidirectional::{MergeLevels, Record, Technique};
 use super::mis::{self, MisState};
-use super::shares::shares;
+use super::shares::Merged;
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
-use crate::plan::{Beam, ClassSet, PathClass, Sight};
 use crate::photon::{Located, PhotonMap, same_surface};
+use crate::plan::{Beam, ClassSet, PathClass, Sight};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
@@ -90,6 +90,7 @@ pub(super) fn merge_photons<R: Record>(
     let radii = levels.radius2();
     let Some(&largest) = radii.last() else { return };
     let (ng, shading) = (vertex.surface.ng, vertex.shading);
+    let mut merged = Merged::new(vertex, sight, classes);
     photons.within(vertex.surface.p, largest, |photon, distance2| {
         if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
             return;
@@ -102,7 +103,7 @@ pub(super) fn merge_photons<R: Record>(
         if !is_lit(value) {
             return;
         }
-        let shares = shares(vertex, (sight, photon.beam), (photon.wi, Transport::Radiance, f), classes);
+        let shares = merged.shares(photon.beam, photon.wi, f);
         let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
         let ratios = mis::merge(&photon.mis(), mis, pdf, reverse);
         let technique = Technique::Merge { light: u32::from(photon.depth), eye: vertex.depth };

@@ -85,8 +85,19 @@ pub(super) fn shares<S: Site>(
     (wi, transport, f): (Vec3, Transport, Rgb),
     on: ClassSet,
 ) -> Shares {
+    shares_of(vertex, classes(vertex, sight, beam), (wi, transport, f), on)
+}
+
+/// The same where the classes are known.
+#[inline]
+fn shares_of<S: Site>(
+    vertex: &S,
+    classes: (PathClass, Option<PathClass>),
+    (wi, transport, f): (Vec3, Transport, Rgb),
+    on: ClassSet,
+) -> Shares {
     let mut shares = Shares::NONE;
-    match classes(vertex, sight, beam) {
+    match classes {
         (first, Some(second)) if first.part() != second.part() || !on.is_all() => {
             let broad = ratio(vertex.evaluate_cos(wi, transport, LobeSet::BROAD).0, f);
             shares.add(first, broad, on);
@@ -95,6 +106,30 @@ pub(super) fn shares<S: Site>(
         (first, _) => shares.add(first, Rgb::ONE, on),
     }
     shares
+}
+
+/// Shares of the light of many photons at one vertex: each kind of [`Beam`] is looked at once.
+pub(super) struct Merged<'v, S> {
+    vertex: &'v S,
+    sight: Sight,
+    on: ClassSet,
+    known: [Option<(PathClass, Option<PathClass>)>; Beam::COUNT],
+}
+
+impl<'v, S: Site> Merged<'v, S> {
+    /// At a vertex at the end of `sight`.
+    #[inline]
+    pub fn new(vertex: &'v S, sight: Sight, on: ClassSet) -> Merged<'v, S> {
+        Merged { vertex, sight, on, known: [None; Beam::COUNT] }
+    }
+
+    /// Shares of light that comes by `beam` along `wi`, of which the vertex scatters `f` towards the eye.
+    #[inline]
+    pub fn shares(&mut self, beam: Beam, wi: Vec3, f: Rgb) -> Shares {
+        let known = &mut self.known[beam.index()];
+        let classes = *known.get_or_insert_with(|| classes(self.vertex, self.sight, beam));
+        shares_of(self.vertex, classes, (wi, Transport::Radiance, f), self.on)
+    }
 }
 
 /// The same for light that a light path's vertex sends along `-d`, of which its lobes scatter `f_light`, to one from where it is along `d`.

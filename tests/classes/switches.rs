@@ -2,7 +2,7 @@
 
 use super::room;
 use crate::support::scenes::square;
-use crate::support::stats::t_critical;
+use crate::support::stats::{mean_and_error, t_critical};
 use crate::support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 use caustique::estimator::{InitialBandwidth, Parts};
 use caustique::math::DVec3;
@@ -86,10 +86,14 @@ fn a_class_and_all_others_are_the_whole() {
             let (one, others) = (of(only(effect)), of(without(&[effect])));
             let apart_by = apart(&one, &others, &whole);
             assert!(apart_by < 1e-4, "{method:?} {indirect:?} {effect:?}: {apart_by}");
-            let light = |rendered: &Rendered| rendered.pixels.iter().map(|p| p.levels[0].mean.element_sum()).sum::<f64>();
-            assert!(light(&one) > 0.0 && light(&others) < light(&whole), "{method:?} {effect:?}");
-            // The class counted twice.
-            assert!(apart(&one, &whole, &whole) > 1e-3, "{method:?} {effect:?}: twice goes unnoticed");
+            let light =
+                |rendered: &Rendered| rendered.pixels.iter().map(|p| p.levels[0].mean.element_sum()).sum::<f64>();
+            // Light paths connected to the camera do not find what is behind glass.
+            if method != Method::Light || effect != Effect::Sds {
+                assert!(light(&one) > 0.0 && light(&others) < light(&whole), "{method:?} {effect:?}");
+                // The class counted twice.
+                assert!(apart(&one, &whole, &whole) > 1e-3, "{method:?} {effect:?}: twice goes unnoticed");
+            }
         }
     }
 }
@@ -149,6 +153,15 @@ fn by(scene: &Scene, way: (Method, Indirect), effect: Effect, iterations: u64, p
     (0..10).map(of).collect()
 }
 
+/// Whether the means of whole pictures differ by more than chance and 3 % allow.
+fn differ(a: &[Vec<f64>], b: &[Vec<f64>]) -> bool {
+    let of = |images: &[Vec<f64>]| {
+        mean_and_error(&images.iter().map(|tiles| tiles.iter().sum::<f64>() / TILES as f64).collect::<Vec<_>>())
+    };
+    let ((a, error_a), (b, error_b)) = (of(a), of(b));
+    (a - b).abs() > t_critical(1e-3, 1, 9.0) * error_a.hypot(error_b) + 0.03 * b
+}
+
 /// Each class alone is the same light whoever brings it: photons, paths, or all weighed against each other. Were one carried twice or by nobody, it would be
 /// twice as bright or dark.
 #[test]
@@ -156,20 +169,23 @@ fn a_class_is_the_same_light_by_every_method() {
     let scene = room(false);
     let critical = t_critical(1e-3, TILES, 9.0);
     for effect in CLASSES {
-        let paths = by(&scene, (Method::Path, Indirect::Photons), effect, 48, 0);
+        // Paths seldom run into what makes a caustic.
+        let passes = match effect {
+            Effect::Caustic => 192,
+            Effect::Sds => 768,
+            _ => 48,
+        };
+        let paths = by(&scene, (Method::Path, Indirect::Photons), effect, passes, 0);
         assert!(average(&paths) > 1e-4, "{effect:?} is dark");
-        for way in [(Method::Sppm, Indirect::Photons), (Method::Sppm, Indirect::Paths), (Method::Vcm, Indirect::Photons)] {
-            let others = by(&scene, way, effect, 8, 30_000);
+        for way in
+            [(Method::Sppm, Indirect::Photons), (Method::Sppm, Indirect::Paths), (Method::Vcm, Indirect::Photons)]
+        {
+            let mut others = by(&scene, way, effect, 8, 15_000);
             println!("{effect:?}: paths {:.5}, {way:?} {:.5}", average(&paths), average(&others));
             let found = disagreeing(&others, &paths, critical, 0.03);
-            assert!(found.is_empty(), "{effect:?} {way:?}: {found:#?}");
+            assert!(found.is_empty() && !differ(&others, &paths), "{effect:?} {way:?}: {found:#?}");
+            others.iter_mut().flatten().for_each(|tile| *tile *= 2.0);
+            assert!(differ(&others, &paths), "{effect:?} {way:?}: twice goes unnoticed");
         }
-        // The class counted twice in one tile.
-        let mut twice = paths.clone();
-        for seed in &mut twice {
-            let brightest = (0..TILES).max_by(|&a, &b| paths[0][a].total_cmp(&paths[0][b])).expect("there are tiles");
-            seed[brightest] *= 2.0;
-        }
-        assert!(!disagreeing(&twice, &paths, critical, 0.03).is_empty(), "{effect:?}: twice goes unnoticed");
     }
 }
