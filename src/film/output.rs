@@ -48,6 +48,9 @@ pub struct Shape {
 /// Values of one layer at one pixel, as many as it has components.
 type Get = Box<dyn Fn(&Pixel) -> [f32; 4] + Sync>;
 
+/// One of the additive parts.
+type OfParts = fn(&Parts) -> DVec3;
+
 /// A layer to be made.
 struct Column {
     name: String,
@@ -108,7 +111,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
         let factor = factor as f32 * level_factor(level, levels);
         columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", move |p| p.volume_bandwidth * factor));
     }
-    let parts: [(Part, &str, fn(&Parts) -> DVec3); 5] = [
+    let parts: [(Part, &str, OfParts); 5] = [
         (Part::Direct, "Direct", |parts| parts.direct),
         (Part::Indirect, "Indirect", |parts| parts.indirect),
         (Part::Caustic, "Caustic", |parts| parts.caustic),
