@@ -8,6 +8,7 @@ mod support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::plan::ClassSet;
 use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
@@ -55,7 +56,14 @@ fn by_photons(
 fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let interior = Interior::at(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons };
+    let eye = Eye {
+        scene,
+        camera: &camera,
+        interior,
+        max_depth: u32::MAX,
+        indirect: Indirect::Photons,
+        classes: ClassSet::ALL,
+    };
     (0..seeds)
         .map(|seed| {
             tiles(|index| {

@@ -11,6 +11,7 @@ use caustique::estimator::InitialBandwidth;
 use caustique::light::Emitter;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
+use caustique::plan::ClassSet;
 use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
@@ -73,7 +74,14 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
     let interior = Interior::at(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons };
+    let eye = Eye {
+        scene,
+        camera: &camera,
+        interior,
+        max_depth: u32::MAX,
+        indirect: Indirect::Photons,
+        classes: ClassSet::ALL,
+    };
     (0..seeds)
         .map(|seed| {
             let mut sum = 0.0;

@@ -15,6 +15,7 @@ use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::medium::{Flight, HenyeyGreenstein};
 use caustique::photon::PhotonMap;
+use caustique::plan::ClassSet;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
@@ -434,7 +435,14 @@ struct Tally {
 fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let surroundings = Surroundings::new(scene, camera.position());
-    let eye = Eye { scene, camera: &camera, interior: surroundings.eye, max_depth: 12, indirect: Indirect::Photons };
+    let eye = Eye {
+        scene,
+        camera: &camera,
+        interior: surroundings.eye,
+        max_depth: 12,
+        indirect: Indirect::Photons,
+        classes: ClassSet::ALL,
+    };
     let pixels = (SIZE * SIZE) as f32;
     let strategies = Strategies::vcm(true);
     let shared =

@@ -60,9 +60,10 @@ fn report(args: &PlanArgs) -> Result<()> {
     let camera = loaded.scene.camera(&view)?;
     let free = Free { photons: false, neighbours: false };
     let max_depth = args.max_depth.unwrap_or(u32::MAX);
+    let classes = args.scene.switches().classes();
     // As a render does that combines levels.
     let make = |way| {
-        let settings = Settings { max_depth, ..Settings::of(way) };
+        let settings = Settings { max_depth, classes, ..Settings::of(way) };
         (settings.levels.count > 1).then_some(settings)
     };
     let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();

@@ -3,8 +3,8 @@
 use super::number::{finite, not_negative, rgb};
 use super::say;
 use caustique::error::{Error, Kind, Result};
+use caustique::plan::Switches;
 use caustique::plan::switch::{self, Removed};
-use caustique::plan::{Effect, Switches};
 use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Scene, environment_file, gltf};
 use clap::ValueEnum;
@@ -36,8 +36,9 @@ pub struct SceneArgs {
     /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light, and says so
     #[arg(long, value_enum, default_value_t = Glass::Auto)]
     pub glass: Glass,
-    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: dispersion, volume (or medium), depth_of_field,
-    /// environment, alpha (cut-outs), textures. 'caustique plan' lists what a scene calls for [default: all that it calls for]
+    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: classes of light paths (emission, direct, indirect, glossy,
+    /// caustic, sds), and dispersion, volume (or medium), depth_of_field, environment, alpha (cut-outs), textures. 'caustique plan' lists what a
+    /// scene calls for [default: all that it calls for]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
     pub effects: Option<Switches>,
     /// Take anything in the scene that is ignored or approximated as an error
@@ -99,13 +100,6 @@ pub struct Loaded {
 /// Reads and builds the scene, with the environment that the options ask for, without the effects that they switch off.
 pub fn read(args: &SceneArgs, threads: usize) -> Result<Loaded> {
     let off = args.switches().off;
-    if let Some(class) = off.classes().iter().next() {
-        let properties: Vec<&str> =
-            Effect::ALL.into_iter().filter(|effect| !effect.is_class()).map(Effect::name).collect();
-        let cause = format!("'{}', a class of light paths, cannot be switched off yet", class.name());
-        return Err(Error::new(Kind::Usage, "--effects", cause)
-            .hint(format!("those that can be switched off are {}", properties.join(", "))));
-    }
     let mut description = gltf::read(&args.path, &args.read_options())?;
     environment(&mut description, args)?;
     let removed = switch::off(&mut description, off);

@@ -12,8 +12,9 @@
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
 use crate::estimator::rule::volume::level_factor;
-use crate::estimator::{Pixel, SquaredError};
+use crate::estimator::{Parts, Pixel, SquaredError};
 use crate::math::{DVec3, Vec3};
+use crate::plan::{ClassSet, Part};
 use rayon::prelude::*;
 
 /// Depth of the background.
@@ -36,6 +37,8 @@ pub struct Shape {
     pub radius2_factor: f64,
     /// Whether an environment light can be seen.
     pub environment: bool,
+    /// Classes of light paths that are looked for: a part of the picture without any has no layer.
+    pub classes: ClassSet,
     /// Whether media scatter.
     pub volume: bool,
     /// Where photons are gathered in media: bandwidth there of the last iteration over that of the first.
@@ -44,6 +47,9 @@ pub struct Shape {
 
 /// Values of one layer at one pixel, as many as it has components.
 type Get = Box<dyn Fn(&Pixel) -> [f32; 4] + Sync>;
+
+/// One of the additive parts.
+type OfParts = fn(&Parts) -> DVec3;
 
 /// A layer to be made.
 struct Column {
@@ -77,7 +83,8 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, volume, volume_radius_factor } = *shape;
+    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, classes, volume, volume_radius_factor } =
+        *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
@@ -104,14 +111,16 @@ fn columns(shape: &Shape) -> Vec<Column> {
         let factor = factor as f32 * level_factor(level, levels);
         columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", move |p| p.volume_bandwidth * factor));
     }
-    columns.extend([
-        Column::rgb("Direct", |p| mean(p.parts.direct, p.iterations)),
-        Column::rgb("Indirect", |p| mean(p.parts.indirect, p.iterations)),
-        Column::rgb("Caustic", |p| mean(p.parts.caustic, p.iterations)),
-        Column::rgb("Emission", |p| mean(p.parts.emission, p.iterations)),
-    ]);
-    if volume {
-        columns.push(Column::rgb("Volume", |p| mean(p.parts.volume, p.iterations)));
+    let parts: [(Part, &str, OfParts); 5] = [
+        (Part::Direct, "Direct", |parts| parts.direct),
+        (Part::Indirect, "Indirect", |parts| parts.indirect),
+        (Part::Caustic, "Caustic", |parts| parts.caustic),
+        (Part::Emission, "Emission", |parts| parts.emission),
+        (Part::Volume, "Volume", |parts| parts.volume),
+    ];
+    let present = |part: Part| classes.has_part(part) && (part != Part::Volume || volume);
+    for (_, name, get) in parts.into_iter().filter(|(part, ..)| present(*part)) {
+        columns.push(Column::rgb(name, move |p| mean(get(&p.parts), p.iterations)));
     }
     columns.extend([
         Column::rgb("Error", move |p| match SquaredError::of(p, own, compared) {
@@ -201,6 +210,7 @@ mod tests {
         bandwidths: true,
         radius2_factor: 0.25,
         environment: false,
+        classes: ClassSet::ALL,
         volume: true,
         volume_radius_factor: Some(0.5),
     };

@@ -1,5 +1,6 @@
 //! The effects by name, and sets of them.
 
+use super::class::ClassSet;
 use serde::{Serialize, Serializer};
 use std::str::FromStr;
 
@@ -12,7 +13,7 @@ pub enum Effect {
     Direct,
     /// Light that surfaces have scattered before.
     Indirect,
-    /// Narrow lobes: what shines and reflects.
+    /// Narrow lobes: what shines and reflects, but for perfect mirrors and clear glass, and for caustics.
     Glossy,
     /// Light that mirrors and glass have focused.
     Caustic,
@@ -133,6 +134,13 @@ pub struct Switches {
     pub off: EffectSet,
     /// Asked for by name; the plan has everything that the scene calls for, so this only asserts it.
     pub on: EffectSet,
+}
+
+impl Switches {
+    /// Classes of light paths that are left. The other effects switched off are gone from the scene itself.
+    pub fn classes(self) -> ClassSet {
+        ClassSet::without(self.off.classes())
+    }
 }
 
 impl FromStr for Switches {

@@ -1,9 +1,10 @@
 //! The plan of a render: which effects the scene calls for, because of what, which are simulated and how, and what looks like a mistake.
 //!
-//! `presence` says what the scene calls for, `search` what a method finds of it, [`switch`] leaves out what the user does without, `diagnosis` says why
+//! [`PathClass`] is the class of a light path, and [`Search::owner`] says who brings its light. `presence` says what the scene calls for, `search` what a method finds of it, [`switch`] leaves out what the user does without, `diagnosis` says why
 //! something may be missing that was hoped for. None of it traces a path: what effects weigh and cost is measured by a pilot, which fills
 //! the figures of [`EffectPlan`].
 
+mod class;
 mod diagnosis;
 mod effect;
 mod names;
@@ -11,9 +12,10 @@ mod presence;
 mod search;
 pub mod switch;
 
+pub use class::{Beam, ClassSet, Event, Part, PathClass, Sight};
 pub use effect::{Effect, EffectSet, Switches};
 pub use presence::Presence;
-pub use search::Search;
+pub use search::{Owner, Search};
 
 use crate::camera::Camera;
 use crate::scene::Scene;
@@ -56,8 +58,6 @@ pub struct Plan {
     /// What is missing from the picture and what may be a mistake in the scene, each with a remedy. What reading the scene has found is in
     /// [`Scene::warnings`].
     pub warnings: Vec<String>,
-    #[serde(skip)]
-    off: EffectSet,
 }
 
 /// What a plan is made for.
@@ -119,18 +119,12 @@ impl Plan {
             because: asked.because.into(),
             effects,
             warnings,
-            off: asked.switches.off,
         }
     }
 
     /// One of the effects.
     pub fn effect(&self, effect: Effect) -> &EffectPlan {
         &self.effects[effect as usize]
-    }
-
-    /// Classes of light paths that the user does without. The other effects switched off are gone from the scene itself.
-    pub fn classes_off(&self) -> EffectSet {
-        self.off.classes()
     }
 }
 

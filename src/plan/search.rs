@@ -1,5 +1,6 @@
 //! How a method looks for light, as far as that decides which effects it finds.
 
+use super::class::{ClassSet, PathClass};
 use super::effect::Effect;
 
 /// Kinds of methods.
@@ -23,7 +24,45 @@ pub enum Search {
     ConnectionsAndMerging,
 }
 
+/// Who brings the light of a class: one technique, or several whose weights sum to one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Owner {
+    /// Eye paths that run into lights.
+    Hits,
+    /// Connections to lights, and eye paths that run into them.
+    Lit,
+    /// Photons, gathered or merged.
+    Photons,
+    /// Light paths, connected to the camera.
+    LightPaths,
+    /// Eye and light paths connected in all ways, and merged where the method merges.
+    Connections,
+}
+
 impl Search {
+    /// The one who brings the light of a class; `None`: nobody does.
+    pub fn owner(self, class: PathClass) -> Option<Owner> {
+        use PathClass as C;
+        Some(match (self, class) {
+            // No other technique can find these.
+            (_, C::Emission | C::Coat) => Owner::Hits,
+            (Search::EyePaths, _) => Owner::Lit,
+            (Search::LightPaths, _) => Owner::LightPaths,
+            (Search::Connections | Search::ConnectionsAndMerging, _) => Owner::Connections,
+            (Search::Merging, C::Single | C::Volume) | (Search::Map, C::Volume) => return None,
+            (Search::Merging, _) => Owner::Photons,
+            (_, C::Direct | C::Highlight | C::Reflection | C::ReflectedDirect | C::Single) => Owner::Lit,
+            (Search::Map | Search::Photons, _) => Owner::Photons,
+            (Search::PathsAndPhotons, C::Indirect | C::ReflectedIndirect) => Owner::Lit,
+            (Search::PathsAndPhotons, _) => Owner::Photons,
+        })
+    }
+
+    /// The classes that someone brings.
+    pub fn owned_by(self, owner: Owner) -> ClassSet {
+        PathClass::ALL.into_iter().filter(|class| self.owner(*class) == Some(owner)).collect()
+    }
+
     /// Whether it finds all light of an effect. A light without size is hit by no path: without photons it shows no light behind glass, where it
     /// could be neither connected to nor run into.
     pub(super) fn finds(self, effect: Effect, sizeless_lights: bool, media_scatter: bool) -> bool {

@@ -89,6 +89,7 @@ impl<'a> Passes<'a> {
             interior: surroundings.eye,
             max_depth: settings.max_depth,
             indirect: Indirect::Photons,
+            classes: settings.classes,
         };
         let shared = settings.method.strategies(camera).map(|strategies| Bidirectional {
             eye,
@@ -125,6 +126,7 @@ impl<'a> Passes<'a> {
             interior: self.surroundings.eye,
             max_depth: self.settings.max_depth,
             indirect: Indirect::Photons,
+            classes: self.settings.classes,
         }
     }
 

@@ -3,6 +3,7 @@
 use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, RadiusRule};
 use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
+use crate::plan::Search;
 use crate::transport::Strategies;
 use serde::Serialize;
 
@@ -47,6 +48,19 @@ impl Method {
             Method::Cppm => "cppm",
             Method::Bpm => "bpm",
             Method::Vcm => "vcm",
+        }
+    }
+
+    /// How it looks for light, where photons bring all indirect light.
+    pub fn search(self) -> Search {
+        match self {
+            Method::Path => Search::EyePaths,
+            Method::Light => Search::LightPaths,
+            Method::Bdpt => Search::Connections,
+            Method::Pm => Search::Map,
+            Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => Search::Photons,
+            Method::Bpm => Search::Merging,
+            Method::Vcm => Search::ConnectionsAndMerging,
         }
     }
 

@@ -38,6 +38,7 @@ pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::
         bandwidths: settings.method.has_bandwidths(),
         radius2_factor: radius2_factor(last, settings.alpha),
         environment: present.environment,
+        classes: settings.classes,
         volume: present.volume,
         volume_radius_factor: (present.volume && settings.method.gathers())
             .then(|| radius_factor(last, settings.volume_alpha)),

@@ -97,6 +97,7 @@ impl<'a> Pm<'a> {
             interior: surroundings.eye,
             max_depth: settings.max_depth,
             indirect: Indirect::Photons,
+            classes: settings.classes,
         };
         Pm { eye, settings, surroundings, map: None }
     }
@@ -104,7 +105,8 @@ impl<'a> Pm<'a> {
     fn build(&self, phases: &mut Phases) -> (PhotonMap, u32) {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
-        let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth);
+        let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
+            .wanting(self.settings.of_photons(self.eye.scene), Indirect::Photons);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
         let (photons, traced) = trace(self.eye.scene, self.surroundings, &pass, most);
         phases.light += cpu_seconds() - start;

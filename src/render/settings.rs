@@ -8,6 +8,8 @@ use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
 #[cfg(doc)]
 use crate::photon::kernel;
+use crate::plan::{ClassSet, Effect, EffectSet, Owner, Search};
+use crate::scene::Scene;
 use crate::transport::{Indirect, MAX_LEVELS};
 
 /// Iterations when no stop condition is given.
@@ -89,6 +91,8 @@ pub struct Settings {
     pub photon_memory: u64,
     /// What [`Method::Sppm`]'s photons bring: all indirect light, or caustics alone.
     pub indirect: Indirect,
+    /// Classes of light paths to be found.
+    pub classes: ClassSet,
     /// Light paths start toward what makes caustics, where a pilot has found them to matter. The methods that count photons have none of it.
     pub guided: bool,
     /// Bandwidth levels.
@@ -129,6 +133,7 @@ impl Default for Settings {
             photons: DEFAULT_PHOTONS,
             photon_memory: DEFAULT_MAP_MEMORY,
             indirect: Indirect::Photons,
+            classes: ClassSet::ALL,
             guided: false,
             levels: Levels::new(5),
             techniques: false,
@@ -167,6 +172,20 @@ impl Settings {
             alpha: method.alpha(),
             ..Settings::default()
         }
+    }
+
+    /// How it looks for light.
+    pub fn search(&self) -> Search {
+        match (self.method, self.indirect) {
+            (Method::Sppm, Indirect::Paths) => Search::PathsAndPhotons,
+            (method, _) => method.search(),
+        }
+    }
+
+    /// Classes of light that photons are to bring to eye paths that gather them.
+    pub fn of_photons(&self, scene: &Scene) -> ClassSet {
+        let off = if scene.survey.scattering() { EffectSet::NONE } else { EffectSet::from_iter([Effect::Volume]) };
+        self.search().owned_by(Owner::Photons) & self.classes & ClassSet::without(off)
     }
 
     /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any order.

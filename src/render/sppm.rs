@@ -156,8 +156,10 @@ impl<'a> Sppm<'a> {
             interior: surroundings.eye,
             max_depth: settings.max_depth,
             indirect: settings.indirect,
+            classes: settings.classes,
         };
-        let guide = settings.guided.then(|| learnt(&eye, surroundings, settings)).flatten();
+        let guided = settings.guided && !settings.of_photons(scene).is_empty();
+        let guide = guided.then(|| learnt(&eye, surroundings, settings)).flatten();
         Sppm { eye, settings, surroundings, guide, later2: f32::INFINITY }
     }
 
@@ -175,7 +177,9 @@ impl<'a> Sppm<'a> {
             let start = cpu_seconds();
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
-            let pass = pass.with(Comb::new(seed, i));
+            let pass =
+                pass.with(Comb::new(seed, i)).wanting(self.settings.of_photons(self.eye.scene), Indirect::Photons);
+            let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(0..each, |arena, index, photons| {
                     flux.light_path(self.eye.scene, arena, self.surroundings, &pass, index, photons);
@@ -200,13 +204,14 @@ impl<'a> Sppm<'a> {
     /// The photons of an iteration.
     pub fn map(&self, i: u64, phases: &mut Phases) -> (Maps, Work) {
         let t0 = cpu_seconds();
-        let photons = trace_photons(self.eye.scene, self.surroundings, &self.light_pass(i, Domain::Light));
+        let pass = self.light_pass(i, Domain::Light);
+        let photons = trace_photons(self.eye.scene, self.surroundings, &pass);
         let t1 = cpu_seconds();
         let maps = self.build(photons, i);
         phases.light += t1 - t0;
         phases.map += cpu_seconds() - t1;
         let photons = maps.len();
-        (maps, Work { light_paths: u64::from(self.settings.photons), photons })
+        (maps, Work { light_paths: u64::from(pass.paths()), photons })
     }
 
     /// Maps of the photons of iteration `i`.
@@ -220,7 +225,7 @@ impl<'a> Sppm<'a> {
         let Settings { seed, photons, max_depth, .. } = *self.settings;
         LightPass::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
-            .caustics_only(self.settings.indirect == Indirect::Paths)
+            .wanting(self.settings.of_photons(self.eye.scene), self.settings.indirect)
             .with(Comb::new(seed, i))
     }
 }

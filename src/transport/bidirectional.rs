@@ -11,6 +11,7 @@ use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::medium::HenyeyGreenstein;
+use crate::plan::{Beam, ClassSet, Event, Sight};
 
 /// Which strategies take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,6 +154,8 @@ pub struct LightVertex<'s> {
     pub depth: u32,
     /// Partial sums of the weights.
     pub mis: MisState,
+    /// What has happened on the way here.
+    pub beam: Beam,
     /// The path has taken a wavelength, the one its eye path takes if it does.
     pub dispersed: bool,
 }
@@ -191,11 +194,26 @@ impl LightVertex<'_> {
         }
     }
 
+    /// Its lobes that are not delta.
+    #[inline]
+    pub fn smooth(&self) -> LobeSet {
+        match &self.scatterer {
+            Scatterer::Surface(_, shading) => shading.bsdf.lobes() & LobeSet::SMOOTH,
+            Scatterer::Medium(..) => LobeSet::BROAD,
+        }
+    }
+
     /// Scattering of its light into `wi` times the cosine, and the density of drawing `wi`.
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3) -> (Rgb, f32) {
+        self.evaluate_set_cos(wi, LobeSet::ALL)
+    }
+
+    /// The same of some lobes; a medium has but one.
+    #[inline]
+    pub fn evaluate_set_cos(&self, wi: Vec3, set: LobeSet) -> (Rgb, f32) {
         match &self.scatterer {
-            Scatterer::Surface(_, shading) => shading.evaluate_cos(wi, Transport::Importance, LobeSet::ALL),
+            Scatterer::Surface(_, shading) => shading.evaluate_cos(wi, Transport::Importance, set),
             Scatterer::Medium(_, phase) => {
                 let f = phase.pdf_w(self.wo, wi);
                 (Rgb::splat(f), f)
@@ -213,106 +231,57 @@ impl LightVertex<'_> {
     }
 }
 
-/// Part of the picture that some light belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Emitters seen directly or through perfect mirrors and clear glass.
-    Emission,
-    /// Light from lights at the first vertex that scatters otherwise.
-    Direct,
-    /// Light focused by mirrors and glass on to that vertex.
-    Caustic,
-    /// Everything else from surfaces.
-    Indirect,
-    /// Light whose first vertex that is not clear, seen from the eye, is in a medium.
-    Volume,
-}
-
-/// Where on its way an eye path is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// Nothing so far but perfect mirrors and clear glass.
-    Clear,
-    /// The last vertex was the first that scatters otherwise.
-    First,
-    /// Beyond.
-    Later,
-}
-
-/// What decides to which part the light of an eye path belongs.
+/// What decides which class the light of an eye path is of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trail {
-    stage: Stage,
+    /// What has happened up to the last vertex.
+    pub sight: Sight,
+    /// Lobes of the last vertex; `None` in a medium.
+    lobes: Option<LobeSet>,
     /// Length of the path so far.
     pub length: f32,
-    /// The first vertex that is not clear scattered broadly, all later ones did not.
-    focus: bool,
-    /// The first vertex that is not clear is in a medium.
-    volume: bool,
     /// All vertices scattered by delta lobes.
     pub delta: bool,
 }
 
 impl Trail {
-    pub const START: Trail = Trail { stage: Stage::Clear, length: 0.0, focus: false, volume: false, delta: true };
+    pub const START: Trail = Trail { sight: Sight::START, lobes: None, length: 0.0, delta: true };
 
     /// The last vertex sent the path on by `lobe`.
     #[inline]
     pub fn scattered(&mut self, lobe: LobeSet) {
         self.delta &= lobe == LobeSet::DELTA;
-        match self.stage {
-            Stage::Clear => {}
-            Stage::First => self.focus = lobe == LobeSet::BROAD,
-            Stage::Later => self.focus &= lobe != LobeSet::BROAD,
-        }
-    }
-
-    /// An emitter is run into after `lobe` (`None`: by the first segment).
-    #[inline]
-    pub fn hit(&self, lobe: Option<LobeSet>) -> Part {
-        match (self.stage, lobe) {
-            (Stage::Clear, _) => Part::Emission,
-            _ if self.volume => Part::Volume,
-            (Stage::First, Some(lobe)) if lobe != LobeSet::DELTA => Part::Direct,
-            (Stage::Later, _) if self.focus => Part::Caustic,
-            _ => Part::Indirect,
-        }
-    }
-
-    /// Light at this vertex straight from a light.
-    #[inline]
-    pub fn next_event(&self, in_medium: bool) -> Part {
-        if self.stage == Stage::Clear && !in_medium { Part::Direct } else { self.connect(in_medium) }
-    }
-
-    /// Light at this vertex from vertices of light paths.
-    #[inline]
-    pub fn connect(&self, in_medium: bool) -> Part {
-        if self.volume || (in_medium && self.stage == Stage::Clear) { Part::Volume } else { Part::Indirect }
+        self.sight = self.sight.then(self.lobes.map_or(Event::Medium, |lobes| Event::of(lobe, lobes)));
     }
 
     /// No vertex before this one scatters but by mirrors and clear glass.
     #[inline]
     pub fn is_clear(&self) -> bool {
-        self.stage == Stage::Clear
+        self.sight.is_clear()
     }
 
-    /// Leaves a vertex, which has lobes that are not delta if `smooth`.
+    /// Leaves a vertex with some lobes; `None`: in a medium.
     #[inline]
-    pub fn leave(&mut self, smooth: bool) {
-        self.stage = match self.stage {
-            Stage::Clear if !smooth => Stage::Clear,
-            Stage::Clear => Stage::First,
-            _ => Stage::Later,
-        };
+    pub fn leave(&mut self, lobes: Option<LobeSet>) {
+        self.lobes = lobes;
     }
 
-    /// Leaves a vertex in a medium.
+    /// Whether going on from the last vertex can come to light of a class that is wanted.
     #[inline]
-    pub fn leave_medium(&mut self) {
-        self.volume |= self.stage == Stage::Clear;
-        self.leave(true);
+    pub fn leads(&self, on: ClassSet) -> bool {
+        on.is_all()
+            || match self.lobes {
+                None => !(self.sight.then(Event::Medium).ahead() & on).is_empty(),
+                Some(lobes) => leads(self.sight, lobes, lobes, on),
+            }
     }
+}
+
+/// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
+pub(super) fn leads(sight: Sight, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
+    let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
+    let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).ahead() & on).is_empty();
+    each.filter(|lobe| set.has(*lobe)).any(ahead)
 }
 
 /// Bandwidths of the levels of one eye path, ascending, with their etas.

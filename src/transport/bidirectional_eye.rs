@@ -1,10 +1,11 @@
 //! Eye paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass before.
 
-use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Technique, Trail};
+use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Technique, Trail};
 use super::bidirectional_light::{add, scatter};
-use super::eye::{EyeMeasure, Features, FirstHit};
+use super::eye::{Eye, EyeMeasure, Features, FirstHit};
 use super::mis::{self, End, MisState, Ratios};
 use super::photon_merge::{MergePhoton, merge_photons};
+use super::shares::{connected, shares, wanted};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
@@ -12,6 +13,7 @@ use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::photon::PhotonMap;
+use crate::plan::{Beam, Part, PathClass};
 use crate::random::{Purpose, Stream, mix};
 use bumpalo::Bump;
 
@@ -77,16 +79,20 @@ pub(super) fn look_in_medium(
 
 impl<R: Record> EyeWalk<'_, R> {
     #[inline]
-    fn add(&mut self, technique: Technique, part: Part, value: Rgb, ratios: Ratios) {
+    fn add(&mut self, technique: Technique, class: PathClass, value: Rgb, ratios: Ratios) {
         for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
             self.record.arrival(technique, level, value, ratios.weight(eta));
         }
-        add(&mut self.measure, self.meets.levels, part, value, ratios);
+        add(&mut self.measure, self.meets.levels, class, value, ratios);
     }
 
     /// The path has run into a light that sends it `value`.
     #[inline]
-    fn run_into(&mut self, value: Rgb, depth: u32, at: Vec3, scattered: Option<Scattered>, density: &EmissionDensity) {
+    fn run_into(&mut self, value: Rgb, depth: u32, at: Vec3, density: &EmissionDensity) {
+        let class = self.trail.sight.lit(false);
+        if !self.shared.eye.classes.has(class) {
+            return;
+        }
         let ratios = if self.trail.delta {
             Ratios::ALONE
         } else if self.shared.strategies.connect {
@@ -95,13 +101,16 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         };
         self.record.contribution(Technique::Hit { eye: depth }, value, at, ratios);
-        self.add(Technique::Hit { eye: self.depth }, self.trail.hit(scattered.map(|s| s.lobe)), value, ratios);
+        self.add(Technique::Hit { eye: self.depth }, class, value, ratios);
     }
 
     #[inline]
     fn next_event<S: Site>(&mut self, vertex: &S) {
-        let scene = self.shared.eye.scene;
-        let draws = vertex.draws();
+        let Eye { scene, classes, .. } = self.shared.eye;
+        let (draws, seen) = (vertex.draws(), (self.trail.sight, Beam::start(false)));
+        if !wanted(vertex, seen.0, seen.1, classes) {
+            return;
+        }
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) =
             scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
@@ -123,7 +132,9 @@ impl<R: Record> EyeWalk<'_, R> {
         let ratios = mis::next_event(&self.mis, (onward, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
         let (technique, at) = (Technique::NextEvent { eye: vertex.depth() }, light.target.unwrap_or(light.wi));
         self.record.contribution(technique, value, at, ratios);
-        self.add(technique, self.trail.next_event(S::IN_MEDIUM), value * way.left, ratios);
+        for (class, share) in shares(vertex, seen, (light.wi, Transport::Radiance, f), classes).iter() {
+            self.add(technique, class, value * way.left * share, ratios);
+        }
     }
 
     #[inline]
@@ -137,6 +148,10 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
+        let shares = || connected(vertex, light, self.trail.sight, (d, f_eye, f_light), eye.classes);
+        if !eye.classes.is_all() && shares().is_empty() {
+            return;
+        }
         let mut value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
             value *= wavelength.once();
@@ -167,7 +182,9 @@ impl<R: Record> EyeWalk<'_, R> {
         );
         let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
         self.record.contribution(technique, value, light.p(), ratios);
-        self.add(technique, self.trail.connect(S::IN_MEDIUM), value * way.left, ratios);
+        for (class, share) in shares().iter() {
+            self.add(technique, class, value * way.left * share, ratios);
+        }
     }
 
     /// Next-event estimation and connections.
@@ -192,7 +209,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         if let Some((radiance, density)) =
             eye.scene.lights.emitted(&eye.scene.materials, &self.last, vertex.surface, vertex.wo)
         {
-            self.run_into(vertex.throughput * radiance, vertex.depth, vertex.surface.p, scattered, &density);
+            self.run_into(vertex.throughput * radiance, vertex.depth, vertex.surface.p, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
         if smooth && vertex.depth < eye.max_depth {
@@ -200,25 +217,25 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
                 self.connect_all(vertex);
             }
             if let (true, Some(photons)) = (strategies.eye_merges(vertex.depth), self.meets.photons) {
-                let (measure, clear) = (&mut self.measure, self.trail.is_clear());
-                let volume = self.trail.connect(false) == Part::Volume;
+                let measure = &mut self.measure;
                 let longest = eye.max_depth - vertex.depth;
-                let add = |photon: &MergePhoton, level: usize, radiance: Rgb| {
-                    if volume {
-                        measure.volume_photons[level] += radiance;
-                    } else if clear && photon.depth == 1 {
+                let add = |class: PathClass, level: usize, radiance: Rgb| {
+                    *match class.part() {
+                        Part::Volume => &mut measure.volume_photons[level],
                         // Only where all is merged, which has one level.
-                        measure.direct += radiance;
-                    } else if photon.caustic {
-                        measure.caustic_photons[level] += radiance;
-                    } else {
-                        measure.indirect_photons[level] += radiance;
-                    }
+                        Part::Emission | Part::Direct => &mut measure.direct,
+                        Part::Caustic => &mut measure.caustic_photons[level],
+                        Part::Indirect => &mut measure.indirect_photons[level],
+                    } += radiance;
                 };
-                merge_photons(photons, self.meets.levels, vertex, &self.mis, longest, self.record, add);
+                let seen = (&self.mis, self.trail.sight, eye.classes);
+                merge_photons(photons, self.meets.levels, vertex, seen, longest, self.record, add);
             }
         }
-        self.trail.leave(smooth);
+        self.trail.leave(Some(vertex.shading.bsdf.lobes()));
+        if !self.trail.leads(eye.classes) {
+            return Next::Stop;
+        }
         self.last = vertex.receiver();
         // Without connections and merging only what mirrors and clear glass show is left to find.
         Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
@@ -239,7 +256,10 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         if strategies.connect && vertex.depth < eye.max_depth {
             self.connect_all(vertex);
         }
-        self.trail.leave_medium();
+        self.trail.leave(None);
+        if !self.trail.leads(eye.classes) {
+            return Next::Stop;
+        }
         self.last = vertex.receiver();
         // As on surfaces: only mirrors and clear glass show what light tracing does not find.
         if strategies.connect || strategies.merge { Next::Continue(LobeSet::ALL) } else { Next::Stop }
@@ -261,7 +281,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
         lights.escape(&last, direction, |radiance, direct, start| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
-            self.run_into(throughput * radiance, 0, direction, scattered, &density);
+            self.run_into(throughput * radiance, 0, direction, &density);
         });
     }
 }

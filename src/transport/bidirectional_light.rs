@@ -1,16 +1,18 @@
 //! Light paths of the bidirectional methods: what one leaves behind.
 
-use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Scatterer, Technique};
+use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Technique};
 use super::eye::EyeMeasure;
 use super::light::LightPass;
 use super::mis::{self, MisState, Ratios};
 use super::photon_merge::MergePhoton;
+use super::shares::{shares, wanted};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, is_lit};
 use crate::medium::Flight;
+use crate::plan::{Beam, Event, Part, PathClass, Sight};
 use crate::random::Purpose;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
@@ -20,8 +22,8 @@ pub struct Splat {
     pub pixel: u32,
     /// Depth of the light path's vertex.
     pub light: u32,
-    /// Where it belongs.
-    pub part: Part,
+    /// What it is.
+    pub class: PathClass,
     /// Radiance of the pixel, unweighted.
     pub value: Rgb,
     /// What its weight comes from.
@@ -32,14 +34,14 @@ impl Splat {
     /// Adds the weighted light to the pixel's measure.
     #[inline]
     pub fn apply(&self, levels: &MergeLevels, measure: &mut EyeMeasure) {
-        add(measure, levels, self.part, self.value, self.ratios);
+        add(measure, levels, self.class, self.value, self.ratios);
     }
 }
 
 /// Adds light to all levels of a measure, each with its own weight.
 #[inline]
-pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, part: Part, value: Rgb, ratios: Ratios) {
-    let into = match part {
+pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
+    let into = match class.part() {
         // Neither can be merged before its first vertex, so no eta is in their weights.
         Part::Emission => return measure.emission += value * ratios.weight(levels.eta()[0]),
         Part::Direct => return measure.direct += value * ratios.weight(levels.eta()[0]),
@@ -70,7 +72,9 @@ struct LightWalk<'a, 's, R> {
     /// Where it comes from.
     light: u32,
     infinite: bool,
-    caustic: bool,
+    beam: Beam,
+    /// Lobes of the last vertex; `None` in a medium.
+    lobes: Option<LobeSet>,
     photons_only: bool,
     vertices: &'a mut LightVertices<'s>,
     left: &'a mut Left,
@@ -80,6 +84,9 @@ struct LightWalk<'a, 's, R> {
 impl<R: Record> LightWalk<'_, '_, R> {
     #[inline]
     fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
+        if let Some(scattered) = scattered {
+            self.beam = self.beam.then(self.lobes.map_or(Event::Medium, |lobes| Event::of(scattered.lobe, lobes)));
+        }
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
         if scattered.is_none() {
@@ -90,7 +97,10 @@ impl<R: Record> LightWalk<'_, '_, R> {
 
     fn connect_camera<S: Site>(&mut self, vertex: &S) {
         let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
-        let draws = vertex.draws();
+        let (draws, seen) = (vertex.draws(), (Sight::START, self.beam));
+        if !wanted(vertex, seen.0, seen.1, eye.classes) {
+            return;
+        }
         let Some(sample) = eye.camera.sample(vertex.p(), draws.two(Purpose::Lens)) else { return };
         let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Importance, LobeSet::ALL);
         // Density of the rays of one pixel.
@@ -116,13 +126,10 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if value.max_element() > 0.0 {
             let (width, height) = eye.camera.size();
             let (x, y) = ((sample.film.x as u32).min(width - 1), (sample.film.y as u32).min(height - 1));
-            let part = match (vertex.depth(), self.caustic) {
-                _ if S::IN_MEDIUM => Part::Volume,
-                (1, _) => Part::Direct,
-                (_, true) => Part::Caustic,
-                _ => Part::Indirect,
-            };
-            self.left.splats.push(Splat { pixel: y * width + x, light: vertex.depth(), part, value, ratios });
+            let (pixel, light) = (y * width + x, vertex.depth());
+            let shares = shares(vertex, seen, (sample.wi, Transport::Importance, f), eye.classes);
+            let splat = |(class, share)| Splat { pixel, light, class, value: value * share, ratios };
+            self.left.splats.extend(shares.iter().map(splat));
         }
     }
 }
@@ -131,9 +138,6 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, merged_paths, .. } = self.shared;
-        if let Some(scattered) = scattered {
-            self.caustic &= scattered.lobe != LobeSet::BROAD;
-        }
         self.arrive(
             &vertex.receiver(),
             vertex.distance,
@@ -142,10 +146,11 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
             scattered,
         );
         let lobes = vertex.shading.bsdf.lobes();
+        self.lobes = Some(lobes);
         // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders of materials.
         if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
             let flux = vertex.throughput / *merged_paths;
-            self.left.photons.push(MergePhoton::new(vertex, flux, self.caustic, &self.mis));
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.beam, &self.mis));
         }
         if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
@@ -155,6 +160,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     throughput: vertex.throughput,
                     depth: vertex.depth,
                     mis: self.mis,
+                    beam: self.beam,
                     dispersed: vertex.wavelength.is_some(),
                 });
             }
@@ -168,9 +174,8 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, .. } = self.shared;
-        // What has come through a medium is no caustic's any more.
-        self.caustic = false;
         self.arrive(&vertex.receiver(), vertex.met.distance, 1.0, vertex.flight, scattered);
+        self.lobes = None;
         if !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
                 self.vertices.push(LightVertex {
@@ -179,6 +184,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     throughput: vertex.throughput,
                     depth: vertex.depth,
                     mis: self.mis,
+                    beam: self.beam,
                     dispersed: vertex.wavelength.is_some(),
                 });
             }
@@ -239,7 +245,8 @@ impl<'s> Bidirectional<'s> {
             mis: MisState::light(&emitted.density),
             light: emitted.light,
             infinite: emitted.density.infinite,
-            caustic: true,
+            beam: Beam::start(emitted.delta),
+            lobes: None,
             photons_only,
             vertices,
             left,

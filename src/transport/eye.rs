@@ -13,6 +13,7 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
+use super::bidirectional::leads;
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
@@ -27,6 +28,7 @@ use crate::light::Receiver;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::photon::{Kernel, Near, Photon, PhotonMap, VolumePhoton};
+use crate::plan::{Beam, ClassSet, Event, Part, Sight};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::spectrum::{Hue, Wavelength};
@@ -183,17 +185,6 @@ impl EyeMeasure {
 /// Least probability of going on with either set of lobes where there are two.
 const LEAST_CHANCE: f32 = 0.1;
 
-/// Where on its way an eye path is: decides to which layer light belongs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// Nothing so far but perfect mirrors and clear glass.
-    Clear,
-    /// The last vertex was the first that scatters otherwise.
-    First,
-    /// Beyond.
-    Later,
-}
-
 /// Who brings light that has been scattered broadly before the eye path's first broad bounce.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Indirect {
@@ -216,7 +207,11 @@ struct Gather<'a, B, K, const PATHS: bool> {
     measure: EyeMeasure,
     /// Length of the path so far.
     length: f32,
-    stage: Stage,
+    /// What has happened up to the last vertex.
+    sight: Sight,
+    /// Lobes of the last vertex.
+    lobes: LobeSet,
+    classes: ClassSet,
     /// The path has scattered broadly.
     broadly: bool,
     /// The last vertex.
@@ -232,20 +227,53 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             // A caustic.
             return;
         }
-        let arriving = throughput * radiance;
-        match (self.stage, scattered) {
-            (Stage::Clear, _) => self.measure.emission += arriving,
-            (stage, Some(s)) if !s.lobe.has(LobeSet::DELTA) => {
-                let weighted = arriving * balance(s.pdf_w, pdf_light);
-                if stage == Stage::First {
-                    self.measure.direct += weighted;
-                } else {
-                    self.measure.indirect += weighted;
-                }
-            }
-            // Behind a perfect mirror or clear glass next-event estimation cannot see it.
-            _ => self.measure.indirect += arriving,
+        let class = self.sight.lit(false);
+        if !self.classes.has(class) {
+            return;
         }
+        let arriving = throughput * radiance;
+        let weighted = match scattered {
+            Some(s) if !s.lobe.has(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
+            // Behind a perfect mirror or clear glass next-event estimation cannot see it.
+            _ => arriving,
+        };
+        *match class.part() {
+            Part::Emission => &mut self.measure.emission,
+            Part::Direct => &mut self.measure.direct,
+            _ => &mut self.measure.indirect,
+        } += weighted;
+    }
+
+    /// What has happened to a path that arrives at the next vertex.
+    #[inline]
+    fn arrived(&self, scattered: Option<Scattered>) -> Sight {
+        scattered.map_or(self.sight, |scattered| self.sight.then(Event::of(scattered.lobe, self.lobes)))
+    }
+
+    /// The lobes that are lit at a vertex, broad ones and those that the path goes on with: all, but for classes that are switched off.
+    #[inline]
+    fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
+        let on = |event: Event| self.classes.is_all() || self.classes.has(self.sight.then(event).lit(false));
+        let only = |set: LobeSet, event: Event| if on(event) { set } else { LobeSet::NONE };
+        (only(broad, Event::Broad), only(onward, Event::Sharp))
+    }
+
+    /// Whether a medium is lit.
+    #[inline]
+    fn lit_in_medium(&self, sight: Sight) -> bool {
+        self.classes.has(sight.then(Event::Medium).lit(false))
+    }
+
+    /// Whether going on by some lobes of the last vertex can come to light of a class that is wanted.
+    #[inline]
+    fn leads(&self, set: LobeSet) -> bool {
+        self.classes.is_all() || leads(self.sight, self.lobes, set, self.classes)
+    }
+
+    /// Where direct light at a vertex belongs.
+    #[inline]
+    fn direct(&mut self) -> &mut Rgb {
+        if self.sight.is_clear() { &mut self.measure.direct } else { &mut self.measure.indirect }
     }
 
     /// Direct light and photons at a vertex from which the path goes on whatever its lobes, and with which of them.
@@ -265,16 +293,17 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             };
             // What narrow lobes send on to the last broad bounce is a caustic there.
             let seen = if self.broadly { LobeSet::NONE } else { onward };
-            let sets = [(broad, tries(broad, chance)), (seen, tries(seen, 1.0 - chance))];
-            let direct = vertex.throughput * next_event(self.scene, vertex, sets);
-            if self.stage == Stage::Clear {
-                self.measure.direct += direct;
-            } else {
-                self.measure.indirect += direct;
+            let lit = self.lit_lobes(broad, seen);
+            if lit != (LobeSet::NONE, LobeSet::NONE) {
+                let sets = [(lit.0, tries(broad, chance)), (lit.1, tries(seen, 1.0 - chance))];
+                let direct = vertex.throughput * next_event(self.scene, vertex, sets);
+                *self.direct() += direct;
             }
             self.gather(vertex, broad, seen & LobeSet::SHARP);
         }
-        self.stage = if self.stage == Stage::Clear { Stage::First } else { Stage::Later };
+        if !self.leads(broad | onward) {
+            return Next::Stop;
+        }
         if vertex.draws.one(Purpose::LobeChoice) < chance {
             self.broadly = true;
             Next::Choose(broad, chance)
@@ -286,6 +315,13 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// Photons around the vertex: kernel density estimation, all levels from one query [post-reconstruction 2021, (2) and (3)].
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
+        // What a photon of caustics makes of sharp lobes is in the same class.
+        let sight = self.sight.then(Event::Broad);
+        let focused = sight.receives(Beam::FOCUSED);
+        let wanted = [Beam::SCATTERED, Beam::FOCUSED].map(|beam| self.classes.has(sight.receives(beam)));
+        if wanted == [false; 2] {
+            return;
+        }
         let mut radii = self.bandwidths.at(self.photons, vertex.surface.p, vertex.surface.ng, self.length);
         if PATHS && self.broadly {
             let largest2 = radii.radius2[radii.count.saturating_sub(1)];
@@ -316,8 +352,16 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let sums = batch.finish(&mut self.bandwidths);
         for (level, radius2) in radii.iter().enumerate() {
             let kernel = vertex.throughput * (FRAC_1_PI / radius2);
-            self.measure.indirect_photons[level] += kernel * sums[0][level];
-            self.measure.caustic_photons[level] += kernel * sums[1][level];
+            let (others, caustics) = (kernel * sums[0][level], kernel * sums[1][level]);
+            if wanted[0] {
+                self.measure.indirect_photons[level] += others;
+            }
+            if wanted[1] {
+                // Caustics that surfaces scatter on before they are seen are indirect light.
+                let caustic = !PATHS || focused.part() == Part::Caustic;
+                let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
+                into[level] += caustics;
+            }
         }
     }
 }
@@ -349,6 +393,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             self.measure.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
             self.last = Receiver::anywhere(vertex.from);
         }
+        self.sight = self.arrived(scattered);
         self.length += vertex.distance;
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, surface) {
             self.run_into(radiance, vertex.throughput, pdf, scattered);
@@ -357,13 +402,14 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let lobes = shading.bsdf.lobes();
         let smooth = lobes & LobeSet::SMOOTH;
         // Lamps and other surfaces that scatter nothing have features, too.
-        if self.stage == Stage::Clear && lobes != LobeSet::DELTA {
+        if self.sight.is_clear() && lobes != LobeSet::DELTA {
             self.measure.features = Features {
                 albedo: shading.albedo(LobeSet::ALL),
                 normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },
                 depth: self.length,
             };
         }
+        self.lobes = lobes;
         if smooth.is_empty() {
             return Next::Continue(lobes);
         }
@@ -374,16 +420,14 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         }
         if vertex.depth < self.max_depth {
             let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
-            let direct = vertex.throughput * direct_light(self.scene, vertex, broad, onward, survival);
-            if self.stage == Stage::Clear {
-                self.measure.direct += direct;
-            } else {
-                self.measure.indirect += direct;
+            let lit = self.lit_lobes(broad, onward);
+            if lit != (LobeSet::NONE, LobeSet::NONE) {
+                let direct = vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival);
+                *self.direct() += direct;
             }
             self.gather(vertex, broad, sharp);
         }
-        self.stage = if self.stage == Stage::Clear { Stage::First } else { Stage::Later };
-        Next::Continue(onward)
+        if self.leads(onward) { Next::Continue(onward) } else { Next::Stop }
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
@@ -392,14 +436,20 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             self.measure.first = vertex.met.first;
         }
         if vertex.depth < self.max_depth {
-            let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
+            let sight = self.arrived(scattered);
+            let lit = self.lit_in_medium(sight);
+            let direct = if lit {
+                vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0)
+            } else {
+                Rgb::ZERO
+            };
             let longest = self.max_depth - vertex.depth;
             let medium = vertex.medium_id(self.scene);
             let gather = |volume: Volume<'_>| volume.gather(self.kernel, self.near_volume, vertex, medium, longest);
-            let gathered = self.volume.map(gather);
-            let clear = self.stage == Stage::Clear;
+            let wanted = self.classes.has(sight.then(Event::Medium).receives(Beam::SCATTERED));
+            let gathered = self.volume.filter(|_| wanted).map(gather);
             let measure = &mut self.measure;
-            let (light, photons) = if clear {
+            let (light, photons) = if sight.is_clear() {
                 (&mut measure.volume, &mut measure.volume_photons)
             } else {
                 (&mut measure.indirect, &mut measure.indirect_photons)
@@ -413,10 +463,10 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     }
 
     #[inline]
-    fn lit(&mut self, vertex: &MediumVertex) {
-        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() {
-            let clear = self.stage == Stage::Clear;
-            let light = if clear { &mut self.measure.volume } else { &mut self.measure.indirect };
+    fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
+        let sight = self.arrived(scattered);
+        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(sight) {
+            let light = if sight.is_clear() { &mut self.measure.volume } else { &mut self.measure.indirect };
             *light += vertex.throughput
                 * next_event(self.scene, vertex, [(LobeSet::BROAD, SECOND_STRATEGY), (LobeSet::NONE, 0.0)]);
         }
@@ -425,6 +475,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     #[inline]
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
         let scene = self.scene;
+        self.sight = self.arrived(scattered);
         let last = self.last;
         scene.lights.escape(&last, direction, |radiance, pdf, _| self.run_into(radiance, throughput, pdf, scattered));
     }
@@ -443,6 +494,8 @@ pub struct Eye<'a> {
     pub max_depth: u32,
     /// Who brings indirect light where photons are gathered.
     pub indirect: Indirect,
+    /// Classes of light paths to be measured.
+    pub classes: ClassSet,
 }
 
 impl Eye<'_> {
@@ -552,7 +605,9 @@ impl Eye<'_> {
             max_depth: self.max_depth,
             measure: EyeMeasure::default(),
             length: 0.0,
-            stage: Stage::Clear,
+            sight: Sight::START,
+            lobes: LobeSet::NONE,
+            classes: self.classes,
             broadly: false,
             last: Receiver::anywhere(Vec3::ZERO),
         };

@@ -138,7 +138,7 @@ impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
             {
                 let share = balance(lamp.pdf(at.distance), collisions.pdf(at.distance));
                 let vertex = self.vertex(span, at, draws, opacity, share);
-                self.visitor.lit(&vertex);
+                self.visitor.lit(&vertex, self.scattered);
             }
         }
         Passage::Left(left)

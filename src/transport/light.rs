@@ -1,5 +1,6 @@
 //! Light paths that leave photons.
 
+use super::eye::Indirect;
 use super::interior::Surroundings;
 use super::segment::Known;
 use super::site::MediumVertex;
@@ -8,6 +9,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, guide};
 use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags, VolumePhoton};
+use crate::plan::{ClassSet, PathClass};
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
 use crate::spectrum::{Band, Comb, Hue};
@@ -26,6 +28,7 @@ pub struct LightPass<'a> {
     direction: SobolPair,
     guide: Option<&'a Guide>,
     caustics_only: bool,
+    keeps_caustics: bool,
     comb: Option<Comb>,
 }
 
@@ -67,6 +70,7 @@ impl<'a> LightPass<'a> {
             direction,
             guide: None,
             caustics_only: false,
+            keeps_caustics: true,
             comb: None,
         }
     }
@@ -79,6 +83,22 @@ impl<'a> LightPass<'a> {
     /// The same with photons of caustics alone, if `only`: light paths end where they would scatter broadly.
     pub fn caustics_only(self, only: bool) -> LightPass<'a> {
         LightPass { caustics_only: only, ..self }
+    }
+
+    /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those of caustics, or with those alone.
+    #[must_use]
+    pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPass<'a> {
+        let caustics: ClassSet = match indirect {
+            Indirect::Photons => [PathClass::Caustic, PathClass::Sds].into_iter().collect(),
+            Indirect::Paths => ClassSet::ALL,
+        };
+        let others = PathClass::ALL.into_iter().any(|class| wanted.has(class) && !caustics.has(class));
+        LightPass {
+            paths: if wanted.is_empty() { 0 } else { self.paths },
+            caustics_only: !others,
+            keeps_caustics: !(wanted & caustics).is_empty(),
+            ..self
+        }
     }
 
     /// Whose paths take no other wavelengths than these.
@@ -169,14 +189,17 @@ struct Deposit<'a> {
     photons: &'a mut Photons,
     /// Lobes that a path goes on with.
     onward: LobeSet,
+    keeps_caustics: bool,
     caustic: bool,
     unreachable: bool,
 }
 
 impl<'a> Deposit<'a> {
     /// Of a light path just begun.
-    fn new(scene: &'a Scene, photons: &'a mut Photons, onward: LobeSet, emitted: &Emitted) -> Deposit<'a> {
-        Deposit { scene, photons, onward, caustic: true, unreachable: emitted.delta }
+    fn new(scene: &'a Scene, photons: &'a mut Photons, pass: &LightPass, emitted: &Emitted) -> Deposit<'a> {
+        let onward = if pass.caustics_only { LobeSet::SHARP | LobeSet::DELTA } else { LobeSet::ALL };
+        let keeps_caustics = pass.keeps_caustics;
+        Deposit { scene, photons, onward, keeps_caustics, caustic: true, unreachable: emitted.delta }
     }
 }
 
@@ -190,7 +213,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders of
         // materials and dark texels.
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
-        if scattered.is_some() && gathers {
+        if scattered.is_some() && gathers && (self.keeps_caustics || !self.caustic) {
             let flags = (u8::from(self.caustic) * PhotonFlags::CAUSTIC)
                 | (u8::from(self.unreachable) * PhotonFlags::UNREACHABLE);
             self.photons.surface.push(Photon {
@@ -234,8 +257,7 @@ pub fn light_path(
     photons: &mut Photons,
 ) -> Option<usize> {
     let emitted = pass.emit(scene, surroundings, index)?;
-    let onward = if pass.caustics_only { LobeSet::SHARP | LobeSet::DELTA } else { LobeSet::ALL };
-    let mut deposit = Deposit::new(scene, photons, onward, &emitted);
+    let mut deposit = Deposit::new(scene, photons, pass, &emitted);
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
     Some(emitted.cell)
 }
@@ -281,7 +303,7 @@ impl EqualFlux {
         let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
         for copy in 0..copies {
             let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
-            let mut deposit = Deposit::new(scene, photons, LobeSet::ALL, &emitted);
+            let mut deposit = Deposit::new(scene, photons, pass, &emitted);
             walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
             arena.reset();
         }

@@ -15,11 +15,12 @@ mod path;
 mod photon_merge;
 mod probe;
 mod segment;
+mod shares;
 mod site;
 mod volume;
 mod walk;
 
-pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Part, Record, Scatterer, Strategies, Technique};
+pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Strategies, Technique};
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Left, LightVertices, Splat};
 pub use direct::{balance, direct_light};

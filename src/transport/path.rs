@@ -3,15 +3,17 @@
 //! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
 //! (`direct_light` splits them), so that the two check each other.
 
-use super::bidirectional::{Part, Record, Technique, Trail};
+use super::bidirectional::{Record, Technique, Trail};
 use super::bidirectional_eye::{look, look_in_medium};
 use super::eye::{Eye, EyeMeasure};
+use super::shares::{shares, wanted};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
+use crate::plan::{Beam, ClassSet, Part, PathClass};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -19,6 +21,7 @@ use bumpalo::Bump;
 struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
+    classes: ClassSet,
     measure: EyeMeasure,
     trail: Trail,
     last: Receiver,
@@ -36,47 +39,54 @@ impl<R: Record> PathTracer<'_, R> {
         }
     }
 
-    /// Light straight from a light, weighted, and its weight.
-    fn next_event(&self, vertex: &impl Site) -> (Rgb, f32) {
-        let (scene, draws) = (self.scene, vertex.draws());
+    /// Light straight from a light at a vertex.
+    fn lit<S: Site>(&mut self, vertex: &S) {
+        let (scene, draws, beam) = (self.scene, vertex.draws(), Beam::start(false));
+        if vertex.depth() >= self.max_depth || !wanted(vertex, self.trail.sight, beam, self.classes) {
+            return;
+        }
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) =
             scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
         else {
-            return (Rgb::ZERO, 1.0);
+            return;
         };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         if (f * light.radiance).max_element() <= 0.0 {
-            return (Rgb::ZERO, 1.0);
+            return;
         }
         let way = vertex.way(scene, light.wi, light.target, draws.token(Purpose::ShadowAlpha), false);
         let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
-        (f * light.radiance * (weight / light.pdf_w) * way.left, weight)
-    }
-
-    /// Light straight from a light at a vertex.
-    fn lit<S: Site>(&mut self, vertex: &S) {
-        if vertex.depth() < self.max_depth {
-            let (light, weight) = self.next_event(vertex);
-            let technique = Technique::NextEvent { eye: self.depth };
-            self.add(technique, self.trail.next_event(S::IN_MEDIUM), vertex.throughput() * light, weight);
+        let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);
+        let technique = Technique::NextEvent { eye: self.depth };
+        let shares = shares(vertex, (self.trail.sight, beam), (light.wi, Transport::Radiance, f), self.classes);
+        for (class, share) in shares.iter() {
+            self.add(technique, class, value * share, weight);
         }
     }
 
     /// Adds weighted light.
-    fn add(&mut self, technique: Technique, part: Part, light: Rgb, weight: f32) {
+    fn add(&mut self, technique: Technique, class: PathClass, light: Rgb, weight: f32) {
+        if !self.classes.has(class) {
+            return;
+        }
         if weight > 0.0 {
             self.record.arrival(technique, 0, light / weight, weight);
         }
         let measure = &mut self.measure;
-        *match part {
+        *match class.part() {
             Part::Emission => &mut measure.emission,
             Part::Direct => &mut measure.direct,
             Part::Caustic => &mut measure.caustic_photons[0],
             Part::Indirect => &mut measure.indirect,
             Part::Volume => &mut measure.volume,
         } += light;
+    }
+
+    /// What the walk does after the last vertex.
+    fn next(&self) -> Next {
+        if self.trail.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }
 }
 
@@ -86,14 +96,14 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface) {
-            let part = self.trail.hit(scattered.map(|s| s.lobe));
+            let class = self.trail.sight.lit(false);
             let weight = Self::weight(scattered, pdf);
-            self.add(Technique::Hit { eye: self.depth }, part, vertex.throughput * radiance * weight, weight);
+            self.add(Technique::Hit { eye: self.depth }, class, vertex.throughput * radiance * weight, weight);
         }
         self.last = vertex.receiver();
         self.lit(vertex);
-        self.trail.leave(vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH));
-        Next::Continue(LobeSet::ALL)
+        self.trail.leave(Some(vertex.shading.bsdf.lobes()));
+        self.next()
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
@@ -101,20 +111,20 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.depth = vertex.depth;
         self.last = vertex.receiver();
         self.lit(vertex);
-        self.trail.leave_medium();
-        Next::Continue(LobeSet::ALL)
+        self.trail.leave(None);
+        self.next()
     }
 
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }
-        let part = self.trail.hit(scattered.map(|s| s.lobe));
+        let class = self.trail.sight.lit(false);
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
         let last = self.last;
         scene.lights.escape(&last, direction, |light, pdf, _| {
             let weight = Self::weight(scattered, pdf);
-            self.add(technique, part, throughput * light * weight, weight);
+            self.add(technique, class, throughput * light * weight, weight);
         });
     }
 }
@@ -127,8 +137,9 @@ pub fn path_measure(
     record: &mut impl Record,
 ) -> EyeMeasure {
     let (measure, trail) = (EyeMeasure::default(), Trail::START);
-    let (scene, max_depth, last) = (eye.scene, eye.max_depth, Receiver::anywhere(start.origin));
-    let mut tracer = PathTracer { scene, max_depth, measure, trail, last, depth: 0, record };
+    let Eye { scene, max_depth, classes, .. } = *eye;
+    let last = Receiver::anywhere(start.origin);
+    let mut tracer = PathTracer { scene, max_depth, classes, measure, trail, last, depth: 0, record };
     walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut tracer);
     tracer.measure
 }

@@ -2,10 +2,12 @@
 
 use super::bidirectional::{MergeLevels, Record, Technique};
 use super::mis::{self, MisState};
+use super::shares::Merged;
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap, same_surface};
+use crate::plan::{Beam, ClassSet, PathClass, Sight};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
@@ -26,8 +28,8 @@ pub struct MergePhoton {
     merged: f32,
     /// Segments of the light path up to here.
     pub depth: u16,
-    /// Every bounce since the light was specular (delta or sharp).
-    pub caustic: bool,
+    /// What has happened on the way here.
+    pub beam: Beam,
     /// Of the light path's wavelength.
     band: Band,
 }
@@ -52,7 +54,7 @@ impl Located for MergePhoton {
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
-    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, caustic: bool, mis: &MisState) -> MergePhoton {
+    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, beam: Beam, mis: &MisState) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
@@ -62,7 +64,7 @@ impl MergePhoton {
             plain: mis.plain,
             merged: mis.merged + mis.last,
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
-            caustic,
+            beam,
             band: Band::of(vertex.wavelength.as_ref()),
         }
     }
@@ -74,20 +76,21 @@ impl MergePhoton {
     }
 }
 
-/// Merges the photons around `vertex`, of all levels with one query: calls `add(photon, level, radiance)`.
+/// Merges the photons around `vertex`, of all levels with one query: calls `add(class, level, radiance)`.
 #[inline]
 pub(super) fn merge_photons<R: Record>(
     photons: &PhotonMap<MergePhoton>,
     levels: &MergeLevels,
     vertex: &Vertex<'_, '_>,
-    mis: &MisState,
+    (mis, sight, classes): (&MisState, Sight, ClassSet),
     longest: u32,
     record: &mut R,
-    mut add: impl FnMut(&MergePhoton, usize, Rgb),
+    mut add: impl FnMut(PathClass, usize, Rgb),
 ) {
     let radii = levels.radius2();
     let Some(&largest) = radii.last() else { return };
     let (ng, shading) = (vertex.surface.ng, vertex.shading);
+    let mut merged = Merged::new(vertex, sight, classes);
     photons.within(vertex.surface.p, largest, |photon, distance2| {
         if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
             return;
@@ -100,6 +103,7 @@ pub(super) fn merge_photons<R: Record>(
         if !is_lit(value) {
             return;
         }
+        let shares = merged.shares(photon.beam, photon.wi, f);
         let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
         let ratios = mis::merge(&photon.mis(), mis, pdf, reverse);
         let technique = Technique::Merge { light: u32::from(photon.depth), eye: vertex.depth };
@@ -107,8 +111,10 @@ pub(super) fn merge_photons<R: Record>(
         for (level, (&radius2, &eta)) in radii.iter().zip(levels.eta()).enumerate() {
             if distance2 < radius2 {
                 let weight = ratios.merge_weight(eta);
-                record.arrival(technique, level, value * (FRAC_1_PI / radius2), weight);
-                add(photon, level, value * (weight * FRAC_1_PI / radius2));
+                for (class, share) in shares.iter() {
+                    record.arrival(technique, level, value * share * (FRAC_1_PI / radius2), weight);
+                    add(class, level, value * share * (weight * FRAC_1_PI / radius2));
+                }
             }
         }
     });

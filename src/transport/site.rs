@@ -72,6 +72,8 @@ pub trait Site {
     fn draws(&self) -> Draws;
     /// The wavelength the path has taken.
     fn wavelength(&self) -> Option<&Wavelength>;
+    /// Its lobes that are not delta.
+    fn smooth(&self) -> LobeSet;
     /// Scattering from `wi` times its cosine, and the density of drawing `wi` ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
     /// Density of the way back ([`crate::bsdf::Shading::reverse_pdf`]).
@@ -161,6 +163,11 @@ impl Site for Vertex<'_, '_> {
     }
 
     #[inline]
+    fn smooth(&self) -> LobeSet {
+        self.shading.bsdf.lobes() & LobeSet::SMOOTH
+    }
+
+    #[inline]
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         self.shading.evaluate_cos(wi, transport, set)
     }
@@ -239,6 +246,11 @@ impl Site for MediumVertex {
     #[inline]
     fn wavelength(&self) -> Option<&Wavelength> {
         self.wavelength.as_ref()
+    }
+
+    #[inline]
+    fn smooth(&self) -> LobeSet {
+        LobeSet::BROAD
     }
 
     #[inline]

@@ -106,8 +106,8 @@ pub trait Visitor<'a> {
     }
     /// A second vertex in the same medium, of a walk that splits, at which nothing but its share of next-event estimation is to be measured.
     #[inline]
-    fn lit(&mut self, vertex: &MediumVertex) {
-        let _ = vertex;
+    fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
+        let _ = (vertex, scattered);
     }
     /// `sample` is drawn at `vertex`, and the path goes on.
     #[inline]

@@ -79,6 +79,42 @@ fn an_effect_switched_off_is_as_if_it_were_not_there() {
     );
 }
 
+/// Classes of light paths that are switched off are named, and their layers are not there; the others are what they were.
+#[test]
+fn classes_of_light_paths_are_left_out() {
+    let folder = Folder::new();
+    let options = "--iterations 2 --no-combine --initial-bandwidth 0.2 --method";
+    for method in ["sppm", "vcm"] {
+        let photons = if method == "vcm" { "" } else { "--photons 2000" };
+        let render = format!("render scene.glb --width 64 --height 48 {photons} {options} {method} -o");
+        assert_eq!(folder.run(&format!("{render} all.exr")).code, Some(0));
+        let outcome = folder.run(&format!("{render} off.exr --effects -caustic,-sds,-direct,-glossy"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        for warning in [
+            "warning: scene.glb: --effects -direct: left out, though called for by light \"Lamp\"\n",
+            "warning: scene.glb: --effects -caustic: left out, though called for by material \"silver\"",
+            "warning: scene.glb: --effects -sds: left out, though called for by caustics seen in material \"silver\"",
+        ] {
+            assert!(outcome.stderr.contains(warning), "{}", outcome.stderr);
+        }
+        let ((all, _), (off, header)) = (folder.read("all.exr"), folder.read("off.exr"));
+        assert!(off.get("Caustic").is_none() && off.get("Direct").is_none());
+        assert_eq!(off.get("Indirect"), all.get("Indirect"), "{method}");
+        let effects = header["plan"]["effects"].as_array().expect("a list");
+        let caustic = effects.iter().find(|effect| effect["name"] == "caustic").expect("it is listed");
+        assert_eq!((&caustic["present"], &caustic["simulated"]), (&true.into(), &false.into()));
+    }
+    // Nothing that photons would bring is left.
+    let none = folder.run(
+        "render scene.glb --width 64 --height 48 --no-combine --iterations 1 -o none.exr --effects -caustic,-sds,-indirect,-glossy",
+    );
+    assert_eq!(none.code, Some(0), "{}", none.stderr);
+    assert_eq!(folder.read("none.exr").1["light_paths"], 0);
+    // A layer that is left out cannot be asked for.
+    let asked = folder.run("render scene.glb -o out.exr --no-combine --layers Direct --effects -direct,-glossy");
+    assert_eq!(asked.code, Some(2), "{}", asked.stderr);
+}
+
 /// A camera that is not there, and --strict.
 #[test]
 fn plans_fail_as_renders_do() {

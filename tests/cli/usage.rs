@@ -8,7 +8,7 @@ fn errors_word_for_word() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --no-combine";
     let help = "'--help' explains every option";
-    let cases: [(&str, i32, &str, &str); 35] = [
+    let cases: [(&str, i32, &str, &str); 34] = [
         ("", 2, "command line: a command is missing", "'caustique --help' lists the commands"),
         ("rendr", 2, "command line: unrecognized subcommand 'rendr'", "a similar subcommand exists: 'render'"),
         (
@@ -34,12 +34,6 @@ fn errors_word_for_word() {
             2,
             "command line: invalid value '-bloom' for '--effects <LIST>': there is no effect 'bloom'; there are emission, direct, indirect, glossy, caustic, sds, volume, dispersion, depth_of_field, environment, alpha, textures",
             help,
-        ),
-        (
-            "plan scene.glb --effects -alpha,-sds",
-            2,
-            "--effects: 'sds', a class of light paths, cannot be switched off yet",
-            "those that can be switched off are volume, dispersion, depth_of_field, environment, alpha, textures",
         ),
         (
             &format!("{render} --method cppm --kernel gaussian"),

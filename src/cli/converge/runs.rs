@@ -75,6 +75,7 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     let settings = Settings {
         max_depth: args.max_depth.unwrap_or(u32::MAX),
         seed: args.seed,
+        classes: args.scene.switches().classes(),
         iterations: None,
         time: None,
         ..render.settings()?

@@ -501,6 +501,7 @@ impl RenderArgs {
             decided: render::Spent::default(),
             guided: way.guided,
             indirect: way.indirect,
+            classes: self.scene.switches().classes(),
         };
         if self.shard.is_some() && !settings.is_memoryless() {
             let rule = if method == render::Method::Sppm { " with local statistics" } else { "" };

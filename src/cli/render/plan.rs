@@ -41,7 +41,7 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
     let (max_depth, switches) = (wishes.max_depth, wishes.switches);
     let search = match wishes.choice {
         Some(choice) if choice.way.indirect == Indirect::Paths => Search::PathsAndPhotons,
-        _ => search(method),
+        _ => method.search(),
     };
     let asked = Asked { method: method.name(), because: &because, search, max_depth, switches, removed };
     let mut plan = Plan::new(scene, camera, &asked);
@@ -91,20 +91,6 @@ fn weigh(plan: &mut Plan, trial: &Trial) {
         if effect.present {
             effect.seconds_per_iteration = seconds;
         }
-    }
-}
-
-/// How a method looks for light.
-fn search(method: render::Method) -> Search {
-    use render::Method as M;
-    match method {
-        M::Path => Search::EyePaths,
-        M::Light => Search::LightPaths,
-        M::Bdpt => Search::Connections,
-        M::Pm => Search::Map,
-        M::Ppm | M::Sppm | M::Appm | M::Cppm => Search::Photons,
-        M::Bpm => Search::Merging,
-        M::Vcm => Search::ConnectionsAndMerging,
     }
 }
 

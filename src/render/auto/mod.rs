@@ -150,8 +150,8 @@ pub fn counted_cost(scene: &Scene, camera: &Camera, way: Way, settings: &Setting
 
 fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
     let surroundings = Surroundings::new(scene, camera.position());
-    let Settings { max_depth, seed, .. } = *settings;
-    let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons };
+    let Settings { max_depth, seed, classes, .. } = *settings;
+    let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons, classes };
     Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide), scattering: scene.survey.scattering() }
 }
 

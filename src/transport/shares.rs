@@ -1,0 +1,162 @@
+//! Light that techniques find for all lobes of a vertex at once, told apart by class.
+//!
+//! A vertex that has both broad and sharp lobes makes different things of the same light. What each makes of it is known, so their shares are exact. Where both
+//! are in one part of the picture and no class is switched off, nobody asks, and it costs nothing.
+//!
+//! A path drawn from all lobes of a vertex at once goes on as if by the lobe that drew it. That shares out light that it runs into in proportion to
+//! densities, not to the lobes' own values, which nearly agree: the sum of the classes is exact.
+
+use super::bidirectional::LightVertex;
+use super::site::Site;
+use crate::bsdf::{LobeSet, Transport};
+use crate::math::{Rgb, Vec3};
+use crate::plan::{Beam, ClassSet, Event, PathClass, Sight};
+
+/// Classes and their shares of some light, by channel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shares {
+    list: [(PathClass, Rgb); 4],
+    count: usize,
+}
+
+impl Shares {
+    const NONE: Shares = Shares { list: [(PathClass::Emission, Rgb::ZERO); 4], count: 0 };
+
+    #[inline]
+    fn add(&mut self, class: PathClass, share: Rgb, on: ClassSet) {
+        if on.has(class) {
+            self.list[self.count] = (class, share);
+            self.count += 1;
+        }
+    }
+
+    /// All are switched off.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Those that are not switched off.
+    #[inline]
+    pub fn iter(&self) -> impl Iterator<Item = (PathClass, Rgb)> {
+        self.list.into_iter().take(self.count)
+    }
+}
+
+/// What smooth lobes are there, broad first.
+#[inline]
+fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
+    match smooth {
+        _ if in_medium => (Event::Medium, None),
+        LobeSet::SMOOTH => (Event::Broad, Some(Event::Sharp)),
+        LobeSet::SHARP => (Event::Sharp, None),
+        _ => (Event::Broad, None),
+    }
+}
+
+/// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones first.
+#[inline]
+fn classes<S: Site>(vertex: &S, sight: Sight, beam: Beam) -> (PathClass, Option<PathClass>) {
+    let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
+    let class = |event| sight.then(event).receives(beam);
+    (class(first), second.map(class))
+}
+
+/// Whether any class of that light is wanted.
+#[inline]
+pub(super) fn wanted<S: Site>(vertex: &S, sight: Sight, beam: Beam, on: ClassSet) -> bool {
+    on.is_all() || {
+        let (first, second) = classes(vertex, sight, beam);
+        on.has(first) || second.is_some_and(|second| on.has(second))
+    }
+}
+
+/// Share of broad lobes in `all` that lobes scatter.
+#[inline]
+fn ratio(broad: Rgb, all: Rgb) -> Rgb {
+    Rgb::select(all.cmpgt(Rgb::ZERO), (broad / all).min(Rgb::ONE), Rgb::ZERO)
+}
+
+/// Shares of light that comes along `wi`, of which all lobes of the vertex scatter `f`.
+#[inline]
+pub(super) fn shares<S: Site>(
+    vertex: &S,
+    (sight, beam): (Sight, Beam),
+    (wi, transport, f): (Vec3, Transport, Rgb),
+    on: ClassSet,
+) -> Shares {
+    shares_of(vertex, classes(vertex, sight, beam), (wi, transport, f), on)
+}
+
+/// The same where the classes are known.
+#[inline]
+fn shares_of<S: Site>(
+    vertex: &S,
+    classes: (PathClass, Option<PathClass>),
+    (wi, transport, f): (Vec3, Transport, Rgb),
+    on: ClassSet,
+) -> Shares {
+    let mut shares = Shares::NONE;
+    match classes {
+        (first, Some(second)) if first.part() != second.part() || !on.is_all() => {
+            let broad = ratio(vertex.evaluate_cos(wi, transport, LobeSet::BROAD).0, f);
+            shares.add(first, broad, on);
+            shares.add(second, Rgb::ONE - broad, on);
+        }
+        (first, _) => shares.add(first, Rgb::ONE, on),
+    }
+    shares
+}
+
+/// Shares of the light of many photons at one vertex: each kind of [`Beam`] is looked at once.
+pub(super) struct Merged<'v, S> {
+    vertex: &'v S,
+    sight: Sight,
+    on: ClassSet,
+    known: [Option<(PathClass, Option<PathClass>)>; Beam::COUNT],
+}
+
+impl<'v, S: Site> Merged<'v, S> {
+    /// At a vertex at the end of `sight`.
+    #[inline]
+    pub fn new(vertex: &'v S, sight: Sight, on: ClassSet) -> Merged<'v, S> {
+        Merged { vertex, sight, on, known: [None; Beam::COUNT] }
+    }
+
+    /// Shares of light that comes by `beam` along `wi`, of which the vertex scatters `f` towards the eye.
+    #[inline]
+    pub fn shares(&mut self, beam: Beam, wi: Vec3, f: Rgb) -> Shares {
+        let known = &mut self.known[beam.index()];
+        let classes = *known.get_or_insert_with(|| classes(self.vertex, self.sight, beam));
+        shares_of(self.vertex, classes, (wi, Transport::Radiance, f), self.on)
+    }
+}
+
+/// The same for light that a light path's vertex sends along `-d`, of which its lobes scatter `f_light`, to one from where it is along `d`.
+#[inline]
+pub(super) fn connected<S: Site>(
+    vertex: &S,
+    light: &LightVertex<'_>,
+    sight: Sight,
+    (d, f, f_light): (Vec3, Rgb, Rgb),
+    on: ClassSet,
+) -> Shares {
+    let (first, second) = events(light.smooth(), light.in_medium());
+    let of = |event: Event| shares(vertex, (sight, light.beam.then(event)), (d, Transport::Radiance, f), on);
+    let Some(second) = second else { return of(first) };
+    let parts = |event: Event| {
+        let (first, second) = classes(vertex, sight, light.beam.then(event));
+        (first.part(), second.map(PathClass::part))
+    };
+    if on.is_all() && parts(first) == parts(second) {
+        return of(first);
+    }
+    let broad = ratio(light.evaluate_set_cos(-d, LobeSet::BROAD).0, f_light);
+    let mut shares = Shares::NONE;
+    for (event, of_light) in [(first, broad), (second, Rgb::ONE - broad)] {
+        for (class, share) in of(event).iter() {
+            shares.add(class, share * of_light, on);
+        }
+    }
+    shares
+}

@@ -1,0 +1,34 @@
+//! Every light path is in one class, every class has one owner, and what is switched off is what is missing: on random paths, and in pictures.
+
+mod support;
+
+#[path = "classes/owners.rs"]
+mod owners;
+#[path = "classes/switches.rs"]
+mod switches;
+
+use caustique::material::Material;
+use caustique::math::{DVec3, Vec3};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere};
+
+/// A room with everything: plastic, rough metal, glass and a mirror, lit by a lamp that paths run into, and by a point if that is asked for.
+fn room(point: bool) -> Scene {
+    let mut room = Description::default();
+    add(&mut room, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
+    add(&mut room, "lamp", quad(Vec3::new(-0.4, 1.9, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8), matte(0.0, 8.0));
+    add(&mut room, "glass", sphere(Vec3::new(-0.5, 0.4, 0.2), 0.3, 48), glass(1.5));
+    let metal = Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness: 0.35, ..Material::default() };
+    add(&mut room, "metal", sphere(Vec3::new(0.5, 0.35, 0.4), 0.3, 48), metal);
+    let plastic = Material { base_color: [0.2, 0.4, 0.6, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
+    add(&mut room, "plastic", sphere(Vec3::new(0.05, 0.3, -0.4), 0.3, 48), plastic.clone());
+    let polished = Material { roughness: 0.0, ..plastic };
+    add(&mut room, "polished", sphere(Vec3::new(0.0, 0.2, 0.9), 0.2, 48), polished);
+    let glazing = quad(Vec3::new(-0.9, 0.3, -0.95), Vec3::X * 0.9, Vec3::Y * 0.9);
+    add(&mut room, "mirror", glazing, mirror());
+    if point {
+        room.lights.push(point_light(DVec3::new(-0.8, 1.5, 0.8), 2.0));
+    }
+    room.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.6, 0.0), 55.0));
+    build(room)
+}
