@@ -1,36 +1,18 @@
 """The programs of bare.sh, taking turns: each pair of runs gives a ratio, of which the median is told."""
 
-import json
 import os
 import statistics
-import subprocess
 import tempfile
 from pathlib import Path
 
-from record import ROOT, record
+from _iteration import WHOLE, iteration, read
+from record import record
 
-WHOLE = os.environ.get("CAUSTIQUE_BIN", ROOT / "target/release/caustique")
 BARE = os.environ["BARE_BIN"]
 ROUNDS = int(os.environ.get("ROUNDS", "8"))
 WIDTH = int(os.environ.get("WIDTH", "320"))
 SCENES = ["blocks", "cornell"]
 METHODS = {"sppm": 12, "path": 24, "vcm": 6}
-
-
-def iteration(program, scene, method, file):
-    """Core-seconds of an iteration after the first, which is cold."""
-    command = [program, "render", ROOT / "scenes" / f"{scene}.glb", "-o", file, "--method", method, "--iterations", str(METHODS[method])]
-    levels = [] if method == "path" else ["--levels", "1"]
-    subprocess.run(command + levels + ["--width", str(WIDTH), "--no-combine", "--progress", "none"], check=True, stderr=subprocess.DEVNULL)
-    history = read("info", file)["history"]
-    first, last = history[0], history[-1]
-    return (last["cpu_seconds"] - first["cpu_seconds"]) / (last["iterations"] - first["iterations"])
-
-
-def read(*arguments):
-    """What a command of the whole program says as JSON."""
-    done = subprocess.run([WHOLE, *arguments, "--json"], check=True, stdout=subprocess.PIPE, text=True)
-    return json.loads(done.stdout)
 
 
 def main():
@@ -44,7 +26,8 @@ def main():
                     pair = [0.0, 0.0]
                     # Neither is always the first.
                     for k in (0, 1) if turn % 2 == 0 else (1, 0):
-                        pair[k] = iteration((WHOLE, BARE)[k], scene, method, files[k])
+                        options = ["--method", method, "--width", str(WIDTH)] + ([] if method == "path" else ["--levels", "1"])
+                        pair[k] = iteration((WHOLE, BARE)[k], scene, options, METHODS[method], files[k])
                     pairs.append(pair)
                 same = read("compare", *files)["mse"] == 0.0
             ratios = sorted(whole / bare for whole, bare in pairs)

@@ -242,7 +242,7 @@ impl LightTree {
             let [a, b] = self.children(node.children);
             let (first, second) = (a.importance(at), b.importance(at));
             let sum = first + second;
-            if !(sum > 0.0) {
+            if sum <= 0.0 {
                 return None;
             }
             let share = first / sum;
@@ -273,7 +273,7 @@ impl LightTree {
             let first = self.nodes[parent as usize].children;
             let importance = self.children(first).map(|child| child.importance(at));
             let own = importance[(node - first) as usize];
-            if !(own > 0.0) {
+            if own <= 0.0 {
                 return 0.0;
             }
             pdf *= own / (importance[0] + importance[1]);

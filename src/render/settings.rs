@@ -184,8 +184,12 @@ impl Settings {
 
     /// Classes of light that photons are to bring to eye paths that gather them.
     pub fn of_photons(&self, scene: &Scene) -> ClassSet {
-        let off = if scene.survey.scattering() { EffectSet::NONE } else { EffectSet::from_iter([Effect::Volume]) };
-        self.search().owned_by(Owner::Photons) & self.classes & ClassSet::without(off)
+        let absent = [
+            (scene.survey.scattering(), &[Effect::Volume][..]),
+            (scene.survey.narrow_lobes, &[Effect::Glossy, Effect::Caustic, Effect::Sds][..]),
+        ];
+        let absent = absent.into_iter().filter(|(there, _)| !there).flat_map(|(_, effects)| effects.iter().copied());
+        self.search().owned_by(Owner::Photons) & self.classes & ClassSet::without(absent.collect::<EffectSet>())
     }
 
     /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any order.

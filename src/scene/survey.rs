@@ -16,6 +16,8 @@ pub struct Survey {
     media: bool,
     scattering: bool,
     dispersion: bool,
+    /// Some surface may have narrow lobes: mirrors, glass, what shines.
+    pub narrow_lobes: bool,
     /// Some light cannot be hit by a ray.
     pub delta_lights: bool,
     /// Light comes from infinity.
@@ -65,6 +67,7 @@ impl Survey {
                 continue;
             }
             survey.alpha |= material.alpha != Alpha::Opaque;
+            survey.narrow_lobes |= material.is_glossy() || material.transmission > 0.0;
             if material.is_solid_glass() {
                 solids += worn;
                 survey.media |= material.medium.is_some();
