@@ -3,117 +3,29 @@
 //!
 //! A cluster is a sphere around its lights and a cone around their axes. A choice goes from the root to a leaf, at each step by how much
 //! light each half may send to the point: intensity by the least angle to an axis over the distance squared. What is
-//! certain to send nothing is never chosen.
+//! certain to send nothing is never chosen. Where a cluster is small and far away and all its lights look one way, it makes no difference how it is divided: there
+//! the choice goes by power.
+
+mod bounds;
 
 use super::emitter::Emitter;
 use super::receiver::Receiver;
-use crate::math::{Vec3, luminance};
+use crate::math::Vec3;
+use bounds::{Bounds, split, union};
 use std::f32::consts::PI;
+use std::ops::Range;
 
-/// Classes of position along an axis at whose borders clusters are split.
-const BUCKETS: usize = 12;
-/// From this depth on clusters are halved by number, so that the tree's depth has a bound.
-const BALANCED_FROM: u32 = 40;
 /// Nearer lights (m2) count as if they were that far, so that sums stay finite.
 const LEAST_DISTANCE2: f32 = 1e-12;
 /// What light along a surface counts for over light from above, since it may be reflected well; and from behind, where a normal is no longer sure.
 const GRAZING: f32 = 0.1;
 const BEHIND: f32 = 0.01;
+/// A cluster is small and far where its squared radius is less than this of its squared distance,
+const SMALL: f32 = 1.0 / 64.0;
+/// and looks one way where its axes are within this cosine of theirs.
+const ONE_WAY: f32 = 0.7;
 /// What is not in the tree.
 const NONE: u32 = u32::MAX;
-
-/// Where lights of a cluster are and shine.
-#[derive(Clone, Copy, Debug)]
-struct Bounds {
-    low: Vec3,
-    high: Vec3,
-    axis: Vec3,
-    /// Greatest angle between the axis and that of a light (rad).
-    spread: f32,
-    /// Greatest angle between a light's axis and what it sends (rad).
-    reach: f32,
-    two_sided: bool,
-    /// All of them send as much as the cosine says, not the same up to `reach`.
-    cosine: bool,
-    /// Sum of the lights' greatest radiant intensities (W/sr, luminance).
-    intensity: f32,
-}
-
-impl Bounds {
-    /// Of one light; `None` for those at infinity and those that send nothing.
-    fn of(emitter: &Emitter) -> Option<Bounds> {
-        let at = |p: Vec3, axis, spread, reach, intensity| Bounds {
-            low: p,
-            high: p,
-            axis,
-            spread,
-            reach,
-            two_sided: false,
-            cosine: false,
-            intensity,
-        };
-        let bounds = match emitter {
-            Emitter::Triangle { area, two_sided, radiance, plane, corners, .. } => {
-                let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
-                let intensity = luminance(*radiance) * area;
-                let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
-                Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
-            }
-            Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
-            Emitter::Spot { p, frame, intensity, cos_outer, .. } => {
-                at(*p, frame.n, 0.0, cos_outer.clamp(-1.0, 1.0).acos(), luminance(*intensity))
-            }
-            Emitter::Sun { .. } | Emitter::Environment => return None,
-        };
-        (bounds.intensity > 0.0 && bounds.intensity.is_finite()).then_some(bounds)
-    }
-
-    fn center(&self) -> Vec3 {
-        (self.low + self.high) * 0.5
-    }
-
-    fn union(&self, other: &Bounds) -> Bounds {
-        let (axis, spread) = joint_cone((self.axis, self.spread), (other.axis, other.spread));
-        Bounds {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-            axis,
-            spread,
-            reach: self.reach.max(other.reach),
-            two_sided: self.two_sided || other.two_sided,
-            cosine: self.cosine && other.cosine,
-            intensity: self.intensity + other.intensity,
-        }
-    }
-
-    /// What it costs to have these lights in one cluster: intensity times the size in space and in directions.
-    fn cost(&self) -> f32 {
-        let (spread, edge) = (self.spread, (self.spread + self.reach).min(PI));
-        let (sin, cos) = spread.sin_cos();
-        // The solid angle of the axes, and around it that of the reach, by the cosine.
-        let rim = 2.0 * edge * sin - (spread - 2.0 * edge).cos() - 2.0 * spread * sin + cos;
-        let directions = 2.0 * PI * (1.0 - cos) + 0.5 * PI * rim;
-        self.intensity * directions * self.low.distance_squared(self.high)
-    }
-}
-
-/// The cone around two cones, each an axis and a half angle.
-fn joint_cone(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
-    let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
-    let apart = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
-    if (apart + narrow.1).min(PI) <= wide.1 {
-        return wide;
-    }
-    let spread = 0.5 * (wide.1 + apart + narrow.1);
-    let across = narrow.0 - wide.0 * wide.0.dot(narrow.0);
-    match across.try_normalize() {
-        Some(across) if spread < PI => {
-            let (sin, cos) = (spread - wide.1).sin_cos();
-            (wide.0 * cos + across * sin, spread)
-        }
-        _ => (wide.0, PI),
-    }
-}
 
 /// What a choice asks of a cluster, in a cache line.
 #[derive(Clone, Copy, Debug)]
@@ -128,15 +40,16 @@ struct Node {
     cos_reach: f32,
     two_sided: bool,
     cosine: bool,
-    /// The emitter of a leaf.
-    emitter: u32,
+    /// Its lights: where they begin in [`LightTree::order`], and how many.
+    first: u32,
+    count: u32,
     /// The first of two children side by side; 0 in a leaf.
     children: u32,
     parent: u32,
 }
 
 impl Node {
-    fn new(bounds: &Bounds, parent: u32) -> Node {
+    fn new(bounds: &Bounds, lights: &Range<usize>, parent: u32) -> Node {
         let (sin_spread, cos_spread) = bounds.spread.sin_cos();
         Node {
             center: bounds.center(),
@@ -148,10 +61,17 @@ impl Node {
             cos_reach: bounds.reach.cos(),
             two_sided: bounds.two_sided,
             cosine: bounds.cosine,
-            emitter: NONE,
+            first: lights.start as u32,
+            count: lights.len() as u32,
             children: 0,
             parent,
         }
+    }
+
+    /// Whether its lights are as good as in one place, seen from a receiver.
+    #[inline]
+    fn is_compact(&self, at: &Receiver) -> bool {
+        self.cos_spread > ONE_WAY && self.radius2 < SMALL * at.p.distance_squared(self.center)
     }
 
     /// Irradiance that the cluster may bring to a receiver (W/m2, luminance), about; 0 only where it is certain to bring none.
@@ -195,6 +115,10 @@ fn less(cos: f32, sin: f32, cos_by: f32, sin_by: f32) -> (f32, f32) {
 /// The tree over all lights that are somewhere.
 pub(super) struct LightTree {
     nodes: Vec<Node>,
+    /// Emitters in the order of leaves.
+    order: Vec<u32>,
+    /// Sums of intensity of all before each of them, and of all.
+    below: Vec<f32>,
     /// The leaf of every emitter; [`NONE`] for those without.
     leaves: Vec<u32>,
 }
@@ -205,15 +129,15 @@ impl LightTree {
         let mut lights: Vec<(u32, Bounds)> =
             (0..).zip(emitters).filter_map(|(i, emitter)| Some((i, Bounds::of(emitter)?))).collect();
         let all = union(&lights)?;
-        let mut tree = LightTree { nodes: vec![Node::new(&all, NONE)], leaves: vec![NONE; emitters.len()] };
+        let root = Node::new(&all, &(0..lights.len()), NONE);
+        let (leaves, order, below) = (vec![NONE; emitters.len()], Vec::new(), Vec::new());
+        let mut tree = LightTree { nodes: vec![root], order, below, leaves };
         tree.nodes.reserve(2 * lights.len());
         // Depth first, without recursion: a node and its lights, a range of the list.
         let mut open = vec![(0u32, 0..lights.len(), 0u32)];
         while let Some((node, range, depth)) = open.pop() {
             if range.len() == 1 {
-                let emitter = lights[range.start].0;
-                tree.nodes[node as usize].emitter = emitter;
-                tree.leaves[emitter as usize] = node;
+                tree.leaves[lights[range.start].0 as usize] = node;
                 continue;
             }
             let middle = range.start + split(&mut lights[range.clone()], depth);
@@ -221,11 +145,35 @@ impl LightTree {
             tree.nodes[node as usize].children = first;
             for (child, half) in (first..).zip([range.start..middle, middle..range.end]) {
                 let Some(bounds) = union(&lights[half.clone()]) else { continue };
-                tree.nodes.push(Node::new(&bounds, node));
+                tree.nodes.push(Node::new(&bounds, &half, node));
                 open.push((child, half, depth + 1));
             }
         }
+        tree.order = lights.iter().map(|light| light.0).collect();
+        let mut sum = 0.0f64;
+        tree.below.push(0.0);
+        tree.below.extend(lights.iter().map(|light| {
+            sum += f64::from(light.1.intensity);
+            sum as f32
+        }));
         Some(tree)
+    }
+
+    /// Sum of intensity before the lights of a node, and within it.
+    #[inline]
+    fn span(&self, node: &Node) -> (f32, f32) {
+        let [first, end] = [node.first, node.first + node.count].map(|k| self.below[k as usize]);
+        (first, end - first)
+    }
+
+    /// One of the lights of a node by power, and its probability.
+    #[inline]
+    fn by_power(&self, node: &Node, u: f32) -> (u32, f32) {
+        let (first, all) = self.span(node);
+        let (start, end) = (node.first as usize, (node.first + node.count) as usize);
+        let target = first + u * all;
+        let k = start + self.below[start + 1..end].partition_point(|&below| below <= target);
+        (self.order[k], (self.below[k + 1] - self.below[k]) / all)
     }
 
     /// Irradiance that all lights may bring to a receiver (W/m2, luminance).
@@ -238,7 +186,7 @@ impl LightTree {
     #[inline]
     pub fn sample(&self, at: &Receiver, mut u: f32) -> Option<(usize, f32)> {
         let (mut node, mut pdf) = (&self.nodes[0], 1.0);
-        while node.children != 0 {
+        while node.children != 0 && !node.is_compact(at) {
             let [a, b] = self.children(node.children);
             let (first, second) = (a.importance(at), b.importance(at));
             let sum = first + second;
@@ -257,7 +205,10 @@ impl LightTree {
             }
             u = u.min(1.0f32.next_down());
         }
-        (pdf > 0.0).then_some((node.emitter as usize, pdf))
+        let (emitter, share) =
+            if node.children == 0 { (self.order[node.first as usize], 1.0) } else { self.by_power(node, u) };
+        pdf *= share;
+        (pdf > 0.0).then_some((emitter as usize, pdf))
     }
 
     /// Probability of choosing an emitter.
@@ -267,17 +218,21 @@ impl LightTree {
         if node == NONE {
             return 0.0;
         }
+        let own = self.nodes[node as usize].first as usize;
+        let own = self.below[own + 1] - self.below[own];
         let mut pdf = 1.0;
         while node != 0 {
             let parent = self.nodes[node as usize].parent;
             let first = self.nodes[parent as usize].children;
             let importance = self.children(first).map(|child| child.importance(at));
-            let own = importance[(node - first) as usize];
-            if own <= 0.0 {
-                return 0.0;
-            }
-            pdf *= own / (importance[0] + importance[1]);
+            let sum = importance[0] + importance[1];
+            pdf *= if sum > 0.0 { importance[(node - first) as usize] / sum } else { 0.0 };
             node = parent;
+            // From here down the choice went by power.
+            let cluster = &self.nodes[node as usize];
+            if cluster.is_compact(at) {
+                pdf = own / self.span(cluster).1;
+            }
         }
         pdf
     }
@@ -287,51 +242,6 @@ impl LightTree {
         let first = first as usize;
         [&self.nodes[first], &self.nodes[first + 1]]
     }
-}
-
-fn union(lights: &[(u32, Bounds)]) -> Option<Bounds> {
-    lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b))
-}
-
-/// Sorts lights into two halves at the least cost; the length of the first.
-fn split(lights: &mut [(u32, Bounds)], depth: u32) -> usize {
-    let middles = || lights.iter().map(|light| light.1.center());
-    let low = middles().fold(Vec3::INFINITY, Vec3::min);
-    let extent = middles().fold(Vec3::NEG_INFINITY, Vec3::max) - low;
-    let bucket =
-        |axis: usize, p: Vec3| (((p[axis] - low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1);
-    let mut best: Option<(f32, usize, usize)> = None;
-    for axis in (0..3).filter(|&axis| extent[axis] > 0.0 && depth < BALANCED_FROM) {
-        let mut buckets = [None::<Bounds>; BUCKETS];
-        for (_, bounds) in lights.iter() {
-            let into = &mut buckets[bucket(axis, bounds.center())];
-            *into = Some(into.map_or(*bounds, |sum| sum.union(bounds)));
-        }
-        let join = |a: Option<Bounds>, b: &Option<Bounds>| match (a, b) {
-            (Some(a), Some(b)) => Some(a.union(b)),
-            (a, b) => a.or(*b),
-        };
-        // Thin boxes cost more: their halves see the lights from all sides.
-        let thin = extent.max_element() / extent[axis];
-        for border in 1..BUCKETS {
-            let below = buckets[..border].iter().fold(None, join);
-            let above = buckets[border..].iter().fold(None, join);
-            let (Some(below), Some(above)) = (below, above) else { continue };
-            let cost = thin * (below.cost() + above.cost());
-            if best.is_none_or(|(least, ..)| cost < least) {
-                best = Some((cost, axis, border));
-            }
-        }
-    }
-    if let Some((_, axis, border)) = best {
-        // Stable, so that the tree does not depend on how a sort breaks ties.
-        lights.sort_by_key(|light| bucket(axis, light.1.center()) >= border);
-        let middle = lights.partition_point(|light| bucket(axis, light.1.center()) < border);
-        if middle > 0 && middle < lights.len() {
-            return middle;
-        }
-    }
-    lights.len() / 2
 }
 
 #[cfg(test)]

@@ -1,0 +1,149 @@
+//! Where lights are and shine, and into which halves they are best split.
+
+use crate::light::emitter::Emitter;
+use crate::math::{Vec3, luminance};
+use std::f32::consts::PI;
+
+/// Classes of position along an axis at whose borders clusters are split.
+const BUCKETS: usize = 12;
+/// From this depth on clusters are halved by number, so that the tree's depth has a bound.
+const BALANCED_FROM: u32 = 40;
+
+/// Where lights of a cluster are and shine.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    pub low: Vec3,
+    pub high: Vec3,
+    pub axis: Vec3,
+    /// Greatest angle between the axis and that of a light (rad).
+    pub spread: f32,
+    /// Greatest angle between a light's axis and what it sends (rad).
+    pub reach: f32,
+    pub two_sided: bool,
+    /// All of them send as much as the cosine says, not the same up to `reach`.
+    pub cosine: bool,
+    /// Sum of the lights' greatest radiant intensities (W/sr, luminance).
+    pub intensity: f32,
+}
+
+impl Bounds {
+    /// Of one light; `None` for those at infinity and those that send nothing.
+    pub fn of(emitter: &Emitter) -> Option<Bounds> {
+        let at = |p: Vec3, axis, spread, reach, intensity| Bounds {
+            low: p,
+            high: p,
+            axis,
+            spread,
+            reach,
+            two_sided: false,
+            cosine: false,
+            intensity,
+        };
+        let bounds = match emitter {
+            Emitter::Triangle { area, two_sided, radiance, plane, corners, .. } => {
+                let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
+                let intensity = luminance(*radiance) * area;
+                let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
+                Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
+            }
+            Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
+            Emitter::Spot { p, frame, intensity, cos_outer, .. } => {
+                at(*p, frame.n, 0.0, cos_outer.clamp(-1.0, 1.0).acos(), luminance(*intensity))
+            }
+            Emitter::Sun { .. } | Emitter::Environment => return None,
+        };
+        (bounds.intensity > 0.0 && bounds.intensity.is_finite()).then_some(bounds)
+    }
+
+    pub fn center(&self) -> Vec3 {
+        (self.low + self.high) * 0.5
+    }
+
+    fn union(&self, other: &Bounds) -> Bounds {
+        let (axis, spread) = joint_cone((self.axis, self.spread), (other.axis, other.spread));
+        Bounds {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            axis,
+            spread,
+            reach: self.reach.max(other.reach),
+            two_sided: self.two_sided || other.two_sided,
+            cosine: self.cosine && other.cosine,
+            intensity: self.intensity + other.intensity,
+        }
+    }
+
+    /// What it costs to have these lights in one cluster: intensity times the size in space and in directions.
+    pub fn cost(&self) -> f32 {
+        let (spread, edge) = (self.spread, (self.spread + self.reach).min(PI));
+        let (sin, cos) = spread.sin_cos();
+        // The solid angle of the axes, and around it that of the reach, by the cosine.
+        let rim = 2.0 * edge * sin - (spread - 2.0 * edge).cos() - 2.0 * spread * sin + cos;
+        let directions = 2.0 * PI * (1.0 - cos) + 0.5 * PI * rim;
+        self.intensity * directions * self.low.distance_squared(self.high)
+    }
+}
+
+/// The cone around two cones, each an axis and a half angle.
+fn joint_cone(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
+    let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    let apart = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
+    if (apart + narrow.1).min(PI) <= wide.1 {
+        return wide;
+    }
+    let spread = 0.5 * (wide.1 + apart + narrow.1);
+    let across = narrow.0 - wide.0 * wide.0.dot(narrow.0);
+    match across.try_normalize() {
+        Some(across) if spread < PI => {
+            let (sin, cos) = (spread - wide.1).sin_cos();
+            (wide.0 * cos + across * sin, spread)
+        }
+        _ => (wide.0, PI),
+    }
+}
+
+/// Of several lights; `None` if there are none.
+pub fn union(lights: &[(u32, Bounds)]) -> Option<Bounds> {
+    lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b))
+}
+
+/// Sorts lights into two halves at the least cost; the length of the first.
+pub fn split(lights: &mut [(u32, Bounds)], depth: u32) -> usize {
+    let middles = || lights.iter().map(|light| light.1.center());
+    let low = middles().fold(Vec3::INFINITY, Vec3::min);
+    let extent = middles().fold(Vec3::NEG_INFINITY, Vec3::max) - low;
+    let bucket =
+        |axis: usize, p: Vec3| (((p[axis] - low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1);
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in (0..3).filter(|&axis| extent[axis] > 0.0 && depth < BALANCED_FROM) {
+        let mut buckets = [None::<Bounds>; BUCKETS];
+        for (_, bounds) in lights.iter() {
+            let into = &mut buckets[bucket(axis, bounds.center())];
+            *into = Some(into.map_or(*bounds, |sum| sum.union(bounds)));
+        }
+        let join = |a: Option<Bounds>, b: &Option<Bounds>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.union(b)),
+            (a, b) => a.or(*b),
+        };
+        // Thin boxes cost more: their halves see the lights from all sides.
+        let thin = extent.max_element() / extent[axis];
+        for border in 1..BUCKETS {
+            let below = buckets[..border].iter().fold(None, join);
+            let above = buckets[border..].iter().fold(None, join);
+            let (Some(below), Some(above)) = (below, above) else { continue };
+            let cost = thin * (below.cost() + above.cost());
+            if best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, border));
+            }
+        }
+    }
+    if let Some((_, axis, border)) = best {
+        // Stable, so that the tree does not depend on how a sort breaks ties.
+        lights.sort_by_key(|light| bucket(axis, light.1.center()) >= border);
+        let middle = lights.partition_point(|light| bucket(axis, light.1.center()) < border);
+        if middle > 0 && middle < lights.len() {
+            return middle;
+        }
+    }
+    lights.len() / 2
+}
