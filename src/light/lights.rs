@@ -1,4 +1,4 @@
-//! All lights of a scene: choosing one by power, sampling it from a point, sampling emission, and the densities for MIS.
+//! All lights of a scene: choosing one, sampling it from a point, sampling emission, and the densities for MIS.
 
 use super::aim::Targets;
 use super::cdf::Cdf;
