@@ -100,7 +100,5 @@ for k in range(50):
     b.thing("floodlight face", face, None).matrix_world = there @ b.Matrix.Translation((0, 0, 0.55)) @ b.Matrix.Rotation(math.pi, 4, "X")
 
 b.sky((0.012, 0.018, 0.036))
-# The caustic alone, near enough to fill the picture.
-b.camera((-0.2, -0.12, 0.47), (0.0, 0.0, 0.2), lens=50, name="Close")
 b.camera((-0.44, -0.215, 0.372), (0.5, 0.255, 0.408), lens=20)
 b.finish(__file__)

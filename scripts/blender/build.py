@@ -394,10 +394,10 @@ def sky(color=None, file=None, strength=1.0):
     return world
 
 
-def camera(at, to, lens=35.0, fstop=None, focus=None, name="Camera"):
+def camera(at, to, lens=35.0, fstop=None, focus=None):
     """Look from `at` to `to` through a lens (mm on 36 mm film); `fstop` opens it, focused at the point `focus`."""
-    eye = bpy.data.cameras.new(name)
-    body = bpy.data.objects.new(name, eye)
+    eye = bpy.data.cameras.new("Camera")
+    body = bpy.data.objects.new("Camera", eye)
     bpy.context.scene.collection.objects.link(body)
     bpy.context.scene.camera = body
     eye.lens, eye.clip_start = lens, 0.01
