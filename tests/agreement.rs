@@ -8,13 +8,12 @@ mod support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::plan::ClassSet;
 use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{Eye, Indirect, Interior, path_radiance};
-use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
+use caustique::transport::{Indirect, path_radiance};
+use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, quad, sphere, square};
 use support::stats::t_critical;
 use support::tiles::{SIZE, TILES, average, tiles};
 
@@ -55,15 +54,7 @@ fn by_photons(
 
 fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
-    let interior = Interior::at(scene, camera.position());
-    let eye = Eye {
-        scene,
-        camera: &camera,
-        interior,
-        max_depth: u32::MAX,
-        indirect: Indirect::Photons,
-        classes: ClassSet::ALL,
-    };
+    let eye = eye(scene, &camera);
     (0..seeds)
         .map(|seed| {
             tiles(|index| {

@@ -11,13 +11,12 @@ use caustique::estimator::InitialBandwidth;
 use caustique::light::Emitter;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::plan::ClassSet;
 use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{Eye, Indirect, Interior, path_radiance};
-use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use caustique::transport::path_radiance;
+use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
 /// Checks in this file that share the error rate.
@@ -73,15 +72,7 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
 /// The same by path tracing with `paths` paths per pixel.
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
-    let interior = Interior::at(scene, camera.position());
-    let eye = Eye {
-        scene,
-        camera: &camera,
-        interior,
-        max_depth: u32::MAX,
-        indirect: Indirect::Photons,
-        classes: ClassSet::ALL,
-    };
+    let eye = eye(scene, &camera);
     (0..seeds)
         .map(|seed| {
             let mut sum = 0.0;

@@ -11,12 +11,11 @@ import json
 import math
 import os
 import subprocess
-from pathlib import Path
 
-from record import record
+from _iteration import WHOLE as BIN
+from _iteration import read
+from record import ROOT, record
 
-ROOT = Path(__file__).resolve().parents[2]
-BIN = os.environ.get("CAUSTIQUE_BIN", ROOT / "target/release/caustique")
 OUT = ROOT / "out" / "auto"
 SECONDS = float(os.environ.get("RUN_SECONDS", "10"))
 REFERENCE = float(os.environ.get("REFERENCE_SECONDS", "120"))
@@ -38,8 +37,7 @@ def guided(scene, reference):
             command = [BIN, "render", ROOT / "scenes" / f"{scene}.glb", "-o", path, "--progress", "none", "--layers", "beauty"]
             command += ["--method", "sppm", "--guide", "on", "--indirect", "paths", "--levels", "1", "--no-combine", "--width", str(WIDTH)]
             subprocess.run(command + ["--time", str(REFERENCE), "--seed", str(seed)], check=True, stderr=subprocess.DEVNULL)
-    compared = subprocess.run([BIN, "compare", other, reference, "--json"], check=True, stdout=subprocess.PIPE, text=True)
-    return json.loads(compared.stdout)["relmse"] / 2
+    return read("compare", other, reference)["relmse"] / 2
 
 
 def options(method):

@@ -41,8 +41,8 @@ pub(super) struct Choice {
 /// By what arrives.
 struct Near {
     tree: LightTree,
-    /// Lights at infinity, and the irradiance they may bring.
-    infinite: Option<(Cdf, f32)>,
+    /// Lights at infinity, by the irradiance they may bring.
+    infinite: Option<Cdf>,
 }
 
 impl Choice {
@@ -55,12 +55,7 @@ impl Choice {
                 Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean()) * PI),
                 _ => 0.0,
             };
-            let with_total = |cdf: Cdf| {
-                let total = cdf.total() as f32;
-                (cdf, total)
-            };
-            let infinite = Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter))));
-            Near { tree, infinite: infinite.map(with_total) }
+            Near { tree, infinite: Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter)))) }
         });
         Some(Choice { power, near })
     }
@@ -110,8 +105,8 @@ impl Near {
     /// Share of the lights at infinity.
     #[inline]
     fn share(&self, at: &Receiver) -> f32 {
-        let Some((_, irradiance)) = &self.infinite else { return 0.0 };
-        let near = self.tree.importance(at);
+        let Some(infinite) = &self.infinite else { return 0.0 };
+        let (irradiance, near) = (infinite.total() as f32, self.tree.importance(at));
         if near > 0.0 { (irradiance / (irradiance + near)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) } else { 1.0 }
     }
 
@@ -119,7 +114,7 @@ impl Near {
     fn sample(&self, at: &Receiver, u: f32) -> Option<(usize, f32)> {
         let share = self.share(at);
         match &self.infinite {
-            Some((infinite, _)) if u < share => {
+            Some(infinite) if u < share => {
                 let (index, pdf, _) = infinite.sample(u / share);
                 Some((index, share * pdf))
             }
@@ -135,7 +130,7 @@ impl Near {
     fn pdf(&self, at: &Receiver, index: usize) -> f32 {
         let share = self.share(at);
         match &self.infinite {
-            Some((infinite, _)) if infinite.pdf(index) > 0.0 => share * infinite.pdf(index),
+            Some(infinite) if infinite.pdf(index) > 0.0 => share * infinite.pdf(index),
             _ => (1.0 - share) * self.tree.pdf(at, index),
         }
     }

@@ -118,7 +118,7 @@ pub(super) struct LightTree {
     /// Emitters in the order of leaves.
     order: Vec<u32>,
     /// Sums of intensity of all before each of them, and of all.
-    below: Vec<f32>,
+    below: Vec<f64>,
     /// The leaf of every emitter; [`NONE`] for those without.
     leaves: Vec<u32>,
 }
@@ -154,26 +154,27 @@ impl LightTree {
         tree.below.push(0.0);
         tree.below.extend(lights.iter().map(|light| {
             sum += f64::from(light.1.intensity);
-            sum as f32
+            sum
         }));
         Some(tree)
     }
 
-    /// Sum of intensity before the lights of a node, and within it.
+    /// Share of one light, by its place in the order, in the power of the node that it belongs to.
     #[inline]
-    fn span(&self, node: &Node) -> (f32, f32) {
-        let [first, end] = [node.first, node.first + node.count].map(|k| self.below[k as usize]);
-        (first, end - first)
+    fn share(&self, k: usize, node: &Node) -> f32 {
+        let of = |first: usize, count: usize| self.below[first + count] - self.below[first];
+        let all = of(node.first as usize, node.count as usize);
+        // Beside far stronger ones before it a node may be lost in the sums.
+        if all > 0.0 { (of(k, 1) / all) as f32 } else { 0.0 }
     }
 
     /// One of the lights of a node by power, and its probability.
     #[inline]
     fn by_power(&self, node: &Node, u: f32) -> (u32, f32) {
-        let (first, all) = self.span(node);
         let (start, end) = (node.first as usize, (node.first + node.count) as usize);
-        let target = first + u * all;
+        let target = self.below[start] + f64::from(u) * (self.below[end] - self.below[start]);
         let k = start + self.below[start + 1..end].partition_point(|&below| below <= target);
-        (self.order[k], (self.below[k + 1] - self.below[k]) / all)
+        (self.order[k], self.share(k, node))
     }
 
     /// Irradiance that all lights may bring to a receiver (W/m2, luminance).
@@ -219,7 +220,6 @@ impl LightTree {
             return 0.0;
         }
         let own = self.nodes[node as usize].first as usize;
-        let own = self.below[own + 1] - self.below[own];
         let mut pdf = 1.0;
         while node != 0 {
             let parent = self.nodes[node as usize].parent;
@@ -231,7 +231,7 @@ impl LightTree {
             // From here down the choice went by power.
             let cluster = &self.nodes[node as usize];
             if cluster.is_compact(at) {
-                pdf = own / self.span(cluster).1;
+                pdf = self.share(own, cluster);
             }
         }
         pdf

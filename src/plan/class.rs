@@ -67,6 +67,12 @@ impl Event {
         }
     }
 
+    /// The same where it may be a medium, which has no lobes.
+    #[inline]
+    pub fn by(lobe: LobeSet, lobes: Option<LobeSet>) -> Event {
+        lobes.map_or(Event::Medium, |lobes| Event::of(lobe, lobes))
+    }
+
     #[inline]
     fn is_narrow(self) -> bool {
         matches!(self, Event::Clear | Event::Mirror | Event::Sharp)

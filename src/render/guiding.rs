@@ -10,8 +10,9 @@ use crate::estimator::bandwidth::{SCREEN_CAP, span};
 use crate::light::Guide;
 use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{Located, Nearest, Photon, PhotonMap};
+use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
-use crate::transport::{Eye, Indirect, LightPass, Photons, Probe, Surroundings, light_path};
+use crate::transport::{Eye, LightPass, Photons, Probe, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -76,7 +77,7 @@ fn photons(
 ) -> (PhotonMap<Marked>, Vec<f64>) {
     let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
         .guided(Some(guide))
-        .caustics_only(eye.indirect == Indirect::Paths);
+        .wanting(ClassSet::ALL, eye.indirect);
     let trace = |paths: std::ops::Range<u32>| {
         let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), Vec::new());
         let mut cells = Vec::with_capacity(paths.len());

@@ -7,6 +7,7 @@
 use super::eye::Eye;
 use super::interior::Surroundings;
 use super::mis::{Eta, MisState, Ratios};
+use super::shares::leads;
 use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
@@ -251,7 +252,7 @@ impl Trail {
     #[inline]
     pub fn scattered(&mut self, lobe: LobeSet) {
         self.delta &= lobe == LobeSet::DELTA;
-        self.sight = self.sight.then(self.lobes.map_or(Event::Medium, |lobes| Event::of(lobe, lobes)));
+        self.sight = self.sight.then(Event::by(lobe, self.lobes));
     }
 
     /// No vertex before this one scatters but by mirrors and clear glass.
@@ -275,13 +276,6 @@ impl Trail {
                 Some(lobes) => leads(self.sight, lobes, lobes, on),
             }
     }
-}
-
-/// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
-pub(super) fn leads(sight: Sight, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
-    let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
-    let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).ahead() & on).is_empty();
-    each.filter(|lobe| set.has(*lobe)).any(ahead)
 }
 
 /// Bandwidths of the levels of one eye path, ascending, with their etas.

@@ -85,7 +85,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
     #[inline]
     fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
-            self.beam = self.beam.then(self.lobes.map_or(Event::Medium, |lobes| Event::of(scattered.lobe, lobes)));
+            self.beam = self.beam.then(Event::by(scattered.lobe, self.lobes));
         }
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };

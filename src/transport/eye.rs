@@ -13,11 +13,11 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
-use super::bidirectional::leads;
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
 use super::segment::Known;
+use super::shares::leads;
 use super::site::MediumVertex;
 use super::site::Site;
 use super::volume::Volume;

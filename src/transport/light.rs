@@ -80,11 +80,6 @@ impl<'a> LightPass<'a> {
         LightPass { guide, ..self }
     }
 
-    /// The same with photons of caustics alone, if `only`: light paths end where they would scatter broadly.
-    pub fn caustics_only(self, only: bool) -> LightPass<'a> {
-        LightPass { caustics_only: only, ..self }
-    }
-
     /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those of caustics, or with those alone.
     #[must_use]
     pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPass<'a> {

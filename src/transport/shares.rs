@@ -71,6 +71,13 @@ pub(super) fn wanted<S: Site>(vertex: &S, sight: Sight, beam: Beam, on: ClassSet
     }
 }
 
+/// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
+pub(super) fn leads(sight: Sight, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
+    let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
+    let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).ahead() & on).is_empty();
+    each.filter(|lobe| set.has(*lobe)).any(ahead)
+}
+
 /// Share of broad lobes in `all` that lobes scatter.
 #[inline]
 fn ratio(broad: Rgb, all: Rgb) -> Rgb {

@@ -1,10 +1,13 @@
 //! Scenes made in code, for closed-form tests.
 
+use caustique::camera::Camera;
 use caustique::geometry::Mesh;
 use caustique::material::Material;
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec3};
+use caustique::plan::ClassSet;
 use caustique::scene::description::{CameraDescription, Description, Placed, Projection, PunctualKind, PunctualLight};
 use caustique::scene::{Scene, View};
+use caustique::transport::{Eye, Indirect, Interior};
 
 /// A diffuse material of some reflectance that gives some radiance, without any Fresnel layer.
 pub fn matte(reflectance: f32, emission: f32) -> Material {
@@ -123,6 +126,12 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         kind: PunctualKind::Point,
         radius: 0.0,
     }
+}
+
+/// What paths are traced from: all classes of light, of any length.
+pub fn eye<'a>(scene: &'a Scene, camera: &'a Camera) -> Eye<'a> {
+    let interior = Interior::at(scene, camera.position());
+    Eye { scene, camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons, classes: ClassSet::ALL }
 }
 
 /// Builds a scene, panicking with the error: tests know their scenes are good.

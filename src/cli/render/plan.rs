@@ -7,11 +7,10 @@ use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
 use caustique::plan::switch::Removed;
-use caustique::plan::{Asked, Effect, Plan, Search, Switches};
+use caustique::plan::{Asked, Effect, Plan, Switches};
 use caustique::render;
 use caustique::render::auto::{Choice, Shares, Trial};
 use caustique::scene::Scene;
-use caustique::transport::Indirect;
 use std::path::Path;
 
 /// What decides what a plan says.
@@ -39,10 +38,7 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
     let method = wishes.choice.map_or(wishes.method.chosen(), |choice| choice.way.method);
     let because = wishes.choice.map_or("asked for".into(), why);
     let (max_depth, switches) = (wishes.max_depth, wishes.switches);
-    let search = match wishes.choice {
-        Some(choice) if choice.way.indirect == Indirect::Paths => Search::PathsAndPhotons,
-        _ => method.search(),
-    };
+    let search = wishes.choice.map_or(method.search(), |choice| choice.settings.search());
     let asked = Asked { method: method.name(), because: &because, search, max_depth, switches, removed };
     let mut plan = Plan::new(scene, camera, &asked);
     if let Some(trial) = wishes.choice.and_then(Choice::trial) {

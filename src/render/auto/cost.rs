@@ -61,14 +61,18 @@ impl Cost {
                 paths * (both + eye * (EYE_VERTEX + light * CONNECTION + merges))
             }
         };
-        seconds * if self.scattering { MEDIA } else { 1.0 }
+        seconds * self.media()
+    }
+
+    fn media(&self) -> f64 {
+        if self.scattering { MEDIA } else { 1.0 }
     }
 
     /// Core-seconds of an iteration that indirect light takes, and caustics, where one can be done without the other.
     pub fn parts(&self, way: Way, settings: &Settings, pixels: f64) -> [Option<f64>; 2] {
         let Lengths { eye, eye_to_broad, .. } = self.lengths;
         let beyond = (eye - eye_to_broad).max(0.0);
-        let media = if self.scattering { MEDIA } else { 1.0 };
+        let media = self.media();
         let all = self.of(way, settings, pixels);
         match (way.method, way.indirect) {
             (Method::Path, _) => [Some(media * pixels * beyond * EYE_VERTEX), None],

@@ -142,17 +142,17 @@ impl Sums {
     fn of(pixels: &[Pixel], levels: Levels, values: &[f64]) -> Sums {
         let mut sums = Sums::default();
         let own = levels.own();
+        let scale = |value: &f64| 1.0 / (value * value + DARK);
         let relative = |(pixel, value): (&Pixel, &f64)| {
-            mean(pixel.levels[own].variance_of_mean(f64::from(pixel.iterations))) / (value * value + DARK)
+            mean(pixel.levels[own].variance_of_mean(f64::from(pixel.iterations))) * scale(value)
         };
         let mut variances: Vec<f64> = pixels.iter().zip(values).map(relative).collect();
         let worst = (variances.len() as f64 * WORST) as usize;
         let last = variances.len().saturating_sub(1 + worst);
-        let most = variances.select_nth_unstable_by(last, f64::total_cmp).1.to_owned();
+        let most = *variances.select_nth_unstable_by(last, f64::total_cmp).1;
         for (pixel, value) in pixels.iter().zip(values) {
             let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
-            let n = f64::from(pixel.iterations);
-            let scale = 1.0 / (value * value + DARK);
+            let (n, variance, scale) = (f64::from(pixel.iterations), relative((pixel, value)), scale(value));
             let parts = &pixel.parts;
             let parts = [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume];
             for (k, part) in parts.into_iter().enumerate() {
@@ -161,13 +161,13 @@ impl Sums {
                 sums.squares[k] += mean(part * part) * scale;
             }
             sums.all += 1.0;
-            if relative((pixel, value)) > most {
+            if variance > most {
                 continue;
             }
             for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
                 *sum += mean(level.variance_of_mean(n)) * scale;
             }
-            sums.variance2 += (mean(error.variance) * scale).powi(2);
+            sums.variance2 += variance.powi(2);
             sums.squared_bias += mean(error.squared_bias) * scale;
             sums.pixels += 1.0;
         }
