@@ -2,7 +2,7 @@
 //!
 //! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest bandwidth is
 //! the distance to the k-th nearest photon of its own surface around its pilot path's gathering point, at most [`SCREEN_CAP`] of the
-//! picture's width there. With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
+//! picture's width there (by default). With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
 //! gets the median of the others (or, with no others, the cap at the scene's size).
 
 use crate::camera::{Camera, band, par_pixels};
@@ -40,9 +40,15 @@ pub fn span(camera: &Camera, length: f32) -> f32 {
     slope * length + at_zero
 }
 
-/// Largest initial bandwidth of every pixel, row by row.
-pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilot: &PhotonMap) -> Vec<f32> {
-    bandwidths(eye, rule, seed, pilot, |arena, start| eye.gather_point(arena, start))
+/// Largest initial bandwidth of every pixel, row by row; at most `widest` of the picture's width.
+pub fn initial_bandwidths(
+    eye: &Eye<'_>,
+    rule: InitialBandwidth,
+    widest: f32,
+    seed: u64,
+    pilot: &PhotonMap,
+) -> Vec<f32> {
+    bandwidths(eye, (rule, widest), seed, pilot, |arena, start| eye.gather_point(arena, start))
 }
 
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path, in three dimensions.
@@ -52,10 +58,11 @@ pub fn initial_bandwidths(eye: &Eye<'_>, rule: InitialBandwidth, seed: u64, pilo
 pub fn initial_volume_bandwidths(
     eye: &Eye<'_>,
     rule: InitialBandwidth,
+    widest: f32,
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    let found = bandwidths(eye, rule, seed, pilot, |arena, start| eye.volume_point(arena, start));
+    let found = bandwidths(eye, (rule, widest), seed, pilot, |arena, start| eye.volume_point(arena, start));
     medians(&found, eye.camera.size().0 as usize)
 }
 
@@ -75,7 +82,7 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
 
 fn bandwidths<P: Located>(
     eye: &Eye<'_>,
-    rule: InitialBandwidth,
+    (rule, widest): (InitialBandwidth, f32),
     seed: u64,
     pilot: &PhotonMap<P>,
     find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
@@ -89,7 +96,7 @@ fn bandwidths<P: Located>(
     let least = LEAST * scene.lights.sky().radius;
     let of_point = |nearest: &mut Nearest<P>, point: &GatherPoint| {
         let span = span(camera, point.length);
-        let cap = SCREEN_CAP * span;
+        let cap = widest * span;
         let r = match rule {
             InitialBandwidth::Nearest(k) => {
                 nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
@@ -114,7 +121,7 @@ fn bandwidths<P: Located>(
     );
     let mut known: Vec<f32> = found.iter().flatten().copied().collect();
     let fallback = if known.is_empty() {
-        (SCREEN_CAP * span(camera, scene.lights.sky().radius)).max(least)
+        (widest * span(camera, scene.lights.sky().radius)).max(least)
     } else {
         let middle = known.len() / 2;
         *known.select_nth_unstable_by(middle, f32::total_cmp).1

@@ -2,6 +2,7 @@
 
 use super::aim::Targets;
 use super::cdf::Cdf;
+use super::cone::Cone;
 use super::emitter::{Emitter, Sky, spot_falloff};
 use super::receiver::{Choice, Receiver};
 use crate::geometry::{Shapes, Surface, spawn};
@@ -328,16 +329,18 @@ impl Lights {
         }
     }
 
-    /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers. `None` for light from infinity.
+    /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers, and the cone that the light stays in. `None` for
+    /// light from infinity.
     #[inline]
-    pub fn point(&self, choice: f32, u: Vec2) -> Option<Vec3> {
+    pub fn point(&self, choice: f32, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
         match &self.emitters[index] {
             Emitter::Triangle { corners, .. } => {
                 let b = warp::triangle_uniform(u);
-                Some(corners[0] + corners[1] * b.x + corners[2] * b.y)
+                Some((corners[0] + corners[1] * b.x + corners[2] * b.y, None))
             }
-            Emitter::Point { p, .. } | Emitter::Spot { p, .. } => Some(*p),
+            Emitter::Point { p, .. } => Some((*p, None)),
+            Emitter::Spot { p, frame, cos_outer, .. } => Some((*p, Cone::new(*p, frame.n, *cos_outer))),
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }

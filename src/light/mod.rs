@@ -2,6 +2,7 @@
 
 mod aim;
 mod cdf;
+mod cone;
 mod emitter;
 mod environment;
 pub mod guide;
@@ -11,6 +12,7 @@ mod tree;
 
 pub use aim::Targets;
 pub use cdf::Cdf;
+pub use cone::Cone;
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;

@@ -284,8 +284,9 @@ impl Iterate for Passes<'_> {
             InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
             _ => InitialBandwidth::Footprint,
         };
+        let Settings { widest: [widest, _], seed, .. } = *self.settings;
         let none = PhotonMap::build(Vec::new());
-        initial_bandwidths(&self.eye(), initial, self.settings.seed, &none).into_iter().map(Pixel::new).collect()
+        initial_bandwidths(&self.eye(), initial, widest, seed, &none).into_iter().map(Pixel::new).collect()
     }
 
     fn guide(&self) -> Option<&Guide> {

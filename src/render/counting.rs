@@ -127,8 +127,9 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
         par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), tallies), places| {
             let waiting = places.iter().flatten().map(|place| {
-                let first = &bandwidths[place.at * states];
-                pixels[place.at].touch() + f64::from(R::radius2(first))
+                let (first, end) = (place.at * states, (place.at + 1) * states);
+                std::hint::black_box((tallies[first * each], tallies[end * each - 1]));
+                pixels[place.at].touch() + f64::from(R::radius2(&bandwidths[first]))
             });
             std::hint::black_box(waiting.sum::<f64>());
             let starts = |[film, streams]: [Streams; 2]| maps[0].tune(eye.starts_through(places, film, streams));

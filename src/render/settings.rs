@@ -4,6 +4,7 @@ use super::auto::Way;
 use super::method::Method;
 use super::session::Spent;
 use crate::estimator::InitialBandwidth;
+use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
 #[cfg(doc)]
@@ -101,6 +102,8 @@ pub struct Settings {
     pub techniques: bool,
     /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is its bandwidth.
     pub initial: InitialBandwidth,
+    /// Largest initial bandwidth over the picture's width: on surfaces and in media.
+    pub widest: [f32; 2],
     /// Reduction rate of the memoryless rule and that of local statistics, in (0, 1].
     pub alpha: f64,
     /// The same for photons in media.
@@ -138,6 +141,7 @@ impl Default for Settings {
             levels: Levels::new(5),
             techniques: false,
             initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
+            widest: [SCREEN_CAP; 2],
             alpha: memoryless::ALPHA,
             volume_alpha: volume::ALPHA,
             radius_rule: RadiusRule::Memoryless,

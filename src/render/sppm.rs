@@ -232,21 +232,21 @@ impl<'a> Sppm<'a> {
 
 impl Iterate for Sppm<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
-        let Settings { initial, seed, .. } = *self.settings;
+        let Settings { initial, widest, seed, .. } = *self.settings;
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
             trace_photons(self.eye.scene, self.surroundings, &self.light_pass(0, Domain::PilotLight))
         } else {
             Photons::default()
         };
         let map = PhotonMap::build(pilot.surface);
-        let bandwidths = initial_bandwidths(&self.eye, initial, seed, &map);
+        let bandwidths = initial_bandwidths(&self.eye, initial, widest[0], seed, &map);
         if let (InitialBandwidth::Nearest(k), Indirect::Paths) = (initial, self.settings.indirect) {
             self.later2 = usual_radius2(&map, k);
         }
         let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
         if self.eye.scene.survey.scattering() {
             let pilot = PhotonMap::build(pilot.volume);
-            let bandwidths = initial_volume_bandwidths(&self.eye, initial, seed, &pilot);
+            let bandwidths = initial_volume_bandwidths(&self.eye, initial, widest[1], seed, &pilot);
             for (pixel, bandwidth) in pixels.iter_mut().zip(bandwidths) {
                 pixel.volume_bandwidth = bandwidth;
             }

@@ -83,14 +83,19 @@ pub(super) struct Split<'a, V> {
 }
 
 impl<V> Split<'_, V> {
-    /// The way as seen from the point of a light to which next-event estimation goes, if that is near.
+    /// The way as seen from the point of a light to which next-event estimation goes, if that is near or shines on little of it.
     #[inline]
     fn lamp(&self, span: &Span<'_>, draws: &Draws) -> Option<Equiangular> {
-        let lamp = self.scene.lights.point(draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint))?;
-        let seen = Equiangular::new(span.origin, span.direction, span.distance, lamp)?;
+        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let (lamp, cone) = self.scene.lights.point(choice, point)?;
+        let lit = match cone {
+            Some(cone) => cone.within(span.origin, span.direction, span.distance)?,
+            None => [0.0, span.distance],
+        };
+        let seen = Equiangular::new(span.origin, span.direction, lit, lamp)?;
         // Light comes from within a mean free path, mostly.
         let length = span.distance.min(3.0 / span.medium.sigma_t().element_sum());
-        seen.is_near(length).then_some(seen)
+        (seen.is_near(length) || seen.is_short(length)).then_some(seen)
     }
 
     /// A vertex on the way; see [`MediumVertex`] for `opacity` and `next_event`.

@@ -6,6 +6,7 @@ use crate::cli::progress::Form;
 use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
+use caustique::estimator::bandwidth::SCREEN_CAP;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use caustique::render::auto::{Free, Way};
@@ -484,6 +485,7 @@ impl RenderArgs {
             levels,
             techniques: self.debug_techniques.is_some(),
             initial,
+            widest: [SCREEN_CAP; 2],
             alpha: self.alpha.unwrap_or(method.alpha()),
             volume_alpha: self.alpha.unwrap_or(VOLUME_ALPHA),
             radius_rule,

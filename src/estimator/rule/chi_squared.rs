@@ -83,15 +83,15 @@ impl ChiSquared {
     /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
     /// the normal through the point has none and counts in the first sector.
     #[inline]
-    fn sectors(&self, frame: &Frame, [x, y, z]: &[f32x8; 3]) -> [i32; 8] {
+    fn sectors(&self, frame: &Frame, [x, y, z]: &[f32x8; 3]) -> f32x8 {
         let along = |axis: Vec3| *x * axis.x + *y * axis.y + *z * axis.z;
         let (u, v) = (along(frame.t), along(frame.b));
         if !self.sectors.is_multiple_of(2) {
             let turn = |u: f32, v: f32| (v.atan2(u) / std::f32::consts::TAU).rem_euclid(1.0);
             let (u, v) = (u.to_array(), v.to_array());
-            return std::array::from_fn(|k| {
-                ((turn(u[k], v[k]) * self.sectors as f32) as i32).min(self.sectors as i32 - 1)
-            });
+            let last = self.sectors as f32 - 1.0;
+            let sector = |k: usize| (turn(u[k], v[k]) * self.sectors as f32).floor().min(last);
+            return f32x8::from(std::array::from_fn(sector));
         }
         // The lower half is the upper, turned by half the sectors.
         let (zero, one) = (f32x8::ZERO, f32x8::ONE);
@@ -103,7 +103,7 @@ impl ChiSquared {
         for &(c, s) in &self.borders {
             passed += (v * c - u * s).cmp_ge(zero) & somewhere & one;
         }
-        passed.trunc_int().to_array()
+        passed
     }
 
     /// Statistic of counts that should be equal \[(12)\]; 0 without any.
@@ -165,14 +165,16 @@ impl CountingRule for ChiSquared {
     #[inline]
     fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) {
         let sectors = self.sectors(frame, &photons.offset);
+        let (annuli, each) = (self.annuli as f32, self.sectors as f32);
         for (bandwidth, counts) in bandwidths.iter().zip(counts.chunks_mut(self.tallies())) {
             let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
-            let annuli = (photons.distance2 * (self.annuli as f32 / bandwidth.radius2)).trunc_int();
-            let (annuli, last) = (annuli.to_array(), self.annuli - 1);
+            let annulus =
+                (photons.distance2 * (annuli / bandwidth.radius2)).floor().fast_min(f32x8::splat(annuli - 1.0));
+            let cells = (annulus * each + sectors).fast_trunc_int().to_array();
             while within != 0 {
                 let k = within.trailing_zeros() as usize;
                 within &= within - 1;
-                counts[(annuli[k] as usize).min(last) * self.sectors + sectors[k] as usize] += 1;
+                counts[cells[k & 7] as usize] += 1;
             }
         }
     }
@@ -212,12 +214,13 @@ mod tests {
         for sectors in [1, 2, 3, 4, 5, 6, 8, 12] {
             let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
             let frame = Frame::from_normal(Vec3::new(0.0, 1.0, 0.0));
-            let sector = |offset: Vec3| rule.sectors(&frame, &Found::one(offset, 0.0, 1.0).offset)[0];
+            let sector =
+                |offset: Vec3| rule.sectors(&frame, &Found::one(offset, 0.0, 1.0).offset).to_array()[0] as usize;
             for i in 0..2000 {
                 let (x, y) = uniform(0, i);
                 let turn = y.atan2(x).rem_euclid(std::f32::consts::TAU) / std::f32::consts::TAU * sectors as f32;
                 if (turn - turn.round()).abs() > 1e-4 {
-                    assert_eq!(sector(frame.t * x + frame.b * y + frame.n * 0.3), turn as i32, "{x} {y}");
+                    assert_eq!(sector(frame.t * x + frame.b * y + frame.n * 0.3), turn as usize, "{x} {y}");
                 }
             }
             assert_eq!((sector(Vec3::ZERO), sector(frame.n)), (0, 0));

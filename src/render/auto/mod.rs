@@ -10,6 +10,7 @@
 
 mod balance;
 mod cost;
+mod tail;
 mod trial;
 
 pub use balance::Balance;
@@ -206,7 +207,7 @@ fn try_all(
     // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
     let spare = allowed_once / trial_cost(small_pixels, few);
     let photons = (few * spare).clamp(few, trial::PHOTONS.1);
-    let plan = trial::Plan { photons, focusing: focuses(scene), budget: budget - allowed, free, pixels };
+    let plan = trial::Plan { photons, budget: budget - allowed, free, pixels };
     let mut values = Vec::new();
     let mut trials: Vec<Trial> = ways
         .iter()

@@ -1,11 +1,15 @@
 //! One candidate tried on a small picture.
 
+use super::balance::EDGES;
 use super::cost::Cost;
+use super::tail::Tail;
 use super::{Balance, Free, Way};
 use crate::camera::Camera;
+use crate::estimator::InitialBandwidth;
 use crate::estimator::{Pixel, SquaredError};
 use crate::light::Guide;
 use crate::math::DVec3;
+use crate::photon::MAX_NEIGHBOURS;
 use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::{Levels, Settings, Shard};
@@ -14,15 +18,9 @@ use crate::transport::MAX_LEVELS;
 
 /// Light paths of a trial over those of the render, at least and at most. As many neighbours are then found in as many times the area.
 pub(super) const PHOTONS: (f64, f64) = (0.125, 1.0);
-/// Squared bias over that which levels tell: at an edge, neighbouring levels differ by less than either is wrong. As measured on a scene with many edges.
-const BLURRED: f64 = 3.0;
 /// Squared error of what bandwidths rule where they follow the photons' counts, over that where they follow the iteration's number: about what the diffuse box
 /// and the box with glass show after ten seconds, and less than the paper says of long renders [CPPM 2020, Table 1].
 const COUNTED: f64 = 0.7;
-/// Squared error of gathering over what a pilot tells of it where mirrors and glass focus light: caustics are finer than bandwidths, which then hide from the levels
-/// how much they blur. As measured on the scenes with glass after ten seconds, one level alone, where it is between one and four. Of several levels the
-/// combiner makes up for it: there gathering does better than the pilot tells.
-const FOCUSED: f64 = 2.0;
 /// Added to a pixel's squared value: relMSE.
 const DARK: f64 = 0.01;
 
@@ -64,10 +62,20 @@ pub struct Trial {
 pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
     // Bandwidths that follow counts tell neither noise nor bias apart.
     let method = if of.method == Method::Cppm { Method::Sppm } else { of.method };
+    // One level alone is what of several is the second largest, of half the area.
+    let larger = if of.levels.count == 1 { 2 } else { 1 };
+    let initial = match of.initial {
+        InitialBandwidth::Nearest(k) => InitialBandwidth::Nearest((larger * k).min(MAX_NEIGHBOURS)),
+        other => other,
+    };
+    let area = larger as f32 / photons as f32;
     Settings {
         method,
         levels: Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 }),
         photons: ((f64::from(of.photons) * photons) as u32).max(1),
+        // Where so many fewer are as many neighbours as in the render.
+        widest: [of.widest[0] * area.sqrt(), of.widest[1] * area.cbrt()],
+        initial,
         iterations: None,
         time: None,
         target_error: None,
@@ -105,8 +113,6 @@ fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<
 pub(super) struct Plan {
     /// Share of the light paths.
     pub photons: f64,
-    /// Mirrors and glass focus light.
-    pub focusing: bool,
     /// What the render may take (core-seconds).
     pub budget: f64,
     /// Settings that may be balanced.
@@ -115,19 +121,18 @@ pub(super) struct Plan {
     pub pixels: f64,
 }
 
-/// Standard errors by which a variance is taken to be larger than it looks: rare bright samples make it look smaller more often than larger.
-const CAUTION: f64 = 1.0;
-
-/// Share of the pixels that are left out, those of the largest variance: a bright sample in a hundred or so of pixels says next to nothing about how often there is one.
+/// Share of the pixels that are left out of means, those of the largest variance: a bright sample in a hundred or so of pixels says next to nothing about how often
+/// there is one. For them stands the power law of those below ([`Tail`]), up to the worst pixels, which are nobody's measure.
 const WORST: f64 = 0.01;
+const NOBODYS: f64 = 0.001;
 
 /// Sums over pixels of relative squares.
 #[derive(Default)]
 struct Sums {
     /// Relative variance of the mean by level.
     variance: [f64; MAX_LEVELS],
-    /// Of squares of the own level's.
-    variance2: f64,
+    /// The largest at the own level.
+    tail: Tail,
     squared_bias: f64,
     /// Number of pixels in these.
     pixels: f64,
@@ -140,7 +145,6 @@ struct Sums {
 impl Sums {
     /// `values`: what pixels are relative to.
     fn of(pixels: &[Pixel], levels: Levels, values: &[f64]) -> Sums {
-        let mut sums = Sums::default();
         let own = levels.own();
         let scale = |value: &f64| 1.0 / (value * value + DARK);
         let relative = |(pixel, value): (&Pixel, &f64)| {
@@ -150,6 +154,7 @@ impl Sums {
         let worst = (variances.len() as f64 * WORST) as usize;
         let last = variances.len().saturating_sub(1 + worst);
         let most = *variances.select_nth_unstable_by(last, f64::total_cmp).1;
+        let mut sums = Sums { tail: Tail::of(&mut variances), ..Sums::default() };
         for (pixel, value) in pixels.iter().zip(values) {
             let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
             let (n, variance, scale) = (f64::from(pixel.iterations), relative((pixel, value)), scale(value));
@@ -167,7 +172,6 @@ impl Sums {
             for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
                 *sum += mean(level.variance_of_mean(n)) * scale;
             }
-            sums.variance2 += variance.powi(2);
             sums.squared_bias += mean(error.squared_bias) * scale;
             sums.pixels += 1.0;
         }
@@ -222,19 +226,27 @@ impl Trial {
         let gathers = of.method.gathers();
         let variance = relative(sums.variance[levels.own()]);
         let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };
-        let spread = (relative(sums.variance2) - variance * variance).max(0.0) / pixels;
-        let fixed = fixed + CAUTION * spread.sqrt();
         let (all, light) = (cost.of(way, of, plan.pixels), cost.of(way, of, 0.0));
         let alpha = of.alpha;
         let mut squared_bias = relative(sums.squared_bias).max(0.0);
+        let counted = of.method == Method::Cppm;
         if gathers {
             // The same neighbours in a smaller area.
-            squared_bias *= plan.photons * BLURRED;
+            squared_bias *= EDGES * plan.photons.sqrt();
         }
-        let mut balance =
-            if gathers { Balance::new(fixed, photons, squared_bias, all - light, light) } else { Balance::USUAL };
+        // After n times as many iterations as in the trial: noise of photons and bias.
+        let ruled = |n: f64| {
+            let counted = if counted { COUNTED } else { 1.0 };
+            (counted * photons / n.powf(alpha), counted * squared_bias / n.powf(0.5 * (1.0 - alpha)))
+        };
+        let usual = plan.budget / all / done;
+        let mut balance = if gathers {
+            let (photons, squared_bias) = ruled(usual);
+            Balance::new(fixed / usual, photons, squared_bias, all - light, light)
+        } else {
+            Balance::USUAL
+        };
         balance.keep(plan.free);
-        let counted = of.method == Method::Cppm;
         if counted {
             // They find their own size.
             balance.neighbours = 1.0;
@@ -243,19 +255,22 @@ impl Trial {
         balance.apply(&mut balanced);
         let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
-        let area = balance.neighbours / balance.photons;
-        let gathered = if gathers { photons / (balance.neighbours * n.powf(alpha)) } else { 0.0 };
-        let bias = squared_bias * area / n.powf(1.0 - alpha);
-        let bias = if of.method == Method::Path { 0.0 } else { bias };
-        let ruled = (gathered + bias) * if counted { COUNTED } else { 1.0 };
+        let mean = fixed / n
+            + match of.method {
+                Method::Path | Method::Bdpt => 0.0,
+                _ => {
+                    let (photons, squared_bias) = ruled(n);
+                    photons / balance.neighbours + squared_bias * (balance.neighbours / balance.photons).sqrt()
+                }
+            };
+        let tail = sums.tail.sum(NOBODYS, WORST) * sums.tail.after(n);
         Trial {
             way,
             shares: Sums::shares(sums.parts.map(|part| part / total)),
             without: Sums::shares(sums.squares.map(|square| (square / sums.all.max(1.0)).sqrt())),
             seconds_per_iteration,
             seconds_of_parts: cost.parts(way, &balanced, plan.pixels),
-            expected: (fixed / n + ruled)
-                * if gathers && plan.focusing && of.levels.count == 1 { FOCUSED } else { 1.0 },
+            expected: (1.0 - WORST) * mean + tail,
             balance,
         }
     }

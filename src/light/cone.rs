@@ -1,0 +1,100 @@
+//! The cone that a spot's light stays in, and the part of a ray within it.
+
+use crate::math::Vec3;
+
+/// A cone of at most half of all directions: it is convex, and holds one part of a ray or none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    apex: Vec3,
+    /// Unit vector from the apex.
+    axis: Vec3,
+    /// Cosine of the angle between the axis and the side.
+    cos: f32,
+}
+
+impl Cone {
+    /// `None` for wider ones.
+    #[inline]
+    pub fn new(apex: Vec3, axis: Vec3, cos: f32) -> Option<Cone> {
+        (cos > 0.0).then_some(Cone { apex, axis, cos })
+    }
+
+    fn holds(&self, p: Vec3) -> bool {
+        let from = p - self.apex;
+        from.dot(self.axis) >= self.cos * from.length()
+    }
+
+    /// Between which distances the ray from `origin` along the unit `direction` is within, no further than `distance`, which may be infinite.
+    #[inline]
+    pub fn within(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<[f32; 2]> {
+        // Where the ray meets the double cone: (f . axis)^2 = cos^2 f . f for f = from + t direction.
+        let from = origin - self.apex;
+        let (along, height, cos2) = (direction.dot(self.axis), from.dot(self.axis), self.cos * self.cos);
+        let a = along * along - cos2;
+        let b = along * height - cos2 * direction.dot(from);
+        let c = height * height - cos2 * from.length_squared();
+        let root = (b * b - a * c).max(0.0).sqrt();
+        // The form that cancels nothing; with a parallel to the side one of them is infinite or no number, and met nowhere.
+        let q = -(b + root.copysign(b));
+        let (s, t) = (q / a, c / q);
+        let meets = |t: f32| if t > 0.0 && t < distance { t } else { 0.0 };
+        let (s, t) = (meets(s), meets(t));
+        let borders = [0.0, s.min(t), s.max(t), distance];
+        let mut within: Option<[f32; 2]> = None;
+        for k in 0..3 {
+            let (start, end) = (borders[k], borders[k + 1]);
+            let middle = if end.is_finite() { 0.5 * (start + end) } else { 2.0 * start + from.length() };
+            if end > start && self.holds(origin + direction * middle) {
+                within = Some([within.map_or(start, |within| within[0]), end]);
+            }
+        }
+        within
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Vec2, warp};
+    use crate::random::{Domain, Purpose, Stream};
+
+    /// Random cones and rays: points of the part, and no others, are in the cone but for those within a thousandth of its side.
+    #[test]
+    fn parts_are_what_the_cone_holds() {
+        let (mut inside, mut outside) = (0, 0);
+        for i in 0..20_000 {
+            let draws = |k| Stream::new(21, 0, Domain::Test, i).vertex(k);
+            let direction = |k| warp::sphere_uniform(draws(k).two(Purpose::Direction));
+            let u: Vec2 = draws(4).two(Purpose::Pixel);
+            let cone = Cone::new(direction(0) * 2.0, direction(1), u.x.max(0.01)).expect("a cone");
+            let (origin, along) = (direction(2) * 4.0 * u.y, direction(3));
+            let distance = if i % 7 == 0 { f32::INFINITY } else { 6.0 };
+            let part = cone.within(origin, along, distance);
+            for k in 1..60 {
+                let t = k as f32 * 0.1;
+                let from = origin + along * t - cone.apex;
+                let over = from.normalize().dot(cone.axis) - cone.cos;
+                if over.abs() > 1e-3 {
+                    let held = part.is_some_and(|[start, end]| (start..=end).contains(&t));
+                    assert_eq!(held, over > 0.0, "{cone:?} {origin} {along} {t}: {part:?}");
+                    *(if held { &mut inside } else { &mut outside }) += 1;
+                }
+            }
+        }
+        assert!(inside > 50_000 && outside > 50_000, "{inside}, {outside}");
+    }
+
+    /// Along the axis, along the side and from the apex.
+    #[test]
+    fn parts_of_special_rays() {
+        let cone = Cone::new(Vec3::ZERO, Vec3::Z, 0.5f32.sqrt()).expect("a cone");
+        assert_eq!(cone.within(Vec3::Z * -1.0, Vec3::Z, 3.0), Some([1.0, 3.0]));
+        assert_eq!(cone.within(Vec3::Z, -Vec3::Z, 3.0), Some([0.0, 1.0]));
+        let side = Vec3::new(0.5f32.sqrt(), 0.0, 0.5f32.sqrt());
+        let part = cone.within(Vec3::new(-1.0, 0.0, 0.5), side, f32::INFINITY).expect("a part");
+        assert!((part[0] - 0.25 * 2f32.sqrt()).abs() < 1e-3 && part[1] == f32::INFINITY, "{part:?}");
+        assert_eq!(cone.within(Vec3::ZERO, Vec3::Z, 2.0), Some([0.0, 2.0]));
+        assert_eq!(cone.within(Vec3::new(0.0, 0.0, -1.0), Vec3::X, 2.0), None);
+        assert!(Cone::new(Vec3::ZERO, Vec3::Z, -0.1).is_none());
+    }
+}
