@@ -10,7 +10,7 @@ use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, KernelChoice, Levels, Method, RadiusRule, Rendered, Settings, render};
 use caustique::scene::{Description, Scene};
-use support::field::{self, PixelField};
+use support::field::{self, Field, PixelField};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 use support::tiles::{SIZE, TILES, average, disagreeing, tiles};
@@ -116,10 +116,11 @@ fn all_agree_with_path_tracing() {
 /// theirs over the squared number of iterations \[Knaus and Zwicker 2011, 3\]; the averaged maps of a bandwidth that never shrinks keep its bias.
 #[test]
 fn errors_are_the_sums_over_bandwidths() {
-    let scene = field::scene();
-    let camera = scene.camera(&field::view()).expect("a camera");
+    let scene = Field::Square.scene();
+    let camera = scene.camera(&field::view(1)).expect("a camera");
     let (radius, photons, n, seeds) = (0.2, 1000, 128, 24);
-    let fields: Vec<PixelField> = (0..128).map(|k| PixelField::new((k % 8, k / 8), radius, photons)).collect();
+    let fields: Vec<PixelField> =
+        (0..128).map(|k| PixelField::new(Field::Square, (k % 8, k / 8), 1, radius, photons)).collect();
     for alpha in [2.0 / 3.0, 1.0] {
         let moments = |i: u64, field: &PixelField| field.moments(radius * radius * radius2_factor(i, alpha));
         let means: Vec<f64> =
@@ -132,7 +133,7 @@ fn errors_are_the_sums_over_bandwidths() {
         };
         let (mut shares, mut ratios, mut poisson) = (Vec::new(), Vec::new(), Vec::new());
         for seed in 0..seeds {
-            let settings = Settings { alpha, iterations: Some(n), ..field::settings(radius, photons, seed) };
+            let settings = Settings { alpha, iterations: Some(n), ..Field::Square.settings(radius, photons, seed) };
             // Squared deviations of single iterations from their expectation, in all and as a Poisson process would have them.
             let (mut sums, mut squares, mut expected) = ([0.0; 128], [0.0; 128], 0.0);
             let rendered = render(&scene, &camera, &settings, |progress, pixels| {
@@ -165,6 +166,43 @@ fn errors_are_the_sums_over_bandwidths() {
         // The bug: photons that all iterations share.
         assert!((2.0 * ratio.0 - 1.0).abs() > critical * 2.0 * ratio.1, "twice the variance goes unnoticed");
     }
+}
+
+/// Where merging alone finds light, VCM's bias after eight iterations is the mean over its bandwidths of the closed form's. A first iteration without photons, an
+/// eighth of the light, is found.
+#[test]
+fn merging_alone_has_the_bias_of_its_bandwidths() {
+    let scene = Field::Point.scene();
+    let camera = scene.camera(&field::view(4)).expect("a camera");
+    let (radius, n, seeds) = (0.2, 8, 12);
+    let (width, height) = camera.size();
+    let places = (0..width * height).map(|k| (k % width, k / width));
+    let fields: Vec<PixelField> =
+        places.map(|place| PixelField::new(Field::Point, place, 4, radius, width * height)).collect();
+    let alpha = Method::Vcm.alpha();
+    let expected = |field: &PixelField| {
+        let mean = |i| field.moments(radius * radius * radius2_factor(i, alpha)).mean;
+        (1..=n).map(mean).sum::<f64>() / n as f64
+    };
+    let all: f64 = fields.iter().map(expected).sum();
+    let bias = all / fields.iter().map(|field| field.truth).sum::<f64>() - 1.0;
+    let ratios: Vec<f64> = (0..seeds)
+        .map(|seed| {
+            let settings = Settings {
+                method: Method::Vcm,
+                alpha,
+                iterations: Some(n),
+                ..Field::Point.settings(radius, width * height, seed)
+            };
+            let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+            rendered.pixels.iter().map(field::photons_of).sum::<f64>() / all
+        })
+        .collect();
+    let (ratio, error) = mean_and_error(&ratios);
+    let critical = t_critical(ERROR_RATE, 1, seeds as f64 - 1.0);
+    println!("{ratio:.5} +- {error:.5} of what is expected, which has a bias of {bias:.4}");
+    assert!((ratio - 1.0).abs() < critical * error, "{ratio} +- {error}");
+    assert!((ratio * (1.0 - 1.0 / n as f64) - 1.0).abs() > critical * error, "an empty iteration goes unnoticed");
 }
 
 /// The curves of the first talk: in a uniform field the squared radius at fixed points falls as the product of `(N + alpha M) / (N + M)`, the count grows as

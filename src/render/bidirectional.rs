@@ -168,9 +168,8 @@ impl<'a> Passes<'a> {
             return Work { light_paths: 0, photons: 0 };
         };
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
-            // The first pass of all can do without photons if it connects.
-            let first = i == 1 && shared.strategies.connect;
-            self.photons = if first { None } else { Some((i - 1, self.photons_of(i - 1, &shared))) };
+            // Before the first pass of all, too: without photons it would lack the light that only they bring.
+            self.photons = Some((i - 1, self.photons_of(i - 1, &shared)));
         }
         let factor = radius2_factor(i, self.settings.alpha) as f32;
         let merged = self.photons.is_some();

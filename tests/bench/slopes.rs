@@ -1,7 +1,9 @@
-//! Bias and variance against iterations on a field of photons in closed form: the memoryless rule beside its exact finite sums, and CPPM whose test always rejects.
+//! Bias and variance against iterations on fields of photons in closed form: the memoryless rule beside its exact finite sums, by SPPM and where merging alone finds light by VCM,
+//! and CPPM whose test always rejects.
 //!
 //! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
-//! the variance and the mean squared error (mean over pixels, over the squared truth), each with its standard error, and what is expected.
+//! the variance and the mean squared error (mean over pixels, over the squared truth), each with its standard error, and what is expected. Given the bandwidths, which
+//! earlier photons decide, an iteration's expectation is known: `bias_given` is the mean of these, the bias without the photons' noise.
 
 #[path = "../support/field.rs"]
 mod field;
@@ -11,18 +13,67 @@ mod scenes;
 
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
-use caustique::render::{Control, Method, Settings, render};
-use field::PixelField;
+use caustique::render::{Method, Session, Settings, Stage};
+use field::{Field, PixelField};
 use plotters::prelude::*;
 use serde_json::{Value, json};
 
 const RADIUS: f64 = 0.2;
 const PHOTONS: u32 = 2000;
 
+/// What is measured.
+struct Run {
+    name: &'static str,
+    field: Field,
+    /// Pixels for every one of the coarsest picture, across and down.
+    finer: u32,
+    /// Light paths of an iteration.
+    photons: u32,
+    method: Method,
+    /// Of the memoryless rule.
+    alpha: Option<f64>,
+    chi_squared: ChiSquaredSettings,
+}
+
+impl Run {
+    fn memoryless(alpha: f64) -> Run {
+        Run {
+            name: "memoryless",
+            field: Field::Square,
+            finer: 1,
+            photons: PHOTONS,
+            method: Method::Sppm,
+            alpha: Some(alpha),
+            chi_squared: ChiSquaredSettings::default(),
+        }
+    }
+
+    fn forced(k: f64, beta: f64) -> Run {
+        let chi_squared = ChiSquaredSettings { significance: 1.0 - 1e-12, k, beta, ..Default::default() };
+        Run { name: "cppm, forced", method: Method::Cppm, alpha: None, chi_squared, ..Run::memoryless(1.0) }
+    }
+
+    /// One light path a pixel.
+    fn merged() -> Run {
+        let (finer, method) = (4, Method::Vcm);
+        let photons = field::SIZE.0 * field::SIZE.1 * finer * finer;
+        Run {
+            name: "vcm, merging alone",
+            field: Field::Point,
+            finer,
+            photons,
+            method,
+            ..Run::memoryless(method.alpha())
+        }
+    }
+}
+
 /// What a seed has at some number of iterations.
 struct Moment {
     /// Estimates of all pixels.
     estimates: Vec<f64>,
+    /// Their expectations, given the bandwidths.
+    given: Vec<f64>,
     /// Mean over pixels of the sum over iterations of squared deviations from their expectation, over the squared number of iterations and the squared truth.
     sum: f64,
 }
@@ -31,45 +82,58 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let number = |i: usize, default: u64| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let (n, seeds) = (number(0, 8192), number(1, 16));
-    let scene = field::scene();
-    let camera = scene.camera(&field::view()).unwrap_or_else(|e| panic!("{e}"));
-    let (width, height) = field::SIZE;
-    let fields: Vec<PixelField> =
-        (0..width * height).map(|k| PixelField::new((k % width, k / width), RADIUS, PHOTONS)).collect();
-    let forced = |k: f64, beta: f64| ChiSquaredSettings { significance: 1.0 - 1e-12, k, beta, ..Default::default() };
-    let rules = [
-        ("memoryless", Some(2.0 / 3.0), ChiSquaredSettings::default()),
-        ("memoryless", Some(0.5), ChiSquaredSettings::default()),
-        ("cppm, forced", None, forced(0.8, 1.2)),
-        ("cppm, forced", None, forced(0.8, 1.0 / 0.64)),
+    let moments: Vec<u64> = (3..64).map(|e| 1u64 << e).take_while(|m| *m <= n).collect();
+    let runs = [
+        Run::memoryless(2.0 / 3.0),
+        Run::memoryless(0.5),
+        Run::forced(0.8, 1.2),
+        Run::forced(0.8, 1.0 / 0.64),
+        Run::merged(),
     ];
     let mut all = Vec::new();
-    for (name, alpha, chi_squared) in rules {
-        let moments: Vec<u64> = (3..64).map(|e| 1u64 << e).take_while(|m| *m <= n).collect();
+    for run in runs {
+        let Run { name, field, finer, photons, method, alpha, chi_squared } = run;
+        let scene = field.scene();
+        let camera = scene.camera(&field::view(finer)).unwrap_or_else(|e| panic!("{e}"));
+        let (width, height) = camera.size();
+        let fields: Vec<PixelField> = (0..width * height)
+            .map(|k| PixelField::new(field, (k % width, k / width), finer, RADIUS, photons))
+            .collect();
         let mut found: Vec<Vec<Moment>> = moments.iter().map(|_| Vec::new()).collect();
         for seed in 0..seeds {
             let settings = Settings {
-                method: if alpha.is_some() { Method::Sppm } else { Method::Cppm },
+                method,
                 alpha: alpha.unwrap_or(1.0),
                 chi_squared,
-                iterations: Some(n),
-                ..field::settings(RADIUS, PHOTONS, seed)
+                iterations: None,
+                ..field.settings(RADIUS, photons, seed)
             };
-            let (mut sums, mut squares) = (vec![0.0; fields.len()], 0.0);
-            render(&scene, &camera, &settings, |progress, pixels| {
-                let i = progress.iteration;
-                let radius2 = RADIUS * RADIUS * radius2_factor(i, settings.alpha);
-                for ((sum, pixel), field) in sums.iter_mut().zip(pixels).zip(&fields) {
+            let stage = Stage::new(&scene, &camera, &settings);
+            let mut session = Session::new(&stage);
+            let (mut sums, mut given, mut squares) = (vec![0.0; fields.len()], vec![0.0; fields.len()], 0.0);
+            // The bandwidths of the next iteration, where they are the photons' doing.
+            let mut radii = vec![RADIUS; fields.len()];
+            for i in 1..=n {
+                session.step();
+                for (k, (pixel, field)) in session.pixels().iter().zip(&fields).enumerate() {
+                    let radius2 = alpha.map_or(radii[k].powi(2), |a| RADIUS * RADIUS * radius2_factor(i, a));
+                    let mean = field.moments(radius2).mean;
                     let now = field::photons_of(pixel) * i as f64;
-                    squares += ((now - *sum - field.moments(radius2).mean) / field.truth).powi(2);
-                    *sum = now;
+                    squares += ((now - sums[k] - mean) / field.truth).powi(2);
+                    sums[k] = now;
+                    given[k] += mean;
+                }
+                if alpha.is_none() {
+                    let layers = session.layers(|name| name == "Radius1").unwrap_or_else(|e| panic!("{e}"));
+                    let of = layers.get("Radius1").map(|layer| layer.triples()).unwrap_or_default();
+                    radii = of.iter().map(|radius| f64::from(radius[0])).collect();
                 }
                 if let Some(at) = moments.iter().position(|m| *m == i) {
-                    let estimates = pixels.iter().map(field::photons_of).collect();
-                    found[at].push(Moment { estimates, sum: squares / fields.len() as f64 / (i * i) as f64 });
+                    let estimates = session.pixels().iter().map(field::photons_of).collect();
+                    let given = given.iter().map(|sum| sum / i as f64).collect();
+                    found[at].push(Moment { estimates, given, sum: squares / fields.len() as f64 / (i * i) as f64 });
                 }
-                Control::Continue
-            });
+            }
         }
         let series: Vec<Value> = moments.iter().zip(&found).map(|(m, e)| at(*m, e, &fields, alpha)).collect();
         let parameters = match alpha {
@@ -110,12 +174,15 @@ fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
             .y_label_area_size(64)
             .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
         chart.configure_mesh().x_desc("iterations").light_line_style(TRANSPARENT).draw()?;
-        for (rule, colour) in rules.iter().zip([(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167)]) {
+        for (rule, colour) in
+            rules.iter().zip([(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233)])
+        {
             let colour = RGBColor(colour.0, colour.1, colour.2);
             let parameters = &rule["parameters"];
             let (name, slope) = match parameters["alpha"].as_f64() {
                 Some(alpha) => {
-                    (format!("memoryless, alpha {alpha:.2}"), if key == "bias" { alpha - 1.0 } else { -alpha })
+                    let name = rule["rule"].as_str().unwrap_or("");
+                    (format!("{name}, alpha {alpha:.2}"), if key == "bias" { alpha - 1.0 } else { -alpha })
                 }
                 None => {
                     let (k, beta) =
@@ -125,6 +192,7 @@ fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
                     (format!("CPPM, k {k}, beta {beta:.2}"), if key == "bias" { -rate } else { rate - 1.0 })
                 }
             };
+            let key = if key == "bias" && rule["parameters"]["alpha"].is_null() { "bias_given" } else { key };
             let measured = points(rule, key);
             let found: Vec<[f64; 3]> = rule["series"]
                 .as_array()
@@ -181,9 +249,11 @@ fn at(n: u64, seeds: &[Moment], fields: &[PixelField], alpha: Option<f64>) -> Va
     let variance = mean(&by_seed(&|k| means[k]));
     let error = mean(&by_seed(&|k| fields[k].truth));
     let bias = mean(&estimates.iter().map(|e| share(e)).collect::<Vec<_>>());
+    let given = mean(&seeds.iter().map(|moment| share(&moment.given)).collect::<Vec<_>>());
     let mut value = json!({
         "iterations": n,
         "bias": bias,
+        "bias_given": given,
         "variance": [variance.0 * unbiased, variance.1 * unbiased],
         "mse": error,
     });

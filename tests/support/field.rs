@@ -1,10 +1,10 @@
-//! A field of photons in closed form: a square lamp that faces a mirror lights a floor by its mirror image alone, as far as photons go.
+//! Fields of photons in closed form: a floor lit by the mirror images of a lamp.
 //!
-//! The lamp hangs in the plane x = 0 and faces the mirror at x = -0.25; on its way from there to the floor that the camera sees light passes below it, and with paths
-//! of three segments every photon there has come by the mirror. The floor's irradiance is an integral over the image of the lamp; a kernel's expectation is
-//! its mean over discs. Photons of equal flux that fall independently have the variance of a Poisson process.
+//! What comes straight from the lamp is no photon's; with paths as short as [`Field::max_depth`] every photon on the floor has come by one mirror.
+//! The floor's irradiance is that of the lamp's images; a kernel's expectation is its mean over discs. Photons of equal flux that fall independently
+//! have the variance of a Poisson process.
 
-use super::scenes::{add, build, look_at, matte, mirror, quad};
+use super::scenes::{add, build, look_at, matte, mirror, point_light, quad};
 use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Levels, Settings};
@@ -12,88 +12,140 @@ use caustique::scene::description::Projection;
 use caustique::scene::{Description, Scene, View};
 use std::f64::consts::PI;
 
-/// Pixels across and down, each of side [`PIXEL`], from [`CORNER`] on.
+/// Pixels of the coarsest picture across and down, each of side [`PIXEL`], from [`CORNER`] on.
 pub const SIZE: (u32, u32) = (8, 16);
 /// Side of a pixel (m).
 pub const PIXEL: f64 = 0.1;
 /// Least x and z of the picture.
 pub const CORNER: (f64, f64) = (0.0, -0.8);
-/// Reflectance of the floor, radiance of the lamp, its side and the height of its centre.
+/// Reflectance of the floor, radiance of the square lamp, its side and the height of either's centre.
 const RHO: f64 = 0.5;
 const RADIANCE: f64 = 10.0;
 const SIDE: f64 = 0.06;
 const HEIGHT: f64 = 0.2;
-/// Where the mirror is.
+/// Where the mirrors are: a wall, and a ceiling where there is one.
 const MIRROR: f64 = -0.25;
+const CEILING: f64 = 1.0;
+/// Intensity of the point lamp (W/sr).
+const INTENSITY: f64 = 1.0;
 
-/// The scene, with its one camera.
-pub fn scene() -> Scene {
-    let mut description = Description::default();
-    let floor = quad(Vec3::new(MIRROR as f32, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 4.0);
-    add(&mut description, "floor", floor, matte(RHO as f32, 0.0));
-    let wall = quad(Vec3::new(MIRROR as f32, 0.0, -3.0), Vec3::Y * 3.0, Vec3::Z * 6.0);
-    add(&mut description, "mirror", wall, mirror());
-    let (low, side) = ((HEIGHT - 0.5 * SIDE) as f32, SIDE as f32);
-    let lamp = quad(Vec3::new(0.0, low, -0.5 * side), Vec3::Z * side, Vec3::Y * side);
-    add(&mut description, "lamp", lamp, matte(0.0, RADIANCE as f32));
-    let (width, height) = (f64::from(SIZE.0) * PIXEL, f64::from(SIZE.1) * PIXEL);
-    let center = DVec3::new(CORNER.0 + 0.5 * width, 0.0, CORNER.1 + 0.5 * height);
-    let mut camera = look_at(center + DVec3::Y * 2.0, center, 40.0);
-    camera.projection = Projection::Orthographic { xmag: (0.5 * width) as f32, ymag: (0.5 * height) as f32 };
-    description.cameras.push(camera);
-    build(description)
+/// What lights the floor, and how it is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Field {
+    /// A square lamp that faces the mirror, by that; seen from above.
+    Square,
+    /// A point lamp, by the wall and the ceiling; seen in the ceiling. Nothing but merging finds what photons bring.
+    Point,
 }
 
-/// The picture.
-pub fn view() -> View {
-    View { camera: None, width: Some(SIZE.0), height: Some(SIZE.1) }
-}
-
-/// Settings of one level with this first bandwidth, and paths of three segments.
-pub fn settings(radius: f64, photons: u32, seed: u64) -> Settings {
-    Settings {
-        seed,
-        photons,
-        levels: Levels::new(1),
-        initial: InitialBandwidth::Fixed(radius as f32),
-        max_depth: 3,
-        ..Settings::default()
+impl Field {
+    /// The scene, with its one camera.
+    pub fn scene(self) -> Scene {
+        let mut description = Description::default();
+        let floor = quad(Vec3::new(MIRROR as f32, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 4.0);
+        add(&mut description, "floor", floor, matte(RHO as f32, 0.0));
+        let wall = quad(Vec3::new(MIRROR as f32, 0.0, -3.0), Vec3::Y * 3.0, Vec3::Z * 6.0);
+        add(&mut description, "mirror", wall, mirror());
+        let (width, height) = (f64::from(SIZE.0) * PIXEL, f64::from(SIZE.1) * PIXEL);
+        let center = DVec3::new(CORNER.0 + 0.5 * width, 0.0, CORNER.1 + 0.5 * height);
+        let mut camera = match self {
+            Field::Square => {
+                let (low, side) = ((HEIGHT - 0.5 * SIDE) as f32, SIDE as f32);
+                let lamp = quad(Vec3::new(0.0, low, -0.5 * side), Vec3::Z * side, Vec3::Y * side);
+                add(&mut description, "lamp", lamp, matte(0.0, RADIANCE as f32));
+                look_at(center + DVec3::Y * 2.0, center, 40.0)
+            }
+            Field::Point => {
+                let at = Vec3::new(MIRROR as f32, CEILING as f32, -3.0);
+                add(&mut description, "ceiling", quad(at, Vec3::X * 4.0, Vec3::Z * 6.0), mirror());
+                description.lights.push(point_light(DVec3::Y * HEIGHT, INTENSITY as f32));
+                look_at(center + DVec3::Y * 0.5, center + DVec3::Y, 40.0)
+            }
+        };
+        camera.projection = Projection::Orthographic { xmag: (0.5 * width) as f32, ymag: (0.5 * height) as f32 };
+        description.cameras.push(camera);
+        build(description)
     }
+
+    /// Segments of the longest paths.
+    pub fn max_depth(self) -> u32 {
+        match self {
+            Field::Square => 3,
+            Field::Point => 4,
+        }
+    }
+
+    /// Settings of one level with this first bandwidth.
+    pub fn settings(self, radius: f64, photons: u32, seed: u64) -> Settings {
+        Settings {
+            seed,
+            photons,
+            levels: Levels::new(1),
+            initial: InitialBandwidth::Fixed(radius as f32),
+            max_depth: self.max_depth(),
+            ..Settings::default()
+        }
+    }
+
+    /// Irradiance of the floor at (x, z) by mirror images (W/m2).
+    pub fn irradiance(self, x: f64, z: f64) -> f64 {
+        match self {
+            Field::Square => {
+                const N: i32 = 12;
+                let at = |i: i32| (f64::from(i) + 0.5) / f64::from(N) * SIDE - 0.5 * SIDE;
+                let mut sum = 0.0;
+                for i in 0..N {
+                    for j in 0..N {
+                        // The image is as far behind the mirror, and faces +x.
+                        let (dx, dy, dz) = (x - 2.0 * MIRROR, HEIGHT + at(i), z - at(j));
+                        let d2 = dx * dx + dy * dy + dz * dz;
+                        sum += dx * dy / (d2 * d2);
+                    }
+                }
+                RADIANCE * sum * (SIDE / f64::from(N)).powi(2)
+            }
+            Field::Point => {
+                let images = [(2.0 * MIRROR, HEIGHT), (0.0, 2.0 * CEILING - HEIGHT)];
+                let of = |(from, height): (f64, f64)| {
+                    INTENSITY * height * ((x - from).powi(2) + height * height + z * z).powf(-1.5)
+                };
+                images.into_iter().map(of).sum()
+            }
+        }
+    }
+
+    /// Flux of one of so many photons (W).
+    fn flux(self, photons: u32) -> f64 {
+        let power = match self {
+            Field::Square => RADIANCE * PI * SIDE * SIDE,
+            Field::Point => 4.0 * PI * INTENSITY,
+        };
+        power / f64::from(photons)
+    }
+
+    /// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles whose radii
+    /// halve equal areas, exact to the sixth order in the radius.
+    fn disc(self, x: f64, z: f64, radius2: f64) -> f64 {
+        // Gauss-Legendre in the squared radius.
+        const NODES: [(f64, f64); 3] =
+            [(0.112_701_665_379_258, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_742, 5.0 / 18.0)];
+        NODES.iter().map(|(s, weight)| weight * self.ring(x, z, (s * radius2).sqrt())).sum()
+    }
+
+    fn ring(self, x: f64, z: f64, r: f64) -> f64 {
+        let at = |k: i32| (2.0 * PI * f64::from(k) / 6.0).sin_cos();
+        (0..6).map(at).map(|(sin, cos)| self.irradiance(x + r * cos, z + r * sin)).sum::<f64>() / 6.0
+    }
+}
+
+/// The picture, with so many pixels for every one of [`SIZE`] across and down.
+pub fn view(finer: u32) -> View {
+    View { camera: None, width: Some(SIZE.0 * finer), height: Some(SIZE.1 * finer) }
 }
 
 /// What photons bring to a pixel, on average over its iterations.
 pub fn photons_of(pixel: &Pixel) -> f64 {
     (pixel.parts.caustic.x + pixel.parts.indirect.x) / f64::from(pixel.iterations.max(1))
-}
-
-/// Irradiance of the floor at (x, z) by the mirror image (W/m2).
-pub fn irradiance(x: f64, z: f64) -> f64 {
-    const N: i32 = 12;
-    let at = |i: i32| (f64::from(i) + 0.5) / f64::from(N) * SIDE - 0.5 * SIDE;
-    let mut sum = 0.0;
-    for i in 0..N {
-        for j in 0..N {
-            // The image is as far behind the mirror, and faces +x.
-            let (dx, dy, dz) = (x - 2.0 * MIRROR, HEIGHT + at(i), z - at(j));
-            let d2 = dx * dx + dy * dy + dz * dz;
-            sum += dx * dy / (d2 * d2);
-        }
-    }
-    RADIANCE * sum * (SIDE / f64::from(N)).powi(2)
-}
-
-/// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles whose radii
-/// halve equal areas, exact to the sixth order in the radius.
-fn disc(x: f64, z: f64, radius2: f64) -> f64 {
-    // Gauss-Legendre in the squared radius.
-    const NODES: [(f64, f64); 3] =
-        [(0.112_701_665_379_258, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_742, 5.0 / 18.0)];
-    NODES.iter().map(|(s, weight)| weight * ring(x, z, (s * radius2).sqrt())).sum()
-}
-
-fn ring(x: f64, z: f64, r: f64) -> f64 {
-    let at = |k: i32| (2.0 * PI * f64::from(k) / 6.0).sin_cos();
-    (0..6).map(at).map(|(sin, cos)| irradiance(x + r * cos, z + r * sin)).sum::<f64>() / 6.0
 }
 
 /// What one iteration gives a pixel.
@@ -119,25 +171,29 @@ pub struct PixelField {
 }
 
 impl PixelField {
-    /// Of pixel (i, j) for bandwidths up to `radius` and so many photons an iteration.
-    pub fn new((i, j): (u32, u32), radius: f64, photons: u32) -> PixelField {
+    /// Of pixel (i, j) of a view for bandwidths up to `radius` and so many photons an iteration.
+    pub fn new(field: Field, (i, j): (u32, u32), finer: u32, radius: f64, photons: u32) -> PixelField {
         let largest2 = radius * radius;
         let mut means = [0.0; 3];
         let (mut first, mut second) = (0.0, 0.0);
         const N: i32 = 4;
+        // The camera that looks down has its right at -x; both have z up.
+        let across = if field == Field::Square { SIZE.0 * finer - 1 - i } else { i };
+        let up = SIZE.1 * finer - 1 - j;
         for k in 0..N * N {
-            // The camera looks down: its right is -x, and its up is z.
-            let at = |k: i32, pixel: u32| (f64::from(pixel) + (f64::from(k) + 0.5) / f64::from(N)) * PIXEL;
-            let (x, z) = (CORNER.0 + at(k % N, SIZE.0 - 1 - i), CORNER.1 + at(k / N, SIZE.1 - 1 - j));
+            let at = |k: i32, pixel: u32| {
+                (f64::from(pixel) + (f64::from(k) + 0.5) / f64::from(N)) * PIXEL / f64::from(finer)
+            };
+            let (x, z) = (CORNER.0 + at(k % N, across), CORNER.1 + at(k / N, up));
             for (mean, share) in means.iter_mut().zip([0.0, 0.5, 1.0]) {
-                let e = if share == 0.0 { irradiance(x, z) } else { disc(x, z, share * largest2) };
+                let e = if share == 0.0 { field.irradiance(x, z) } else { field.disc(x, z, share * largest2) };
                 *mean += e * RHO / PI / f64::from(N * N);
             }
-            let e = irradiance(x, z) * RHO / PI;
+            let e = field.irradiance(x, z) * RHO / PI;
             first += e / f64::from(N * N);
             second += e * e / f64::from(N * N);
         }
-        let flux = RADIANCE * PI * SIDE * SIDE / f64::from(photons);
+        let flux = field.flux(photons);
         PixelField { truth: means[0], means, largest2, spread: second - first * first, flux }
     }
 
