@@ -1,6 +1,7 @@
 //! All materials and textures of a scene.
 
 use super::{Alpha, Material};
+use crate::bsdf::DELTA_ALPHA;
 use crate::geometry::Surface;
 use crate::math::Rgb;
 use crate::texture::{Texture, TextureRef};
@@ -50,6 +51,14 @@ impl Material {
     /// Whether it shows reflections: its base, or a coating, has a narrow lobe.
     pub fn is_glossy(&self) -> bool {
         self.has_narrow_base() || self.clearcoat > 0.0
+    }
+
+    /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light of its own to show.
+    pub fn is_clear(&self) -> bool {
+        let perfect = self.roughness * self.roughness < DELTA_ALPHA && self.metallic_roughness_texture.is_none();
+        let glass = self.transmission == 1.0 && self.transmission_texture.is_none() && self.metallic == 0.0;
+        let covered = self.clearcoat > 0.0 || self.sheen_color != Rgb::ZERO;
+        perfect && (glass || self.metallic == 1.0) && !covered
     }
 
     /// Whether it makes caustics that count: mirrors and glass, narrow enough to focus light.

@@ -22,7 +22,8 @@ impl Presence {
         let worn = worn_in(scene);
         let objects: Vec<String> = worn.iter().flat_map(|worn| worn.objects.iter().cloned()).collect();
         let under = format!("under {}", cut(&all));
-        let shines = |worn: &Worn| worn.material.is_glossy().then(|| worn.label());
+        let glossy = |worn: &Worn| worn.material.is_glossy() && !worn.material.is_clear();
+        let shines = |worn: &Worn| glossy(worn).then(|| worn.label());
         let focuses = |worn: &&Worn| worn.material.focuses();
         let caustic = |worn: &Worn| format!("{} {under}", worn.label());
         let seen = |worn: &Worn| {

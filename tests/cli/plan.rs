@@ -14,7 +14,7 @@ fn the_plan_of_a_scene() {
   direct          connections   light "Lamp"
                                 the environment
   indirect        connections   "Floor", "Mirror" under light "Lamp", the environment
-  glossy          eye paths     material "silver" on "Mirror"
+  glossy          -             nothing in the scene calls for it
   caustic         connections   material "silver" on "Mirror" under light "Lamp", the environment
   sds             left out      caustics seen in material "silver" on "Mirror"
   volume          -             nothing in the scene calls for it

@@ -7,9 +7,9 @@ use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
 use caustique::plan::switch::Removed;
-use caustique::plan::{Asked, Effect, Plan, Switches};
+use caustique::plan::{Asked, Plan, Switches};
 use caustique::render;
-use caustique::render::auto::{Choice, Shares, Trial};
+use caustique::render::auto::{Choice, Trial};
 use caustique::scene::Scene;
 use std::path::Path;
 
@@ -41,8 +41,12 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
     let search = wishes.choice.map_or(method.search(), |choice| choice.settings.search());
     let asked = Asked { method: method.name(), because: &because, search, max_depth, switches, removed };
     let mut plan = Plan::new(scene, camera, &asked);
-    if let Some(trial) = wishes.choice.and_then(Choice::trial) {
-        weigh(&mut plan, trial);
+    for weight in wishes.choice.iter().flat_map(|choice| &choice.weights) {
+        let effect = &mut plan.effects[weight.effect as usize];
+        if effect.present {
+            (effect.energy, effect.error_if_off) = (Some(weight.energy), Some(weight.error_if_off));
+            effect.seconds_per_iteration = weight.saved;
+        }
     }
     plan
 }
@@ -63,31 +67,6 @@ pub fn why(choice: &Choice) -> String {
         _ => String::new(),
     };
     format!("auto: {name}{with} is expected to reach an error of {} ({})", error(trial), others.join("; "))
-}
-
-/// Fills in what a trial has measured.
-fn weigh(plan: &mut Plan, trial: &Trial) {
-    let Shares { emission, direct, indirect, caustic, volume } = trial.shares;
-    let without = &trial.without;
-    let measured = [
-        (Effect::Emission, emission, without.emission),
-        (Effect::Direct, direct, without.direct),
-        (Effect::Indirect, indirect, without.indirect),
-        (Effect::Caustic, caustic, without.caustic),
-        (Effect::Volume, volume, without.volume),
-    ];
-    for (effect, energy, error) in measured {
-        let effect = &mut plan.effects[effect as usize];
-        if effect.present {
-            (effect.energy, effect.error_if_off) = (Some(energy), Some(error));
-        }
-    }
-    for (effect, seconds) in [Effect::Indirect, Effect::Caustic].into_iter().zip(trial.seconds_of_parts) {
-        let effect = &mut plan.effects[effect as usize];
-        if effect.present {
-            effect.seconds_per_iteration = seconds;
-        }
-    }
 }
 
 /// Whether the method can do without what media scatter, or finds it.

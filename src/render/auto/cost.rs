@@ -68,6 +68,14 @@ impl Cost {
         if self.scattering { MEDIA } else { 1.0 }
     }
 
+    /// Core-seconds of an iteration that go to photons, where they are gathered.
+    pub fn of_photons(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
+        let without = Settings { photons: 0, ..settings.clone() };
+        let paths = pixels * if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
+        self.of(way, settings, pixels) - self.of(way, &without, pixels)
+            + self.media() * paths * self.lengths.eye_to_broad * GATHER
+    }
+
     /// Core-seconds of an iteration that indirect light takes, and caustics, where one can be done without the other.
     pub fn parts(&self, way: Way, settings: &Settings, pixels: f64) -> [Option<f64>; 2] {
         let Lengths { eye, eye_to_broad, .. } = self.lengths;

@@ -12,9 +12,11 @@ mod balance;
 mod cost;
 mod tail;
 mod trial;
+mod weights;
 
 pub use balance::Balance;
-pub use trial::{Shares, Trial};
+pub use trial::Trial;
+pub use weights::Weight;
 
 use super::control::{Clock, cpu_seconds};
 use super::guiding::ROUNDS;
@@ -30,6 +32,8 @@ use cost::Cost;
 
 /// Share of the render's cost that the pilot may take.
 const SHARE: f64 = 0.05;
+/// Share of that which may go to weighing the effects.
+const WEIGHING: f64 = 0.2;
 /// Pixels of the pilot's picture.
 const PIXELS: (f64, f64) = (768.0, 4096.0);
 /// Iterations of a candidate: as many as its share of the pilot allows.
@@ -85,6 +89,8 @@ pub struct Choice {
     pub trials: Vec<Trial>,
     /// Index of the one chosen.
     pub chosen: Option<usize>,
+    /// What effects of light mean to the picture; none where the render is too short.
+    pub weights: Vec<Weight>,
     /// Why.
     pub because: String,
     /// Time that it took.
@@ -127,18 +133,23 @@ fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
 pub fn choose(scene: &Scene, camera: &Camera, free: Free, make: impl Fn(Way) -> Option<Settings>) -> Option<Choice> {
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let untried = make(Way::UNTRIED)?;
-    let (trials, because) = try_all(scene, camera, free, &untried, &make);
+    let pilot = Pilot::new(scene, camera, &untried);
+    let mut weights = pilot.weigh();
+    let left = SHARE * pilot.budget - if weights.is_empty() { 0.0 } else { pilot.weighing_cost() };
+    let (trials, because) = pilot.try_all(left, free, &make);
     let best = (0..trials.len()).min_by(|&a, &b| trials[a].expected.total_cmp(&trials[b].expected));
-    let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
-    let Some(best) = best else {
-        let settings = Settings { decided: spent, ..untried };
-        return Some(Choice { settings, way: Way::UNTRIED, trials, chosen: None, because, spent });
-    };
-    let way = trials[best].way;
+    let way = best.map_or(Way::UNTRIED, |best| trials[best].way);
     let mut settings = make(way)?;
-    trials[best].balance.apply(&mut settings);
+    if let Some(best) = best {
+        trials[best].balance.apply(&mut settings);
+    }
+    let cost = best.map_or(pilot.cost, |best| trials[best].cost);
+    for weight in &mut weights {
+        weight.saved = weights::saved(scene, &cost, (way, &settings), weight.effect, pilot.pixels);
+    }
+    let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
-    Some(Choice { settings, way, trials, chosen: Some(best), because, spent })
+    Some(Choice { settings, way, trials, chosen: best, weights, because, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.
@@ -156,79 +167,122 @@ fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Gu
     Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide), scattering: scene.survey.scattering() }
 }
 
-fn try_all(
-    scene: &Scene,
-    camera: &Camera,
-    free: Free,
-    untried: &Settings,
-    make: &impl Fn(Way) -> Option<Settings>,
-) -> (Vec<Trial>, String) {
-    let (width, height) = camera.size();
-    let pixels = f64::from(width) * f64::from(height);
-    let cost = counts(scene, camera, untried, None);
-    let budget = match (untried.iterations, untried.time) {
-        (Some(n), time) => {
-            let work = n as f64 * cost.of(Way::UNTRIED, untried, pixels);
-            time.map_or(work, |seconds| work.min(seconds * CORES))
-        }
-        (None, Some(seconds)) => seconds * CORES,
-        (None, None) => UNLIMITED,
-    };
-    // Bandwidths that shrink only where photons do not look uniform are better ones. Of several levels each would shrink on its own, and the combiner has
-    // learnt on levels that keep their ratios.
-    let counted = make(Way { method: Method::Cppm, ..Way::UNTRIED }).is_some_and(|settings| settings.levels.count == 1);
-    let gathering = if counted { Method::Cppm } else { Method::Sppm };
-    let ways: Vec<(Way, Settings)> =
-        candidates(scene, gathering).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect();
-    if ways.len() < 2 {
-        return (Vec::new(), "the one way that these options leave".into());
-    }
-    let trial_cost = |pixels: f64, photons: f64| -> f64 {
-        let each = |(way, settings): &(Way, Settings)| {
-            // Learning a guide takes about as much as an iteration of a trial every other round.
-            let learning = if way.guided { ROUNDS as f64 / 2.0 } else { 0.0 };
-            (ITERATIONS.0 as f64 + learning) * cost.of(*way, &trial::settings(settings, photons), pixels)
+/// What a pilot is of.
+struct Pilot<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    /// Settings of [`Way::UNTRIED`].
+    untried: &'a Settings,
+    cost: Cost,
+    /// Pixels of the whole picture.
+    pixels: f64,
+    /// What the render may take (core-seconds).
+    budget: f64,
+}
+
+impl<'a> Pilot<'a> {
+    fn new(scene: &'a Scene, camera: &'a Camera, untried: &'a Settings) -> Pilot<'a> {
+        let (width, height) = camera.size();
+        let pixels = f64::from(width) * f64::from(height);
+        let cost = counts(scene, camera, untried, None);
+        let budget = match (untried.iterations, untried.time) {
+            (Some(n), time) => {
+                let work = n as f64 * cost.of(Way::UNTRIED, untried, pixels);
+                time.map_or(work, |seconds| work.min(seconds * CORES))
+            }
+            (None, Some(seconds)) => seconds * CORES,
+            (None, None) => UNLIMITED,
         };
-        ways.iter().map(each).sum()
-    };
-    let allowed = SHARE * budget;
-    let least = PIXELS.0.min(pixels);
-    let few = trial::PHOTONS.0;
-    if trial_cost(least, few) > allowed {
-        return (Vec::new(), "the render is too short to try others".into());
+        Pilot { scene, camera, untried, cost, pixels, budget }
     }
-    // The cost grows linearly with pixels. Half of it goes to what makes all equal: cheap ones run for longer.
-    let allowed_once = 0.5 * allowed;
-    let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
-    let most = least + (allowed_once - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
-    let factor = (most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0);
-    let (small, sparse) = (camera.resized(factor), camera.sparse(factor));
-    let small_pixels = f64::from(small.size().0) * f64::from(small.size().1);
-    // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
-    let spare = allowed_once / trial_cost(small_pixels, few);
-    let photons = (few * spare).clamp(few, trial::PHOTONS.1);
-    let plan = trial::Plan { photons, budget: budget - allowed, free, pixels };
-    let mut values = Vec::new();
-    let mut trials: Vec<Trial> = ways
-        .iter()
-        .map(|(way, settings)| {
-            let once = cost.of(*way, &trial::settings(settings, photons), small_pixels);
-            let iterations = (allowed / (ways.len() as f64 * once)) as u64;
-            let iterations = iterations.clamp(ITERATIONS.0, ITERATIONS.1);
-            // What light paths send to the film needs pixels that cover it.
-            let bidirectional = matches!(way.method, Method::Bdpt | Method::Vcm);
-            let small = if bidirectional { &small } else { &sparse };
-            let guided = |guide: &Guide| counts(scene, camera, untried, Some(guide));
-            let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
-            Trial::new(scene, small, (*way, settings), cost_with, (&plan, iterations), &mut values)
-        })
-        .collect();
+
+    /// Pixels of the smallest picture that says anything.
+    fn least(&self) -> f64 {
+        PIXELS.0.min(self.pixels)
+    }
+
+    /// Core-seconds that weighing the effects takes.
+    fn weighing_cost(&self) -> f64 {
+        let settings = trial::settings(self.untried, trial::PHOTONS.0);
+        (weights::PICTURES as u64 * ITERATIONS.0) as f64 * self.cost.of(Way::UNTRIED, &settings, self.least())
+    }
+
+    /// What effects of light mean to the picture; nothing where the render is too short.
+    fn weigh(&self) -> Vec<Weight> {
+        if self.weighing_cost() > WEIGHING * SHARE * self.budget {
+            return Vec::new();
+        }
+        let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
+        let presence = Presence::of(self.scene, self.camera);
+        let settings = trial::settings(self.untried, trial::PHOTONS.0);
+        weights::weigh(self.scene, &small, &settings, |effect| !presence.because(effect).is_empty())
+    }
+
+    /// Tries what there is for so many core-seconds; returns the trials and why one of them is to be taken, or none.
+    fn try_all(&self, allowed: f64, free: Free, make: &impl Fn(Way) -> Option<Settings>) -> (Vec<Trial>, String) {
+        let Pilot { scene, camera, untried, cost, pixels, .. } = *self;
+        // Bandwidths that shrink only where photons do not look uniform are better ones. Of several levels each would shrink on its own, and the combiner has
+        // learnt on levels that keep their ratios.
+        let counted =
+            make(Way { method: Method::Cppm, ..Way::UNTRIED }).is_some_and(|settings| settings.levels.count == 1);
+        let gathering = if counted { Method::Cppm } else { Method::Sppm };
+        let ways: Vec<(Way, Settings)> = candidates(scene, gathering)
+            .into_iter()
+            .filter_map(|way| make(way).map(|settings| (way, settings)))
+            .collect();
+        if ways.len() < 2 {
+            return (Vec::new(), "the one way that these options leave".into());
+        }
+        let trial_cost = |pixels: f64, photons: f64| -> f64 {
+            let each = |(way, settings): &(Way, Settings)| {
+                // Learning a guide takes about as much as an iteration of a trial every other round.
+                let learning = if way.guided { ROUNDS as f64 / 2.0 } else { 0.0 };
+                (ITERATIONS.0 as f64 + learning) * cost.of(*way, &trial::settings(settings, photons), pixels)
+            };
+            ways.iter().map(each).sum()
+        };
+        let (least, few) = (self.least(), trial::PHOTONS.0);
+        if trial_cost(least, few) > allowed {
+            return (Vec::new(), "the render is too short to try others".into());
+        }
+        // The cost grows linearly with pixels. Half of it goes to what makes all equal: cheap ones run for longer.
+        let allowed_once = 0.5 * allowed;
+        let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
+        let most = least + (allowed_once - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
+        let factor = (most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0);
+        let (small, sparse) = (camera.resized(factor), camera.sparse(factor));
+        let small_pixels = f64::from(small.size().0) * f64::from(small.size().1);
+        // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
+        let spare = allowed_once / trial_cost(small_pixels, few);
+        let photons = (few * spare).clamp(few, trial::PHOTONS.1);
+        let plan = trial::Plan { photons, budget: (1.0 - SHARE) * self.budget, free, pixels };
+        let mut values = Vec::new();
+        let mut trials: Vec<Trial> = ways
+            .iter()
+            .map(|(way, settings)| {
+                let once = cost.of(*way, &trial::settings(settings, photons), small_pixels);
+                let iterations = (allowed / (ways.len() as f64 * once)) as u64;
+                let iterations = iterations.clamp(ITERATIONS.0, ITERATIONS.1);
+                // What light paths send to the film needs pixels that cover it.
+                let bidirectional = matches!(way.method, Method::Bdpt | Method::Vcm);
+                let small = if bidirectional { &small } else { &sparse };
+                let guided = |guide: &Guide| counts(scene, camera, untried, Some(guide));
+                let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
+                Trial::new(scene, small, (*way, settings), cost_with, (&plan, iterations), &mut values)
+            })
+            .collect();
+        rule_out(&mut trials);
+        (trials, "least expected error".into())
+    }
+}
+
+/// Rules out what has not seen the caustics that photons show.
+fn rule_out(trials: &mut [Trial]) {
     let gathers = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;
-    let caustics = trials.iter().filter(gathers).map(|trial| trial.shares.caustic).fold(0.0, f64::max);
+    let caustics = trials.iter().filter(gathers).map(|trial| trial.caustics).fold(0.0, f64::max);
     for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
-        if trial.shares.caustic < FOUND * caustics {
+        if trial.caustics < FOUND * caustics {
             trial.expected = f64::INFINITY;
         }
     }
-    (trials, "least expected error".into())
 }

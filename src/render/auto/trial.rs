@@ -22,36 +22,19 @@ pub(super) const PHOTONS: (f64, f64) = (0.125, 1.0);
 /// and the box with glass show after ten seconds, and less than the paper says of long renders [CPPM 2020, Table 1].
 const COUNTED: f64 = 0.7;
 /// Added to a pixel's squared value: relMSE.
-const DARK: f64 = 0.01;
-
-/// What an additive part of the picture means to it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Shares {
-    /// Light sources seen directly or through perfect mirrors and clear glass.
-    pub emission: f64,
-    /// Direct light.
-    pub direct: f64,
-    /// Everything else from surfaces.
-    pub indirect: f64,
-    /// Caustics.
-    pub caustic: f64,
-    /// Light scattered by media on its way to the eye.
-    pub volume: f64,
-}
+pub(super) const DARK: f64 = 0.01;
 
 /// A candidate and how it did.
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
     /// The candidate.
     pub way: Way,
-    /// Share of the picture's light by part.
-    pub shares: Shares,
-    /// Relative error (the root of relMSE) of a picture without the part.
-    pub without: Shares,
+    /// Share of caustics in the picture's light.
+    pub caustics: f64,
     /// Counted core-seconds of an iteration of the whole picture.
     pub seconds_per_iteration: f64,
-    /// Of them those that indirect light takes, and caustics, where one can be done without the other.
-    pub seconds_of_parts: [Option<f64>; 2],
+    /// The counts behind it.
+    pub(super) cost: Cost,
     /// Expected relMSE when the budget is spent.
     pub expected: f64,
     /// What suits it.
@@ -85,13 +68,13 @@ pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
     }
 }
 
-fn mean(v: DVec3) -> f64 {
+pub(super) fn mean(v: DVec3) -> f64 {
     v.element_sum() / 3.0
 }
 
 /// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of `levels`. A pixel's own mean would not
 /// do: where one bright sample is all that it has, it is as large as its error. It counts where two eye paths agree on it, for lamps stand out.
-fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
+pub(super) fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
     let smoothest = levels.count - 1;
     const REACH: usize = 2;
     let (width, height) = (width as usize, height as usize);
@@ -136,10 +119,9 @@ struct Sums {
     squared_bias: f64,
     /// Number of pixels in these.
     pixels: f64,
-    /// The parts, and their squares, of all pixels.
-    parts: [f64; 5],
-    squares: [f64; 5],
-    all: f64,
+    /// Light of all pixels, and its caustics.
+    light: f64,
+    caustics: f64,
 }
 
 impl Sums {
@@ -159,13 +141,9 @@ impl Sums {
             let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
             let (n, variance, scale) = (f64::from(pixel.iterations), relative((pixel, value)), scale(value));
             let parts = &pixel.parts;
-            let parts = [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume];
-            for (k, part) in parts.into_iter().enumerate() {
-                let part = part / n;
-                sums.parts[k] += mean(part);
-                sums.squares[k] += mean(part * part) * scale;
-            }
-            sums.all += 1.0;
+            let all = parts.emission + parts.direct + parts.indirect + parts.caustic + parts.volume;
+            sums.light += mean(all) / n;
+            sums.caustics += mean(parts.caustic) / n;
             if variance > most {
                 continue;
             }
@@ -176,11 +154,6 @@ impl Sums {
             sums.pixels += 1.0;
         }
         sums
-    }
-
-    fn shares(of: [f64; 5]) -> Shares {
-        let [emission, direct, indirect, caustic, volume] = of;
-        Shares { emission, direct, indirect, caustic, volume }
     }
 }
 
@@ -222,7 +195,6 @@ impl Trial {
         let cost = cost_with(session.guide());
         let (done, pixels) = (iterations as f64, sums.pixels.max(1.0));
         let relative = |sum: f64| sum / pixels;
-        let total: f64 = sums.parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let gathers = of.method.gathers();
         let variance = relative(sums.variance[levels.own()]);
         let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };
@@ -266,10 +238,9 @@ impl Trial {
         let tail = sums.tail.sum(NOBODYS, WORST) * sums.tail.after(n);
         Trial {
             way,
-            shares: Sums::shares(sums.parts.map(|part| part / total)),
-            without: Sums::shares(sums.squares.map(|square| (square / sums.all.max(1.0)).sqrt())),
+            caustics: sums.caustics / sums.light.max(f64::MIN_POSITIVE),
             seconds_per_iteration,
-            seconds_of_parts: cost.parts(way, &balanced, plan.pixels),
+            cost,
             expected: (1.0 - WORST) * mean + tail,
             balance,
         }

@@ -1,0 +1,119 @@
+//! What effects of light mean to the picture: how much of it they are, how wrong it would be without them, and what leaving them out would save.
+//!
+//! The additive parts of the picture are told apart by any render. Two effects share a part with others, and pictures of their classes alone tell them: what
+//! narrow lobes show, and caustics seen in mirrors and glass.
+
+use super::cost::Cost;
+use super::trial::{DARK, mean, values};
+use super::{ITERATIONS, Way};
+use crate::camera::Camera;
+use crate::estimator::Pixel;
+use crate::math::DVec3;
+use crate::plan::{ClassSet, Effect, PathClass};
+use crate::render::session::{Session, Stage};
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use crate::transport::Indirect;
+
+/// Effects that have a part of the picture, in the order of [`parts`].
+const WHOLE: [Effect; 5] = [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];
+/// Effects that are in parts of others.
+const APART: [Effect; 2] = [Effect::Glossy, Effect::Sds];
+
+/// What an effect means to the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weight {
+    /// The effect.
+    pub effect: Effect,
+    /// Its share of the picture's light.
+    pub energy: f64,
+    /// Relative error (the root of relMSE) of the picture without it.
+    pub error_if_off: f64,
+    /// Counted core-seconds of an iteration that leaving it out would save; `None` where that is not counted.
+    pub saved: Option<f64>,
+}
+
+/// Pictures that [`weigh`] makes, at most.
+pub(super) const PICTURES: usize = 1 + APART.len();
+
+/// The parts of every pixel.
+fn pictures(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<[DVec3; 5]>, Vec<f64>) {
+    let stage = Stage::new(scene, camera, settings);
+    let mut session = Session::new(&stage);
+    for _ in 0..ITERATIONS.0 {
+        session.step();
+    }
+    let parts = |pixel: &Pixel| {
+        let parts = &pixel.parts;
+        let n = f64::from(pixel.iterations.max(1));
+        [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume].map(|part| part / n)
+    };
+    let values = values(session.pixels(), camera.size(), stage.settings().levels);
+    (session.pixels().iter().map(parts).collect(), values)
+}
+
+/// Weighs the effects of light on a small picture by the settings of a trial that finds all of them. `present`: effects that the scene calls for.
+pub(super) fn weigh(
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    present: impl Fn(Effect) -> bool,
+) -> Vec<Weight> {
+    let (mut whole, values) = pictures(scene, camera, settings);
+    let total = whole.iter().flatten().map(|part| mean(*part)).sum::<f64>().max(f64::MIN_POSITIVE);
+    let weight = |effect: Effect, picture: &mut dyn Iterator<Item = DVec3>| {
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for (light, value) in picture.zip(&values) {
+            sum += mean(light);
+            squares += mean(light * light) / (value * value + DARK);
+        }
+        let error_if_off = (squares / values.len().max(1) as f64).sqrt();
+        Weight { effect, energy: (sum / total).max(0.0), error_if_off, saved: None }
+    };
+    let mut weights = Vec::new();
+    for effect in APART.into_iter().filter(|effect| present(*effect)) {
+        let alone: ClassSet = PathClass::ALL.into_iter().filter(|class| class.effect() == effect).collect();
+        let settings = Settings { classes: settings.classes & alone, ..settings.clone() };
+        if settings.classes.is_empty() {
+            continue;
+        }
+        let (picture, _) = pictures(scene, camera, &settings);
+        weights.push(weight(effect, &mut picture.iter().map(|parts| parts.iter().sum())));
+        for (parts, apart) in whole.iter_mut().zip(picture) {
+            for (part, apart) in parts.iter_mut().zip(apart) {
+                *part -= apart;
+            }
+        }
+    }
+    for (k, effect) in WHOLE.into_iter().enumerate().filter(|(_, effect)| present(*effect)) {
+        weights.push(weight(effect, &mut whole.iter().map(|parts| parts[k])));
+    }
+    weights
+}
+
+/// Core-seconds of an iteration that leaving an effect out would save, where that is counted.
+pub(super) fn saved(
+    scene: &Scene,
+    cost: &Cost,
+    (way, settings): (Way, &Settings),
+    effect: Effect,
+    pixels: f64,
+) -> Option<f64> {
+    let [indirect, caustic] = cost.parts(way, settings, pixels);
+    match effect {
+        Effect::Indirect if indirect.is_some() => indirect,
+        Effect::Caustic if caustic.is_some() => caustic,
+        // Photons are for all of these, and are sent as long as any is there.
+        Effect::Indirect | Effect::Glossy | Effect::Caustic | Effect::Sds | Effect::Volume
+            if way.method.gathers() && way.indirect == Indirect::Photons =>
+        {
+            let left = Settings {
+                classes: settings.classes & ClassSet::without([effect].into_iter().collect()),
+                ..settings.clone()
+            };
+            let (now, then) = (settings.of_photons(scene).is_empty(), left.of_photons(scene).is_empty());
+            Some(if then && !now { cost.of_photons(way, settings, pixels) } else { 0.0 })
+        }
+        _ => None,
+    }
+}
