@@ -1,10 +1,14 @@
 #!/usr/bin/env python3
 """Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone and of vcm, with and without, of all pixels and without the worst 0.1 %.
+On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
 
 Settings, references and environment variables are those of auto.py.
 """
 
+import subprocess
+
 import auto
+from _iteration import read
 from record import record
 
 RUNS = {
@@ -13,6 +17,29 @@ RUNS = {
     "vcm": auto.options("vcm"),
     "vcm guided": auto.options("vcm") + " --guide on",
 }
+
+
+def caustics(scene):
+    """relMSE of the layer Caustic by run after RUN_SECONDS, and half that of two references against each other."""
+
+    def render(name, options, seconds, seed):
+        path = auto.OUT / f"{scene}-{auto.WIDTH}-{name.replace(' ', '-')}-{seconds:g}s-{seed}.exr"
+        if not path.exists():
+            command = [auto.BIN, "render", auto.ROOT / "scenes" / f"{scene}.glb", "-o", path, "--progress", "none"]
+            command += [*options.split(), "--width", str(auto.WIDTH), "--time", str(seconds), "--seed", str(seed)]
+            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+        return path
+
+    def error(of, to):
+        return read("compare", of, to, "--layer", "Caustic")["relmse"]
+
+    reference, other = (render("caustics", RUNS["sppm guided"], auto.REFERENCE, seed) for seed in (77, 78))
+    own = error(other, reference) / 2
+    found = {name: [] for name in RUNS}
+    for seed in (1, 2, 3):
+        for name, options in RUNS.items():
+            found[name].append(error(render(f"caustics {name}", options, auto.SECONDS, seed), reference) - own)
+    return {"errors": found, "reference": own}
 
 
 def main():
@@ -33,6 +60,13 @@ def main():
             gains = [errors[name] / errors[f"{name} guided"] for name in ("sppm", "vcm")]
             line = f"{scene:<10}{figure:<16}" + "".join(f"{error:>13.2g}" for error in errors.values())
             print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  {means['sppm guided']:.4f} {means['vcm guided']:.4f}", flush=True)
+        if scene in auto.GUIDED:
+            row["caustics"] = caustics(scene)
+            errors = row["caustics"]["errors"]
+            mean = {name: sum(each) / len(each) for name, each in errors.items()}
+            gains = [mean[name] / mean[f"{name} guided"] for name in ("sppm", "vcm")]
+            line = f"{scene:<10}{'layer Caustic':<16}" + "".join(f"{error:>13.2g}" for error in mean.values())
+            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  reference {row['caustics']['reference']:.2g}", flush=True)
         rows.append(row)
     record("guide", {"seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE, "scenes": rows})
 

@@ -1,6 +1,6 @@
 //! All lights of a scene: choosing one, sampling it from a point, sampling emission, and the densities for MIS.
 
-use super::aim::Targets;
+use super::aim::{Region, Targets};
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emitter::{Emitter, Sky, spot_falloff};
@@ -517,6 +517,25 @@ impl Lights {
         if emission.infinite {
             self.targets.aim(&self.sky, emission, u, point);
         }
+    }
+
+    /// The same, and part of the paths from infinity through the disc of a region of interest. Returns the share of the start's density that all light has, that of the
+    /// whole scene and the region, without what is aimed.
+    #[inline]
+    pub fn aim_and_light(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) -> f32 {
+        match region {
+            Some(region) if emission.infinite => self.targets.aim_and_light(&self.sky, emission, region, u, point),
+            _ => {
+                self.aim(emission, u, point);
+                self.unaimed(emission)
+            }
+        }
+    }
+
+    /// Share of an aimed start's density that paths of all light have.
+    #[inline]
+    pub fn unaimed(&self, emission: &EmissionSample) -> f32 {
+        if emission.infinite { self.targets.unaimed(&self.sky, emission.origin, emission.direction) } else { 1.0 }
     }
 
     /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.

@@ -10,7 +10,7 @@ mod lights;
 mod receiver;
 mod tree;
 
-pub use aim::Targets;
+pub use aim::{Region, Targets};
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use emitter::{Emitter, Sky};

@@ -10,6 +10,7 @@ mod guiding;
 mod method;
 pub mod output;
 mod pm;
+mod region;
 mod result;
 mod session;
 mod settings;

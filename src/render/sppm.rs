@@ -6,6 +6,7 @@
 use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::guiding::learnt;
+use super::region::region;
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
 use super::volume::{Maps, VolumeMap};
@@ -13,7 +14,7 @@ use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths};
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::light::Guide;
+use crate::light::{Guide, Region};
 use crate::photon::{Kernel, Nearest, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
@@ -138,6 +139,8 @@ pub(super) struct Sppm<'a> {
     settings: &'a Settings,
     surroundings: &'a Surroundings,
     guide: Option<Guide>,
+    /// Where light from infinity is wanted.
+    region: Option<Region>,
     /// Largest initial bandwidth, squared, beyond an eye path's first broad bounce.
     later2: f32,
 }
@@ -160,7 +163,8 @@ impl<'a> Sppm<'a> {
         };
         let guided = settings.guided && !settings.of_photons(scene).is_empty();
         let guide = guided.then(|| learnt(&eye, surroundings, settings)).flatten();
-        Sppm { eye, settings, surroundings, guide, later2: f32::INFINITY }
+        let region = region(&eye, settings.seed);
+        Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY }
     }
 
     /// Eye paths.
@@ -225,6 +229,7 @@ impl<'a> Sppm<'a> {
         let Settings { seed, photons, max_depth, .. } = *self.settings;
         LightPass::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
+            .lighting(self.region)
             .wanting(self.settings.of_photons(self.eye.scene), self.settings.indirect)
             .with(Comb::new(seed, i))
     }

@@ -6,7 +6,7 @@ use super::segment::Known;
 use super::site::MediumVertex;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
-use crate::light::{EmissionDensity, Guide, guide};
+use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{Rgb, Vec2};
 use crate::photon::{Photon, PhotonFlags, VolumePhoton};
 use crate::plan::{ClassSet, PathClass};
@@ -27,6 +27,7 @@ pub struct LightPass<'a> {
     point: SobolPair,
     direction: SobolPair,
     guide: Option<&'a Guide>,
+    region: Option<Region>,
     caustics_only: bool,
     keeps_caustics: bool,
     comb: Option<Comb>,
@@ -49,6 +50,8 @@ pub struct Emitted {
     pub cell: usize,
     /// Density of unguided emission over that of the guide.
     pub ratio: f32,
+    /// Share of the start's density that paths of all light have, without those sent where caustics are made.
+    pub unaimed: f32,
 }
 
 impl<'a> LightPass<'a> {
@@ -69,6 +72,7 @@ impl<'a> LightPass<'a> {
             point,
             direction,
             guide: None,
+            region: None,
             caustics_only: false,
             keeps_caustics: true,
             comb: None,
@@ -78,6 +82,12 @@ impl<'a> LightPass<'a> {
     /// The same with emission guided, if there is a guide.
     pub fn guided(self, guide: Option<&'a Guide>) -> LightPass<'a> {
         LightPass { guide, ..self }
+    }
+
+    /// The same with part of the light from infinity through a region, if there is one; guided passes have none.
+    #[must_use]
+    pub fn lighting(self, region: Option<Region>) -> LightPass<'a> {
+        LightPass { region, ..self }
     }
 
     /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those of caustics, or with those alone.
@@ -129,15 +139,16 @@ impl<'a> LightPass<'a> {
         let choice = self.choice.point(index);
         let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
-        let (emission, cell, ratio) = match self.guide {
+        let (emission, cell, ratio, unaimed) = match self.guide {
             Some(guide) => {
                 let guided = guide.emit(lights, shapes, materials, choice, point, direction)?;
-                (guided.emission, guided.cell, guided.ratio)
+                let unaimed = guide.unguided() * guided.ratio * lights.unaimed(&guided.emission);
+                (guided.emission, guided.cell, guided.ratio, unaimed)
             }
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
-                lights.aim(&mut emission, choice.y, point);
-                (emission, guide::UNGUIDED, 1.0)
+                let unaimed = lights.aim_and_light(&mut emission, self.region, choice.y, point);
+                (emission, guide::UNGUIDED, 1.0, unaimed)
             }
         };
         let mut flux = emission.flux / self.paths as f32;
@@ -165,6 +176,7 @@ impl<'a> LightPass<'a> {
             density: emission.density,
             cell,
             ratio,
+            unaimed,
         })
     }
 }
@@ -179,6 +191,10 @@ pub struct Photons {
 }
 
 /// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or clear glass.
+///
+/// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is one among those that light everything: it
+/// goes on with a probability, their share of the density of its start, and then carries as much as they do. Else bandwidths would be set by dense photons of little
+/// flux, and filled by sparse ones of much.
 struct Deposit<'a> {
     scene: &'a Scene,
     photons: &'a mut Photons,
@@ -187,23 +203,57 @@ struct Deposit<'a> {
     keeps_caustics: bool,
     caustic: bool,
     unreachable: bool,
+    /// The path may go on after a broad bounce, and its flux then is multiplied by this.
+    goes_on: bool,
+    gain: f32,
+    /// What flux is multiplied by here.
+    scale: f32,
 }
 
 impl<'a> Deposit<'a> {
-    /// Of a light path just begun.
-    fn new(scene: &'a Scene, photons: &'a mut Photons, pass: &LightPass, emitted: &Emitted) -> Deposit<'a> {
+    /// Of a light path just begun, which goes on after a broad bounce with a probability.
+    fn new(
+        scene: &'a Scene,
+        photons: &'a mut Photons,
+        pass: &LightPass,
+        emitted: &Emitted,
+        probability: f32,
+    ) -> Deposit<'a> {
         let onward = if pass.caustics_only { LobeSet::SHARP | LobeSet::DELTA } else { LobeSet::ALL };
-        let keeps_caustics = pass.keeps_caustics;
-        Deposit { scene, photons, onward, keeps_caustics, caustic: true, unreachable: emitted.delta }
+        Deposit {
+            scene,
+            photons,
+            onward,
+            keeps_caustics: pass.keeps_caustics,
+            caustic: true,
+            unreachable: emitted.delta,
+            goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
+            gain: 1.0 / probability,
+            scale: 1.0,
+        }
+    }
+
+    /// At a vertex that a bounce has sent the path to: whether it goes on there.
+    #[inline]
+    fn arrives(&mut self, scattered: Option<Scattered>) -> bool {
+        let Some(scattered) = scattered else { return true };
+        self.unreachable &= scattered.lobe == LobeSet::DELTA;
+        // A medium, which focuses nothing, is as broad as can be.
+        if scattered.lobe.has(LobeSet::BROAD) {
+            if self.caustic {
+                (self.caustic, self.scale) = (false, self.gain);
+            }
+            return self.goes_on;
+        }
+        true
     }
 }
 
 impl<'a> Visitor<'a> for Deposit<'_> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
-        if let Some(scattered) = scattered {
-            self.caustic &= !scattered.lobe.has(LobeSet::BROAD);
-            self.unreachable &= scattered.lobe == LobeSet::DELTA;
+        if !self.arrives(scattered) {
+            return Next::Stop;
         }
         // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders of
         // materials and dark texels.
@@ -215,7 +265,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 p: vertex.surface.p,
                 wi: vertex.wo,
                 ng: vertex.surface.ng,
-                flux: vertex.throughput,
+                flux: vertex.throughput * self.scale,
                 flags: PhotonFlags(flags),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
                 band: Band::of(vertex.wavelength.as_ref()),
@@ -225,13 +275,14 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        // A medium focuses nothing.
-        (self.caustic, self.unreachable) = (false, false);
+        if !self.arrives(scattered) {
+            return Next::Stop;
+        }
         if scattered.is_some() {
             self.photons.volume.push(VolumePhoton {
                 p: vertex.met.p,
                 wi: vertex.wo,
-                flux: vertex.arriving,
+                flux: vertex.arriving * self.scale,
                 medium: vertex.medium_id(self.scene),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
                 band: Band::of(vertex.wavelength.as_ref()),
@@ -252,7 +303,7 @@ pub fn light_path(
     photons: &mut Photons,
 ) -> Option<usize> {
     let emitted = pass.emit(scene, surroundings, index)?;
-    let mut deposit = Deposit::new(scene, photons, pass, &emitted);
+    let mut deposit = Deposit::new(scene, photons, pass, &emitted, emitted.unaimed);
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
     Some(emitted.cell)
 }
@@ -298,7 +349,8 @@ impl EqualFlux {
         let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
         for copy in 0..copies {
             let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
-            let mut deposit = Deposit::new(scene, photons, pass, &emitted);
+            // All carry the same already.
+            let mut deposit = Deposit::new(scene, photons, pass, &emitted, 1.0);
             walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
             arena.reset();
         }
