@@ -158,7 +158,7 @@ fn shading_normals_keep_light_and_eye_agreed() {
                 // Radiance: f*(wi -> wo) |cos_g wi|; importance: f*(wi -> wo) |cos_g wo|.
                 let (a, b) = (radiance * wo.z.abs(), importance * wi.z.abs());
                 assert!((a - b).abs().max_element() <= 2e-3 * a.max(b).max_element(), "{wo} {wi}: {a} {b}");
-                let gathered = shading(wo).gather(wi, LobeSet::ALL) * wi.z.abs();
+                let gathered = shading(wo).gather(wi, wi.z.abs(), LobeSet::ALL) * wi.z.abs();
                 assert!((gathered - radiance).abs().max_element() <= 1e-4 * radiance.max_element());
                 if p.transmission == 0.0 && wo.z * wi.z < 0.0 {
                     assert_eq!(radiance, Rgb::ZERO, "light leaks");

@@ -57,37 +57,39 @@ impl Gathering<'_> {
         if self.shading.seen.side == 1 { -1.0 } else { 1.0 }
     }
 
-    /// [`Shading::gather`] of a photon from `wi`.
+    /// [`Shading::gather`] of a photon from `wi`, which has met its surface at this cosine.
     #[inline]
-    pub fn photon(&self, wi: Vec3) -> Rgb {
+    pub fn photon(&self, wi: Vec3, cosine: f32) -> Rgb {
         match &self.kind {
             Kind::Nothing => Rgb::ZERO,
-            Kind::Any | Kind::Facets(..) => self.shading.gather(wi, self.set),
+            Kind::Any | Kind::Facets(..) => self.shading.gather(wi, cosine, self.set),
             Kind::Diffuse { factor, through } => {
                 let side = self.side();
                 let (cos_s, cos_g) = (wi.dot(self.shading.frame.n) * side, wi.dot(self.shading.ng) * side);
-                if cos_s < LEAST_COSINE || cos_g <= 0.0 {
+                if cos_s < LEAST_COSINE || cos_g <= 0.0 || cosine <= 0.0 {
                     return Rgb::ZERO;
                 }
                 let through = through.map_or(1.0, |through| through.at(Position::new(cos_s)));
-                *factor * (through * cos_s / cos_g)
+                *factor * (through * cos_s / cosine)
             }
         }
     }
 
-    /// [`Gathering::photon`] for eight directions: x, y, z; the result's red, green, blue.
+    /// [`Gathering::photon`] for eight directions, x, y, z, and cosines; the result's red, green, blue.
     #[inline]
-    pub fn eight(&self, wi: [f32x8; 3]) -> [f32x8; 3] {
+    pub fn eight(&self, wi: [f32x8; 3], cosine: f32x8) -> [f32x8; 3] {
         if matches!(self.kind, Kind::Nothing | Kind::Any) {
             let [x, y, z] = wi.map(|c| c.to_array());
-            let f: [Rgb; 8] = std::array::from_fn(|k| self.photon(Vec3::new(x[k], y[k], z[k])));
+            let cosine = cosine.to_array();
+            let f: [Rgb; 8] = std::array::from_fn(|k| self.photon(Vec3::new(x[k], y[k], z[k]), cosine[k]));
             return std::array::from_fn(|c| f32x8::from(f.map(|f| f[c])));
         }
         let (side, frame) = (self.side(), &self.shading.frame);
         let (cos_s, cos_g) = (dot(&wi, frame.n) * side, dot(&wi, self.shading.ng) * side);
-        let counts = cos_s.cmp_ge(f32x8::splat(LEAST_COSINE)) & cos_g.cmp_gt(f32x8::ZERO);
+        let zero = f32x8::ZERO;
+        let counts = cos_s.cmp_ge(f32x8::splat(LEAST_COSINE)) & cos_g.cmp_gt(zero) & cosine.cmp_gt(zero);
         // Lanes that do not count are cut off in the end, whatever they hold.
-        let scale = counts.blend(cos_s / cos_g, f32x8::ZERO);
+        let scale = counts.blend(cos_s / cosine, zero);
         let at = Positions::new(cos_s);
         match &self.kind {
             Kind::Diffuse { factor, through } => {
@@ -186,17 +188,38 @@ mod tests {
                 let wo = crate::math::warp::sphere_uniform(draws.two(Purpose::Pixel));
                 let wi = crate::math::warp::sphere_uniform(draws.two(Purpose::Lens));
                 let shading = Shading::new(frame, Vec3::Z, bsdf, wo);
-                let expected = shading.gather(wi, LobeSet::BROAD);
+                let cosine = draws.one(Purpose::Lobe);
+                let expected = shading.gather(wi, cosine, LobeSet::BROAD);
                 let gathering = shading.gathering(LobeSet::BROAD);
-                let found = gathering.photon(wi);
+                let found = gathering.photon(wi, cosine);
                 assert!((found - expected).length() <= 1e-4 * expected.length() + 1e-7, "{found} {expected}");
                 // Eight at once, this one among others.
                 let lane = (i % 8) as usize;
                 let eight: [Vec3; 8] = std::array::from_fn(|k| if k == lane { wi } else { Vec3::new(0.6, 0.0, 0.8) });
-                let found = gathering.eight(std::array::from_fn(|a| f32x8::from(eight.map(|w| w[a]))));
+                let cosines = f32x8::from(std::array::from_fn(|k| if k == lane { cosine } else { 0.8 }));
+                let found = gathering.eight(std::array::from_fn(|a| f32x8::from(eight.map(|w| w[a]))), cosines);
                 let found = Rgb::from_array(found.map(|c| c.to_array()[lane]));
                 assert!((found - expected).length() <= 1e-4 * expected.length() + 1e-7, "{found} {expected}");
             }
         }
+    }
+
+    /// A photon that has met another facet squarely, and grazes the plane of this one, brings what its small cosine with the shading normal leaves. Over its cosine with
+    /// this plane it would be hundreds of times what any photon should.
+    #[test]
+    fn photons_of_facets_nearby_bring_no_more_than_their_own_cosine_allows() {
+        let tables = EnergyTables::new([1.5], Coverings { coat: false, sheen: false });
+        let parameters = Parameters { base_color: Rgb::splat(0.8), specular: 0.0, ..Parameters::default() };
+        let interface = Interface::new(&parameters, &tables);
+        let bsdf = Bsdf::new(&parameters, &interface);
+        let frame = Frame::from_normal(Vec3::new(1e-3, 0.0, 1.0).normalize());
+        let shading = Shading::new(frame, Vec3::Z, bsdf, Vec3::new(0.0, 0.6, 0.8));
+        let wi = Vec3::new(1.0, 0.0, 1e-6).normalize();
+        let met = wi.dot(Vec3::new(0.6, 0.0, 0.8));
+        let (cos_s, cos_g) = (wi.dot(frame.n), wi.dot(Vec3::Z));
+        let brought = shading.gathering(LobeSet::BROAD).photon(wi, met);
+        let expected = Rgb::splat(0.8 * FRAC_1_PI * cos_s / met);
+        assert!((brought - expected).length() < 1e-3 * expected.length(), "{brought} {expected}");
+        assert!(cos_s / cos_g > 500.0 && brought.max_element() < 1e-2);
     }
 }

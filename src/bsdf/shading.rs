@@ -76,13 +76,14 @@ impl<'a> Shading<'a> {
     }
 
     /// What a photon from `wi` (unit, towards where it came from) adds to the radiance seen, per flux over kernel area: photons
-    /// measure irradiance on the geometric surface, so `f |wi.ns| / |wi.ng|`.
+    /// measure irradiance on the geometric surface where they are, so `f |wi.ns| / cosine`, the latter that of `wi` with the normal there. That of the normal here would
+    /// not do: photons that graze it have met another facet nearby, whose share of them does not vanish with their cosine here.
     #[inline]
-    pub fn gather(&self, wi: Vec3, set: LobeSet) -> Rgb {
-        let (true, Some((i, cos_ig))) = (self.cos_og > 0.0, self.local(wi)) else {
+    pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
+        let (true, Some((i, _))) = (self.cos_og > 0.0 && cosine > 0.0, self.local(wi)) else {
             return Rgb::ZERO;
         };
-        self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cos_ig)
+        self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cosine)
     }
 
     /// Albedo of the lobes of `set`, see [`Bsdf::albedo`].

@@ -52,6 +52,14 @@ pub struct Photon {
     pub band: Band,
 }
 
+impl Photon {
+    /// Cosine of the direction with the normal.
+    #[inline]
+    pub fn cosine(&self) -> f32 {
+        self.wi.dot(self.ng).abs()
+    }
+}
+
 /// Eight positions, structure of arrays; absent photons are infinitely far away.
 #[derive(Clone, Copy)]
 struct Leaf {

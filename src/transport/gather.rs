@@ -34,6 +34,7 @@ pub(super) struct Batch<'a, K> {
     unreachable: Option<Gathering<'a>>,
     count: usize,
     wi: [[f32; 8]; 3],
+    cosine: [f32; 8],
     flux: [[f32; 8]; 3],
     bin: [u8; 8],
     /// For those who count: where they are from the gathering point.
@@ -57,6 +58,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
             unreachable: (set != all).then(|| shading.gathering(all)),
             count: 0,
             wi: [[0.0; 8]; 3],
+            cosine: [0.0; 8],
             flux: [[0.0; 8]; 3],
             bin: [0; 8],
             offset: [[0.0; 8]; 3],
@@ -76,7 +78,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
         }
         let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
         if let (Some(gathering), true) = (&self.unreachable, photon.flags.has(PhotonFlags::UNREACHABLE)) {
-            let light = gathering.photon(photon.wi) * photon.flux;
+            let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
             self.add(caustic, level, light.into(), distance2);
             if B::COUNTS && light != Rgb::ZERO {
                 let light = (light * self.throughput).element_sum() / 3.0;
@@ -89,6 +91,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
             self.wi[axis][at] = photon.wi[axis];
             self.flux[axis][at] = photon.flux[axis];
         }
+        self.cosine[at] = photon.cosine();
         self.bin[at] = (caustic * BINS + level) as u8;
         if B::COUNTS {
             for axis in 0..3 {
@@ -106,7 +109,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
 
     #[inline(never)]
     fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
-        let f = self.gathering.eight(self.wi.map(f32x8::from));
+        let f = self.gathering.eight(self.wi.map(f32x8::from), f32x8::from(self.cosine));
         let found: [f32x8; 3] = std::array::from_fn(|c| f[c] * f32x8::from(self.flux[c]));
         let [r, g, b] = found.map(f32x8::to_array);
         for k in 0..self.count {
