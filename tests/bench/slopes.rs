@@ -1,7 +1,7 @@
 //! Bias and variance against iterations on fields of photons in closed form: the memoryless rule beside its exact finite sums, by SPPM and where merging alone finds light by VCM,
 //! and CPPM whose test always rejects.
 //!
-//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
+//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`, or `-- MEASURED.json PLOT.svg`, which draws what has been measured; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
 //! the variance and the mean squared error (mean over pixels, over the squared truth), each with its standard error, and what is expected. Given the bandwidths, which
 //! earlier photons decide, an iteration's expectation is known: `bias_given` is the mean of these, the bias without the photons' noise.
 
@@ -80,6 +80,11 @@ struct Moment {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    if let Some(Ok(measured)) = arguments.first().map(std::fs::read_to_string) {
+        let rules: Vec<Value> = measured.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let file = arguments.get(1).map_or("slopes.svg", String::as_str);
+        return plot(file, &rules).unwrap_or_else(|error| panic!("{file}: {error}"));
+    }
     let number = |i: usize, default: u64| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let (n, seeds) = (number(0, 8192), number(1, 16));
     let moments: Vec<u64> = (3..64).map(|e| 1u64 << e).take_while(|m| *m <= n).collect();
@@ -163,7 +168,11 @@ fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
             let series = rule["series"].as_array().into_iter().flatten();
             series.filter_map(|at| Some((at["iterations"].as_f64()?, number(&at[key])?))).collect()
         };
-        let every: Vec<(f64, f64)> = rules.iter().flat_map(|rule| points(rule, key)).collect();
+        // CPPM's bias without the photons' noise.
+        let shown = |rule: &Value| {
+            if key == "bias" && rule["parameters"]["alpha"].is_null() { "bias_given" } else { key }
+        };
+        let every: Vec<(f64, f64)> = rules.iter().flat_map(|rule| points(rule, shown(rule))).collect();
         let fold = |f: fn(f64, f64) -> f64, x: fn(&(f64, f64)) -> f64| every.iter().map(x).reduce(f).unwrap_or(1.0);
         let (left, right) = (fold(f64::min, |p| p.0) / 1.2, fold(f64::max, |p| p.0) * 1.2);
         let (low, high) = (fold(f64::min, |p| p.1) / 1.5, fold(f64::max, |p| p.1) * 1.5);
@@ -173,7 +182,12 @@ fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
             .x_label_area_size(34)
             .y_label_area_size(64)
             .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
-        chart.configure_mesh().x_desc("iterations").light_line_style(TRANSPARENT).draw()?;
+        chart
+            .configure_mesh()
+            .x_desc("iterations")
+            .y_label_formatter(&|y| format!("{y:.0e}"))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
         for (rule, colour) in
             rules.iter().zip([(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233)])
         {
@@ -192,7 +206,7 @@ fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
                     (format!("CPPM, k {k}, beta {beta:.2}"), if key == "bias" { -rate } else { rate - 1.0 })
                 }
             };
-            let key = if key == "bias" && rule["parameters"]["alpha"].is_null() { "bias_given" } else { key };
+            let key = shown(rule);
             let measured = points(rule, key);
             let found: Vec<[f64; 3]> = rule["series"]
                 .as_array()

@@ -115,8 +115,7 @@ fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
     let mut ways = vec![plain(gathering)];
     if focusing {
-        // Photons of all light are not guided: of dense ones that carry little and sparse ones that carry much, those set the bandwidth and these are
-        // noise in it.
+        // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and of those none is sent where the picture is.
         if !scattering {
             ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
         }
