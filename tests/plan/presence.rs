@@ -23,7 +23,14 @@ fn effects_are_there_for_reasons() {
     add(&mut scene, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), Material { dispersion: 0.3, ..glass(1.5) });
     add(&mut scene, "Disc", sphere(Vec3::new(2.0, 1.0, 0.0), 0.5, 16), mirror());
     let everything = plan(scene.clone());
-    assert_eq!(present(&everything), "emission direct indirect glossy caustic sds dispersion");
+    assert_eq!(present(&everything), "emission direct indirect caustic sds dispersion");
+    // A perfect mirror and clear glass have no gloss of their own; a mirror that is not perfect has, and a coated one.
+    let disc = scene.materials.len() - 1;
+    for glossy in [Material { roughness: 0.1, ..mirror() }, Material { clearcoat: 1.0, ..mirror() }] {
+        let mut scene = scene.clone();
+        scene.materials[disc] = glossy;
+        assert_eq!(present(&plan(scene)), "emission direct indirect glossy caustic sds dispersion");
+    }
     let because = |effect: Effect| everything.effect(effect).because.join("; ");
     assert_eq!(because(Effect::Emission), "object \"Panel\"");
     assert_eq!(because(Effect::Direct), "object \"Panel\"; light \"point\"");
@@ -61,7 +68,7 @@ fn properties_of_the_scene() {
     add(&mut scene, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), Material { medium: Some(fog), ..glass(1.5) });
     scene.cameras[0].aperture_radius = 0.1;
     let whole = plan(scene.clone());
-    assert_eq!(present(&whole), "emission direct indirect glossy caustic sds volume depth_of_field environment");
+    assert_eq!(present(&whole), "emission direct indirect caustic sds volume depth_of_field environment");
     let because = |effect: Effect| whole.effect(effect).because.join("; ");
     assert_eq!(because(Effect::Volume), "the scene's medium; the medium of material \"Ball\" on \"Ball\"");
     assert_eq!(because(Effect::DepthOfField), "the camera's aperture");
