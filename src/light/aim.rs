@@ -167,7 +167,7 @@ impl Targets {
         let through = if from_line(region.center, p, d) < region.radius * region.radius { lit / area } else { 0.0 };
         let mixed = (1.0 - lit) * aimed + through;
         emission.flux = plain / (PI * sky.radius * sky.radius * mixed);
-        ((1.0 - lit) * aimed * self.unaimed(sky, p, d) + through) / mixed
+        ((1.0 - lit) * aimed * self.unaimed(sky, emission) + through) / mixed
     }
 
     /// The same, drawn through the disc of one target.
@@ -214,9 +214,12 @@ impl Targets {
         if inside { (1.0 - AIMED) / (PI * sky.radius * sky.radius) } else { 0.0 }
     }
 
-    /// Its share of the density.
-    pub fn unaimed(&self, sky: &Sky, p: Vec3, d: Vec3) -> f32 {
-        if self.choice.is_none() { 1.0 } else { self.uniform(sky, p, d) / self.density(sky, p, d) }
+    /// Its share of the density that an aimed start has.
+    pub fn unaimed(&self, sky: &Sky, emission: &EmissionSample) -> f32 {
+        match self.choice {
+            None => 1.0,
+            Some(_) => self.uniform(sky, emission.origin, emission.direction) / emission.density.onward,
+        }
     }
 }
 
@@ -268,7 +271,7 @@ mod tests {
                     Some(region) => targets.aim_and_light(&sky, &mut emission, region, u, point),
                     None => {
                         targets.aim(&sky, &mut emission, u, point);
-                        targets.unaimed(&sky, emission.origin, d)
+                        targets.unaimed(&sky, &emission)
                     }
                 };
                 assert!((0.0..=1.0001).contains(&unaimed));

@@ -535,7 +535,7 @@ impl Lights {
     /// Share of an aimed start's density that paths of all light have.
     #[inline]
     pub fn unaimed(&self, emission: &EmissionSample) -> f32 {
-        if emission.infinite { self.targets.unaimed(&self.sky, emission.origin, emission.direction) } else { 1.0 }
+        if emission.infinite { self.targets.unaimed(&self.sky, emission) } else { 1.0 }
     }
 
     /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.

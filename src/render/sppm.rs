@@ -163,7 +163,8 @@ impl<'a> Sppm<'a> {
         };
         let guided = settings.guided && !settings.of_photons(scene).is_empty();
         let guide = guided.then(|| learnt(&eye, surroundings, settings)).flatten();
-        let region = region(&eye, settings.seed);
+        // Guided passes send no light there.
+        let region = if guide.is_none() { region(&eye, settings.seed) } else { None };
         Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY }
     }
 

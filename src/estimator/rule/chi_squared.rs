@@ -136,21 +136,25 @@ impl ChiSquared {
         squares as f64 * counts.len() as f64 / total as f64 - total as f64
     }
 
+    /// Whether counts in the innermost annuli pass the test, by [`ChiSquared::sums`]: the statistic, times the total, against the quantile, without a division.
+    #[inline]
+    fn looks_uniform(&self, annuli: usize, (total, squares): (u64, u64)) -> bool {
+        let (total, squares) = (total as f64, squares as f64);
+        squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
+    }
+
     /// After an iteration: tests if there are photons enough, and shrinks the bandwidth to the largest inner disc that looks uniform, or by k
     /// where none does \[6.1, (13), (14)\]; then all counts are dropped. Returns whether it shrank.
     #[inline]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
-        let (total, squares) = Self::sums(counts);
-        let (total, squares) = (total as f64, squares as f64);
-        // The statistic, times the total, against the quantile: photons that look uniform cost no division.
-        let looks_uniform = squares * counts.len() as f64 <= total * (total + self.critical[self.annuli - 1]);
-        if total < f64::from(bandwidth.bound) || looks_uniform {
+        let all = Self::sums(counts);
+        if (all.0 as f64) < f64::from(bandwidth.bound) || self.looks_uniform(self.annuli, all) {
             return false;
         }
         let passes = |annuli: usize| {
-            let inner = &counts[..annuli * self.sectors];
+            let inner = Self::sums(&counts[..annuli * self.sectors]);
             // A disc without photons says nothing.
-            inner.iter().any(|&c| c > 0) && Self::statistic(inner) <= self.critical[annuli - 1]
+            inner.0 > 0 && self.looks_uniform(annuli, inner)
         };
         let factor = match (1..self.annuli).rev().find(|&annuli| passes(annuli)) {
             Some(annuli) => annuli as f32 / self.annuli as f32,

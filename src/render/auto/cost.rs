@@ -30,6 +30,11 @@ const COUNTING: f64 = 0.15e-6;
 /// Times as much where media scatter: vertices on the way, which are not counted, and paths that are longer.
 const MEDIA: f64 = 2.2;
 
+/// Eye paths of a pixel in an iteration.
+fn eye_paths(settings: &Settings) -> f64 {
+    if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 }
+}
+
 /// The counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cost {
@@ -43,7 +48,7 @@ impl Cost {
     /// Core-seconds of an iteration of a picture of so many pixels.
     pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
         let Lengths { eye, eye_to_broad, light, light_to_broad } = self.lengths;
-        let paths = pixels * if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
+        let paths = pixels * eye_paths(settings);
         let photons = f64::from(settings.photons);
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
         let gather = GATHER + if way.method == Method::Cppm { COUNTING } else { 0.0 };
@@ -71,7 +76,7 @@ impl Cost {
     /// Core-seconds of an iteration that go to photons, where they are gathered.
     pub fn of_photons(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
         let without = Settings { photons: 0, ..settings.clone() };
-        let paths = pixels * if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
+        let paths = pixels * eye_paths(settings);
         self.of(way, settings, pixels) - self.of(way, &without, pixels)
             + self.media() * paths * self.lengths.eye_to_broad * GATHER
     }
@@ -87,7 +92,7 @@ impl Cost {
             // Without caustics there would be no photons.
             (method, Indirect::Paths) if method.gathers() => {
                 let paths = self.of(Way { method: Method::Path, ..way }, settings, pixels);
-                let eyes = if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 };
+                let eyes = eye_paths(settings);
                 [Some(media * eyes * pixels * beyond * (EYE_VERTEX + GATHER)), Some(all - eyes * paths)]
             }
             _ => [None, None],

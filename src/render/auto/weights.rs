@@ -15,7 +15,7 @@ use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::Indirect;
 
-/// Effects that have a part of the picture, in the order of [`parts`].
+/// Effects that have a part of the picture, in the order of [`parts()`].
 const WHOLE: [Effect; 5] = [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];
 /// Effects that are in parts of others.
 const APART: [Effect; 2] = [Effect::Glossy, Effect::Sds];
@@ -36,20 +36,20 @@ pub struct Weight {
 /// Pictures that [`weigh`] makes, at most.
 pub(super) const PICTURES: usize = 1 + APART.len();
 
-/// The parts of every pixel.
-fn pictures(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<[DVec3; 5]>, Vec<f64>) {
+/// The pixels of a picture.
+fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec<Pixel> {
     let stage = Stage::new(scene, camera, settings);
     let mut session = Session::new(&stage);
     for _ in 0..ITERATIONS.0 {
         session.step();
     }
-    let parts = |pixel: &Pixel| {
-        let parts = &pixel.parts;
-        let n = f64::from(pixel.iterations.max(1));
-        [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume].map(|part| part / n)
-    };
-    let values = values(session.pixels(), camera.size(), stage.settings().levels);
-    (session.pixels().iter().map(parts).collect(), values)
+    session.pixels().to_vec()
+}
+
+/// The additive parts of a pixel.
+fn parts(pixel: &Pixel) -> [DVec3; 5] {
+    let (parts, n) = (&pixel.parts, f64::from(pixel.iterations.max(1)));
+    [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume].map(|part| part / n)
 }
 
 /// Weighs the effects of light on a small picture by the settings of a trial that finds all of them. `present`: effects that the scene calls for.
@@ -59,7 +59,9 @@ pub(super) fn weigh(
     settings: &Settings,
     present: impl Fn(Effect) -> bool,
 ) -> Vec<Weight> {
-    let (mut whole, values) = pictures(scene, camera, settings);
+    let pixels = picture(scene, camera, settings);
+    let values = values(&pixels, camera.size(), settings.levels);
+    let mut whole: Vec<[DVec3; 5]> = pixels.iter().map(parts).collect();
     let total = whole.iter().flatten().map(|part| mean(*part)).sum::<f64>().max(f64::MIN_POSITIVE);
     let weight = |effect: Effect, picture: &mut dyn Iterator<Item = DVec3>| {
         let (mut sum, mut squares) = (0.0, 0.0);
@@ -77,7 +79,7 @@ pub(super) fn weigh(
         if settings.classes.is_empty() {
             continue;
         }
-        let (picture, _) = pictures(scene, camera, &settings);
+        let picture: Vec<[DVec3; 5]> = picture(scene, camera, &settings).iter().map(parts).collect();
         weights.push(weight(effect, &mut picture.iter().map(|parts| parts.iter().sum())));
         for (parts, apart) in whole.iter_mut().zip(picture) {
             for (part, apart) in parts.iter_mut().zip(apart) {
