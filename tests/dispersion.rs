@@ -331,7 +331,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
                 light_path(&scene, &Bump::new(), &surroundings, &pass, index, &mut photons);
             }
             let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);
-            for photon in photons.surface.iter().filter(|photon| photon.depth == 3) {
+            for photon in photons.surface.iter().flatten().filter(|photon| photon.depth == 3) {
                 let d = -photon.wi;
                 let angle = f64::from(d.y).atan2(f64::from(d.x));
                 // Up goes what has come in by the base.

@@ -8,6 +8,7 @@ use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{DVec3, Vec3};
+use caustique::photon::Kind;
 use caustique::render::{Control, KernelChoice, Levels, Method, RadiusRule, Rendered, Settings, render};
 use caustique::scene::{Description, Scene};
 use support::field::{self, Field, PixelField};
@@ -224,7 +225,7 @@ fn measurement_points_follow_the_talks_curves() {
             ..Settings::default()
         };
         let rendered = picture(&scene, 8, &settings);
-        let radius2 = rendered.radii.iter().map(|r| f64::from(r * r)).sum::<f64>() / 64.0;
+        let radius2 = rendered.radii[Kind::Indirect as usize].iter().map(|r| f64::from(r * r)).sum::<f64>() / 64.0;
         let error = rendered.pixels.iter().map(|p| (p.levels[0].mean.x - 1.0).powi(2)).sum::<f64>() / 64.0;
         (radius2 / f64::from(radius * radius), error.sqrt())
     };

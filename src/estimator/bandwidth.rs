@@ -40,15 +40,15 @@ pub fn span(camera: &Camera, length: f32) -> f32 {
     slope * length + at_zero
 }
 
-/// Largest initial bandwidth of every pixel, row by row; at most `widest` of the picture's width.
-pub fn initial_bandwidths(
+/// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the picture's width.
+pub fn initial_bandwidths<const MAPS: usize>(
     eye: &Eye<'_>,
     rule: InitialBandwidth,
     widest: f32,
     seed: u64,
-    pilot: &PhotonMap,
-) -> Vec<f32> {
-    bandwidths(eye, (rule, widest), seed, pilot, |arena, start| eye.gather_point(arena, start))
+    pilots: [&PhotonMap; MAPS],
+) -> Vec<[f32; MAPS]> {
+    bandwidths(eye, (rule, widest), seed, pilots, |arena, start| eye.gather_point(arena, start))
 }
 
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path, in three dimensions.
@@ -62,8 +62,8 @@ pub fn initial_volume_bandwidths(
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    let found = bandwidths(eye, (rule, widest), seed, pilot, |arena, start| eye.volume_point(arena, start));
-    medians(&found, eye.camera.size().0 as usize)
+    let found = bandwidths(eye, (rule, widest), seed, [pilot], |arena, start| eye.volume_point(arena, start));
+    medians(found.as_flattened(), eye.camera.size().0 as usize)
 }
 
 /// The median of every pixel's neighbourhood, of `2 NEIGHBOURHOOD + 1` pixels squared within the picture.
@@ -80,21 +80,21 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
     (0..values.len()).into_par_iter().map(median).collect()
 }
 
-fn bandwidths<P: Located>(
+fn bandwidths<P: Located, const MAPS: usize>(
     eye: &Eye<'_>,
     (rule, widest): (InitialBandwidth, f32),
     seed: u64,
-    pilot: &PhotonMap<P>,
+    pilots: [&PhotonMap<P>; MAPS],
     find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
-) -> Vec<f32> {
+) -> Vec<[f32; MAPS]> {
     let (scene, camera) = (eye.scene, eye.camera);
     let (width, height) = camera.size();
     let pixels = width as usize * height as usize;
     if let InitialBandwidth::Fixed(r) = rule {
-        return vec![r; pixels];
+        return vec![[r; MAPS]; pixels];
     }
     let least = LEAST * scene.lights.sky().radius;
-    let of_point = |nearest: &mut Nearest<P>, point: &GatherPoint| {
+    let of_point = |(pilot, nearest): (&PhotonMap<P>, &mut Nearest<P>), point: &GatherPoint| {
         let span = span(camera, point.length);
         let cap = widest * span;
         let r = match rule {
@@ -105,27 +105,31 @@ fn bandwidths<P: Located>(
         };
         r.max(least)
     };
-    let mut found: Vec<Option<f32>> = vec![None; pixels];
+    let mut found: Vec<Option<[f32; MAPS]>> = vec![None; pixels];
     let streams = Streams::new(seed, 0, Domain::PilotEye);
     par_pixels(
         found.par_chunks_mut(band(width)),
         (width, height),
-        <(Bump, Nearest<P>)>::default,
+        || (Bump::new(), std::array::from_fn::<_, MAPS, _>(|_| Nearest::default())),
         |(arena, nearest), found, places| {
             let starts = eye.starts(places, streams);
             for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                found[place.at] = find(arena, start).map(|point| of_point(nearest, &point));
+                found[place.at] = find(arena, start).map(|point| {
+                    let mut maps = pilots.into_iter().zip(&mut *nearest);
+                    std::array::from_fn(|_| maps.next().map_or(least, |map| of_point(map, &point)))
+                });
                 arena.reset();
             }
         },
     );
-    let mut known: Vec<f32> = found.iter().flatten().copied().collect();
-    let fallback = if known.is_empty() {
-        (widest * span(camera, scene.lights.sky().radius)).max(least)
-    } else {
+    let fallback = std::array::from_fn(|map| {
+        let mut known: Vec<f32> = found.iter().flatten().map(|r| r[map]).collect();
+        if known.is_empty() {
+            return (widest * span(camera, scene.lights.sky().radius)).max(least);
+        }
         let middle = known.len() / 2;
         *known.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
+    });
     found.into_iter().map(|r| r.unwrap_or(fallback)).collect()
 }
 

@@ -60,7 +60,7 @@ mod tests {
         for bias in [0.0, 0.3] {
             let (mut squared_bias, mut variance) = (0.0, 0.0);
             for index in 0..4000 {
-                let mut pixel = Pixel::new(1.0);
+                let mut pixel = Pixel::new([1.0; 2]);
                 for i in 1..=16u32 {
                     let draws = Stream::new(9, u64::from(i), Domain::Test, index).vertex(0);
                     let noise = draws.two(Purpose::Pixel);
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn one_iteration_tells_nothing() {
-        let mut pixel = Pixel::new(1.0);
+        let mut pixel = Pixel::new([1.0; 2]);
         pixel.iterations = 1;
         assert_eq!(SquaredError::of(&pixel, 3, 5), None);
     }

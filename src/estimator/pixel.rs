@@ -2,6 +2,7 @@
 
 use super::Coverage;
 use crate::math::{DVec3, Rgb, Vec3};
+use crate::photon::ByKind;
 use crate::stat::Welford;
 use crate::transport::{EyeMeasure, MAX_LEVELS};
 
@@ -50,8 +51,8 @@ pub struct Pixel {
     pub iterations: u32,
     /// Iterations rejected as not finite.
     pub rejected: u32,
-    /// Largest initial bandwidth (scene units).
-    pub bandwidth: f32,
+    /// Largest initial bandwidth by kind of photons (scene units).
+    pub bandwidths: ByKind<f32>,
     /// The same for photons in media; 0 where there are none.
     pub volume_bandwidth: f32,
     /// Camera depth of the first visible hit of the first iteration; 1e10 where there is none.
@@ -62,8 +63,8 @@ pub struct Pixel {
 
 impl Pixel {
     /// A pixel before its first iteration.
-    pub fn new(bandwidth: f32) -> Pixel {
-        Pixel { bandwidth, z: 1e10, ..Pixel::default() }
+    pub fn new(bandwidths: ByKind<f32>) -> Pixel {
+        Pixel { bandwidths, z: 1e10, ..Pixel::default() }
     }
 
     /// Looks at the memory that [`Pixel::add`] is about to change, so that the processor waits for that of several pixels at once. Returns
@@ -71,7 +72,7 @@ impl Pixel {
     #[inline]
     pub fn touch(&self) -> f64 {
         let levels: f64 = self.levels.iter().chain(&self.differences).map(|level| level.mean.x).sum();
-        levels + self.parts.emission.x + self.parts.indirect.z + self.depth + f64::from(self.bandwidth)
+        levels + self.parts.emission.x + self.parts.indirect.z + self.depth + f64::from(self.bandwidths[0])
     }
 
     /// Adds one iteration: level 1 from `independent`, the others from `correlated` (of `count - 1` levels), or all from `independent`
@@ -145,7 +146,7 @@ mod tests {
             measure
         };
         for media in [true, false] {
-            let mut pixel = Pixel { volume_bandwidth: if media { 0.1 } else { 0.0 }, ..Pixel::new(0.1) };
+            let mut pixel = Pixel { volume_bandwidth: if media { 0.1 } else { 0.0 }, ..Pixel::new([0.1; 2]) };
             pixel.add(&measure(0), Some(&measure(1)), 5, 3);
             for (level, difference) in (0..).zip(&pixel.differences) {
                 let (surface, volume) = biases(level);

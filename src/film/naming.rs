@@ -67,6 +67,7 @@ pub fn describe(name: &str) -> Option<Description> {
         "Level" => is("RGB", RADIANCE, "estimate of one bandwidth level, 1 the smallest"),
         "Variance" => is("RGB", "(W/(sr m^2))^2", "variance of the mean of one level"),
         "Radius" => is("X", "m", "bandwidth of the last iteration of one level"),
+        "CausticRadius" => is("X", "m", "the same for photons of caustics, where others are gathered, too"),
         "VolumeRadius" => is("X", "m", "the same for photons in media"),
         "Direct" => is("RGB", RADIANCE, "light after one bounce"),
         "Indirect" => is("RGB", RADIANCE, "light after several bounces, caustics excepted"),
@@ -149,12 +150,13 @@ impl Selection {
 }
 
 /// Names to suggest from; [`describe`] knows each.
-const KNOWN: [&str; 19] = [
+const KNOWN: [&str; 20] = [
     "beauty",
     "Noisy",
     "Level1",
     "Variance1",
     "Radius1",
+    "CausticRadius1",
     "VolumeRadius1",
     "Direct",
     "Indirect",

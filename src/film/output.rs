@@ -7,6 +7,7 @@
 //! - `A` is the fraction of eye paths that hit a surface or are taken by a medium in a mesh; where an environment shines the background is part of the picture,
 //!   and it is 1.
 //! - `Volume` is there only where media scatter, `VolumeRadius` where photons are gathered in them.
+//! - `CausticRadius` is there only where photons of caustics and others are gathered.
 //! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and `normal` are zero there.
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
@@ -14,6 +15,7 @@ use crate::error::Result;
 use crate::estimator::rule::volume::level_factor;
 use crate::estimator::{Parts, Pixel, SquaredError};
 use crate::math::{DVec3, Vec3};
+use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Part};
 use rayon::prelude::*;
 
@@ -31,8 +33,8 @@ pub struct Shape {
     pub compared: usize,
     /// The level (from 0) that is the method's own image.
     pub own: usize,
-    /// Whether there are bandwidths.
-    pub bandwidths: bool,
+    /// Kinds of photons that have bandwidths, merged light paths counted as the first.
+    pub kinds: ByKind<bool>,
     /// Squared bandwidth of the last iteration over that of the first.
     pub radius2_factor: f64,
     /// Whether an environment light can be seen.
@@ -82,8 +84,13 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 }
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
+/// The kinds of photons that have bandwidths, and their layers: of one kind alone they are `Radius`.
+pub fn radius_layers(kinds: ByKind<bool>) -> impl Iterator<Item = (Kind, &'static str)> {
+    Kind::ALL.into_iter().filter(move |kind| kinds[*kind as usize]).zip(["Radius", "CausticRadius"])
+}
+
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, bandwidths, radius2_factor, environment, classes, volume, volume_radius_factor } =
+    let Shape { levels, compared, own, kinds, radius2_factor, environment, classes, volume, volume_radius_factor } =
         *shape;
     let mut columns = vec![
         Column {
@@ -102,10 +109,13 @@ fn columns(shape: &Shape) -> Vec<Column> {
     for level in 0..levels {
         columns.push(Column::rgb(format!("Variance{}", level + 1), move |p| variance(p, level)));
     }
-    for level in (0..levels).filter(|_| bandwidths) {
-        // Each level's squared bandwidth is half that of the next larger.
-        let factor = (radius2_factor * 0.5f64.powi((levels - 1 - level) as i32)).sqrt() as f32;
-        columns.push(Column::one(format!("Radius{}", level + 1), "X", move |p| p.bandwidth * factor));
+    for (kind, name) in radius_layers(kinds) {
+        for level in 0..levels {
+            // Each level's squared bandwidth is half that of the next larger.
+            let factor = (radius2_factor * 0.5f64.powi((levels - 1 - level) as i32)).sqrt() as f32;
+            let bandwidth = move |p: &Pixel| p.bandwidths[kind as usize] * factor;
+            columns.push(Column::one(format!("{name}{}", level + 1), "X", bandwidth));
+        }
     }
     for (level, factor) in volume_radius_factor.into_iter().flat_map(|factor| (0..levels).map(move |k| (k, factor))) {
         let factor = factor as f32 * level_factor(level, levels);
@@ -207,7 +217,7 @@ mod tests {
         levels: 5,
         compared: 5,
         own: 3,
-        bandwidths: true,
+        kinds: [true; 2],
         radius2_factor: 0.25,
         environment: false,
         classes: ClassSet::ALL,
@@ -241,7 +251,7 @@ mod tests {
 
     #[test]
     fn the_parts_sum_to_the_image_and_radii_halve_their_squares() {
-        let mut pixel = Pixel { volume_bandwidth: 3.0, ..Pixel::new(2.0) };
+        let mut pixel = Pixel { volume_bandwidth: 3.0, ..Pixel::new([2.0, 4.0]) };
         for i in 0..5 {
             let x = 0.1 + 0.37 * i as f32;
             pixel.add(&measure(x, true), Some(&measure(1.1 * x, i != 0)), 5, 3);
@@ -258,6 +268,12 @@ mod tests {
         for (name, expected) in [("Radius5", 1.0), ("Radius4", 0.5f32.sqrt()), ("Radius3", 0.5), ("Radius1", 0.25)] {
             assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
         }
+        for (name, expected) in [("CausticRadius5", 2.0), ("CausticRadius1", 0.5)] {
+            assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
+        }
+        let focused = Shape { kinds: [false, true], ..SHAPE };
+        let alone = layers((1, 1), &[pixel], &focused, |_| true).expect("one pixel");
+        assert!((value(&alone, "Radius5", "X") - 2.0).abs() < 1e-6 && alone.get("CausticRadius5").is_none());
         // Half of the largest, then 1/cbrt(2) a level.
         for (name, expected) in [("VolumeRadius5", 1.5), ("VolumeRadius4", 1.5 / 2f32.cbrt()), ("VolumeRadius2", 0.75)]
         {
@@ -274,7 +290,7 @@ mod tests {
 
     #[test]
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
-        let mut pixel = Pixel::new(1.0);
+        let mut pixel = Pixel::new([1.0; 2]);
         pixel.add(&measure(0.5, false), Some(&measure(0.5, false)), 5, 3);
         let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");

@@ -21,10 +21,8 @@ const MORTON_BITS: u32 = 21;
 pub struct PhotonFlags(pub u8);
 
 impl PhotonFlags {
-    /// Every bounce since the light was specular (delta or sharp): a caustic.
-    pub const CAUSTIC: u8 = 1;
     /// The light is a delta light and every bounce was delta: no eye path that continues can find this light.
-    pub const UNREACHABLE: u8 = 2;
+    pub const UNREACHABLE: u8 = 1;
 
     /// Whether all bits of `mask` are set.
     #[inline]

@@ -1,12 +1,14 @@
 //! The photon map: photons in Morton order under an implicit 8-wide tree of boxes, and the kernels that weigh them.
 
 pub mod kernel;
+mod kind;
 mod map;
 mod near;
 mod nearest;
 mod volume;
 
 pub use kernel::Kernel;
+pub use kind::{ByKind, Kind, PhotonMaps};
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
 pub use near::{Near, same_surface};
 pub use nearest::{MAX_NEIGHBOURS, Nearest};

@@ -211,7 +211,7 @@ impl<'a> Passes<'a> {
                             arena.reset();
                             let mut vertices = LightVertices::new_in(&arena);
                             shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());
-                            let levels = levels(bandwidths[index as usize].bandwidth, pair);
+                            let levels = levels(bandwidths[index as usize].bandwidths[0], pair);
                             let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                             watch.begin(place.at, own);
                             measures[place.at] = shared.eye_path(&arena, start, &meets, watch);
@@ -222,7 +222,7 @@ impl<'a> Passes<'a> {
                 .collect();
             for (splats, left) in left {
                 for splat in splats {
-                    let levels = levels(bandwidths[splat.pixel as usize].bandwidth, pair);
+                    let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
                     let (tile, slot) = tiles.place(splat.pixel);
                     watches[tile].splat(slot, own, &splat, &levels);
                     splat.apply(&levels, &mut measures[tile * TILE_PIXELS + slot]);
@@ -276,7 +276,7 @@ impl Iterate for Passes<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
         let (width, height) = self.camera.size();
         if !self.settings.method.has_bandwidths() {
-            return vec![Pixel::new(0.0); width as usize * height as usize];
+            return vec![Pixel::new([0.0; 2]); width as usize * height as usize];
         }
         // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
         let initial = match self.settings.initial {
@@ -285,7 +285,7 @@ impl Iterate for Passes<'_> {
         };
         let Settings { widest: [widest, _], seed, .. } = *self.settings;
         let none = PhotonMap::build(Vec::new());
-        initial_bandwidths(&self.eye(), initial, widest, seed, &none).into_iter().map(Pixel::new).collect()
+        initial_bandwidths(&self.eye(), initial, widest, seed, [&none; 2]).into_iter().map(Pixel::new).collect()
     }
 
     fn guide(&self) -> Option<&Guide> {

@@ -15,32 +15,30 @@ use super::volume::Maps;
 use crate::camera::{band, par_pixels};
 use crate::estimator::rule::CountingRule;
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::math::{Frame, Vec3};
-use crate::photon::{Kernel, PhotonMap};
+use crate::math::{Frame, Rgb, Vec3};
+use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
 use crate::random::{Domain, Streams};
 use crate::transport::{Bandwidths, EqualFlux, EyeMeasure, Found, LevelRadii, MAX_LEVELS, PathStart, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The bandwidths of some levels, and what is counted within them.
-struct Counter<'a, R: CountingRule> {
-    rule: &'a R,
-    bandwidths: &'a [R::Bandwidth],
+/// The bandwidths of some levels for one kind of photons, and what is counted within them.
+struct States<'a, R: CountingRule> {
+    bandwidths: &'a mut [R::Bandwidth],
     /// Levels by ascending bandwidth: each may shrink on its own, so they may change places.
     order: [usize; MAX_LEVELS],
     tallies: &'a mut [R::Tally],
-    frame: Frame,
 }
 
-impl<'a, R: CountingRule> Counter<'a, R> {
+impl<'a, R: CountingRule> States<'a, R> {
     #[inline]
-    fn new(rule: &'a R, bandwidths: &'a [R::Bandwidth], tallies: &'a mut [R::Tally]) -> Counter<'a, R> {
+    fn new(bandwidths: &'a mut [R::Bandwidth], tallies: &'a mut [R::Tally]) -> States<'a, R> {
         let mut order = std::array::from_fn(|k| k);
         let radius2 = |level: usize| R::radius2(&bandwidths[level]);
         if !bandwidths.is_sorted_by(|a, b| R::radius2(a) <= R::radius2(b)) {
             order[..bandwidths.len()].sort_by(|&a, &b| radius2(a).total_cmp(&radius2(b)));
         }
-        Counter { rule, bandwidths, order, tallies, frame: Frame::from_normal(Vec3::Z) }
+        States { bandwidths, order, tallies }
     }
 
     fn ascending(&self) -> impl Iterator<Item = usize> {
@@ -49,14 +47,42 @@ impl<'a, R: CountingRule> Counter<'a, R> {
 
     /// Puts the levels of photons on surfaces, which are in the order of bandwidths, where they belong.
     #[inline]
-    fn by_level(&self, measure: &mut EyeMeasure) {
+    fn by_level(&self, light: &mut [Rgb; MAX_LEVELS]) {
         if self.order.is_sorted() {
             return;
         }
-        let (caustic, indirect) = (measure.caustic_photons, measure.indirect_photons);
+        let found = *light;
         for (at, level) in self.ascending().enumerate() {
-            measure.caustic_photons[level] = caustic[at];
-            measure.indirect_photons[level] = indirect[at];
+            light[level] = found[at];
+        }
+    }
+}
+
+/// Both kinds; of one that is not there, no levels.
+struct Counter<'a, R: CountingRule> {
+    rule: &'a R,
+    states: ByKind<States<'a, R>>,
+    /// What is being counted, and where.
+    kind: Kind,
+    frame: Frame,
+}
+
+impl<'a, R: CountingRule> Counter<'a, R> {
+    #[inline]
+    fn new(rule: &'a R, states: ByKind<States<'a, R>>) -> Counter<'a, R> {
+        Counter { rule, states, kind: Kind::Indirect, frame: Frame::from_normal(Vec3::Z) }
+    }
+
+    /// After the eye path of iteration `i` that has measured `measure`.
+    #[inline]
+    fn finish(self, i: u64, measure: &mut EyeMeasure) {
+        let [indirect, caustic] = self.states;
+        indirect.by_level(&mut measure.indirect_photons);
+        caustic.by_level(&mut measure.caustic_photons);
+        for States { bandwidths, tallies, .. } in [indirect, caustic] {
+            if !bandwidths.is_empty() {
+                self.rule.update(i, bandwidths, tallies);
+            }
         }
     }
 }
@@ -65,20 +91,22 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
     const COUNTS: bool = true;
 
     #[inline]
-    fn at(&mut self, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {
+    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {
         // One function of the normal in all iterations: counts of different gathering points are added.
-        self.frame = Frame::from_normal(ng);
-        LevelRadii::new(self.ascending().map(|level| R::radius2(&self.bandwidths[level])))
+        (self.kind, self.frame) = (kind, Frame::from_normal(ng));
+        let states = &self.states[kind as usize];
+        LevelRadii::new(states.ascending().map(|level| R::radius2(&states.bandwidths[level])))
     }
 
     #[inline]
     fn reach2(&self, largest2: f32) -> f32 {
-        self.rule.reach2(self.bandwidths, largest2)
+        self.rule.reach2(self.states[self.kind as usize].bandwidths, largest2)
     }
 
     #[inline]
     fn count(&mut self, photon: &Found) {
-        self.rule.count(self.bandwidths, self.tallies, &self.frame, photon);
+        let States { bandwidths, tallies, .. } = &mut self.states[self.kind as usize];
+        self.rule.count(bandwidths, tallies, &self.frame, photon);
     }
 }
 
@@ -91,9 +119,11 @@ pub(super) struct Counting<'a, R: CountingRule, K> {
     kernel: K,
     /// What photons of each channel carry, where channels are apart; then each has bandwidths of its own.
     channels: Option<[Option<EqualFlux>; 3]>,
-    /// Of every pixel, channel and level.
+    /// Kinds of photons that there are.
+    kinds: ByKind<bool>,
+    /// Of every pixel, channel, kind and level.
     bandwidths: Vec<R::Bandwidth>,
-    /// Of every pixel, channel and level.
+    /// Of every pixel, channel, kind and level.
     tallies: Vec<R::Tally>,
 }
 
@@ -102,7 +132,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     pub fn new(sppm: Sppm<'a>, settings: &'a Settings, rule: R, kernel: K) -> Self {
         let apart = settings.method == Method::Cppm && settings.chi_squared.plus;
         let channels = apart.then(|| sppm.equal_flux());
-        Counting { sppm, settings, rule, kernel, channels, bandwidths: Vec::new(), tallies: Vec::new() }
+        let kinds = sppm.kinds();
+        Counting { sppm, settings, rule, kernel, channels, kinds, bandwidths: Vec::new(), tallies: Vec::new() }
     }
 
     /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all else.
@@ -112,14 +143,20 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         [film, i].map(|pass| Streams::new(self.settings.seed, pass, domain))
     }
 
+    /// Bandwidths of a pixel and channel.
+    fn states(&self) -> usize {
+        self.settings.levels.count * self.kinds.iter().filter(|there| **there).count()
+    }
+
     /// `maps` holds the photons, or those of each channel.
     fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &mut [Pixel]) {
         let [independent, correlated] =
             [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
-        let Counting { sppm, settings, rule, kernel, bandwidths, tallies, .. } = self;
+        let each_map = self.states();
+        let Counting { sppm, settings, rule, kernel, kinds, bandwidths, tallies, .. } = self;
         let (eye, rule, kernel, levels) = (sppm.eye(), &*rule, *kernel, settings.levels);
         let (size, count, each) = (eye.camera.size(), levels.count, rule.tallies());
-        let states = count * maps.len();
+        let states = each_map * maps.len();
         let bands = pixels
             .par_chunks_mut(band(size.0))
             .zip(bandwidths.par_chunks_mut(band(size.0) * states))
@@ -144,15 +181,24 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
                     let mut channel = |channel: usize| {
                         let volume = maps[channel].volume(pixel, levels.clone());
-                        let levels = channel * count + levels.start..channel * count + levels.end;
-                        let tallies = &mut tallies[levels.start * each..levels.end * each];
-                        let bandwidths = &mut bandwidths[levels];
-                        let mut counter = Counter::new(rule, bandwidths, tallies);
+                        let own = channel * each_map..(channel + 1) * each_map;
+                        let mut of_kinds = bandwidths[own.clone()]
+                            .chunks_exact_mut(count)
+                            .zip(tallies[own.start * each..own.end * each].chunks_exact_mut(count * each));
+                        let mut counter = Counter::new(
+                            rule,
+                            kinds.map(|there| {
+                                let some = if there { of_kinds.next() } else { None };
+                                let (bandwidths, tallies) = some.unwrap_or_default();
+                                let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
+                                let counted = levels.start * each..levels.end * each;
+                                States::new(&mut bandwidths[levels], &mut tallies[counted])
+                            }),
+                        );
                         let scratch = &mut scratches[channel];
                         let photons = &maps[channel].surface;
                         let mut measure = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
-                        counter.by_level(&mut measure);
-                        rule.update(i, bandwidths, tallies);
+                        counter.finish(i, &mut measure);
                         measure
                     };
                     let mut all = channel(0);
@@ -197,15 +243,22 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
             InitialBandwidth::Nearest(k) => k as f32,
             _ => 0.0,
         };
-        let begin = |pixel: &Pixel, level: usize| {
+        let begin = |bandwidth: f32, level: usize| {
             // Each level's area is half that of the next larger, and so is the number of photons it begins with.
             let scale = 0.5f32.powi((levels.count - 1 - level) as i32);
             let above = level as i32 - levels.own() as i32;
-            self.rule.begin(pixel.bandwidth * pixel.bandwidth * scale, neighbours * scale, above)
+            self.rule.begin(bandwidth * bandwidth * scale, neighbours * scale, above)
         };
-        let states = levels.count * self.channels.map_or(1, |channels| channels.len());
-        let bandwidths = pixels.iter().flat_map(|pixel| (0..states).map(move |k| begin(pixel, k % levels.count)));
-        self.bandwidths = bandwidths.collect();
+        let channels = self.channels.map_or(1, |channels| channels.len());
+        self.bandwidths = Vec::with_capacity(pixels.len() * channels * self.states());
+        for pixel in &pixels {
+            for _ in 0..channels {
+                for kind in Kind::ALL.into_iter().filter(|kind| self.kinds[*kind as usize]) {
+                    let bandwidth = pixel.bandwidths[kind as usize];
+                    self.bandwidths.extend((0..levels.count).map(|level| begin(bandwidth, level)));
+                }
+            }
+        }
         self.tallies = vec![R::Tally::default(); self.bandwidths.len() * self.rule.tallies()];
         pixels
     }
@@ -227,11 +280,18 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         work
     }
 
-    fn radii(&mut self) -> Vec<f32> {
-        let count = self.settings.levels.count;
+    fn radii(&mut self) -> ByKind<Vec<f32>> {
+        let (count, each) = (self.settings.levels.count, self.states());
         // Of three channels the one in the middle.
-        let (all, shown) = if self.channels.is_some() { (3 * count, count..2 * count) } else { (count, 0..count) };
-        let bandwidths = self.bandwidths.chunks(all).flat_map(|bandwidths| &bandwidths[shown.clone()]);
-        bandwidths.map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
+        let (all, first) = if self.channels.is_some() { (3 * each, each) } else { (each, 0) };
+        let mut shown = first..first;
+        self.kinds.map(|there| {
+            if !there {
+                return Vec::new();
+            }
+            shown = shown.end..shown.end + count;
+            let bandwidths = self.bandwidths.chunks(all).flat_map(|bandwidths| &bandwidths[shown.clone()]);
+            bandwidths.map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
+        })
     }
 }

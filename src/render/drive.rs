@@ -8,6 +8,7 @@ use super::techniques::TechniquePicture;
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::light::Guide;
+use crate::photon::ByKind;
 use crate::scene::Scene;
 
 /// What an iteration has done.
@@ -24,9 +25,9 @@ pub(super) trait Iterate {
     fn pixels(&mut self) -> Vec<Pixel>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
-    /// Bandwidths of every pixel and level after the last iteration, of methods where they do not follow from the iteration.
-    fn radii(&mut self) -> Vec<f32> {
-        Vec::new()
+    /// Bandwidths by kind of photons of every pixel and level after the last iteration, of methods where they do not follow from the iteration.
+    fn radii(&mut self) -> ByKind<Vec<f32>> {
+        ByKind::default()
     }
     /// Where its light paths start, if they are guided.
     fn guide(&self) -> Option<&Guide> {

@@ -9,7 +9,7 @@ use super::sppm::chunks;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
 use crate::light::Guide;
 use crate::math::{Rgb, Vec3, luminance};
-use crate::photon::{Located, Nearest, Photon, PhotonMap};
+use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
 use crate::transport::{Eye, LightPass, Photons, Probe, Surroundings, light_path};
@@ -59,8 +59,8 @@ pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, settings: &Sett
     let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
     let mut guide = Guide::new(&eye.scene.lights)?;
     for round in 0..ROUNDS {
-        let (map, paths) = photons(eye, surroundings, light_paths, seed, round, &guide);
-        let error = error(eye, seed, round, &map, guide.cells());
+        let (maps, paths) = photons(eye, surroundings, light_paths, seed, round, &guide);
+        let error = error(eye, seed, round, &maps, guide.cells());
         guide.learn(&error, &paths);
     }
     Some(guide)
@@ -74,33 +74,39 @@ fn photons(
     seed: u64,
     round: u64,
     guide: &Guide,
-) -> (PhotonMap<Marked>, Vec<f64>) {
+) -> (ByKind<PhotonMap<Marked>>, Vec<f64>) {
     let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
         .guided(Some(guide))
         .wanting(ClassSet::ALL, eye.indirect);
     let trace = |paths: std::ops::Range<u32>| {
-        let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), Vec::new());
+        let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());
         let mut cells = Vec::with_capacity(paths.len());
         for index in paths {
             let Some(cell) = light_path(eye.scene, &arena, surroundings, &pass, index, &mut photons) else { continue };
             arena.reset();
             photons.volume.clear();
             let cell = cell as u32;
-            marked.extend(photons.surface.drain(..).map(|photon| Marked { photon, cell }));
+            for (marked, photons) in marked.iter_mut().zip(&mut photons.surface) {
+                marked.extend(photons.drain(..).map(|photon| Marked { photon, cell }));
+            }
             cells.push(cell);
         }
         (marked, cells)
     };
-    let parts: Vec<(Vec<Marked>, Vec<u32>)> = chunks(light_paths).map(trace).collect();
+    let parts: Vec<(ByKind<Vec<Marked>>, Vec<u32>)> = chunks(light_paths).map(trace).collect();
     let mut paths = vec![0.0; guide.cells()];
     for &cell in parts.iter().flat_map(|(_, cells)| cells) {
         paths[cell as usize] += 1.0;
     }
-    (PhotonMap::build(parts.into_iter().flat_map(|(marked, _)| marked).collect()), paths)
+    let mut all = ByKind::<Vec<Marked>>::default();
+    for (marked, _) in parts {
+        all.iter_mut().zip(marked).for_each(|(all, some)| all.extend(some));
+    }
+    (all.map(PhotonMap::build), paths)
 }
 
 /// Sum over a round's eye paths of the squared relative errors that photons leave, by cell.
-fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: usize) -> Vec<f64> {
+fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> Vec<f64> {
     let (width, height) = eye.camera.size();
     let pixels = u64::from(width) * u64::from(height);
     let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
@@ -108,7 +114,7 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: u
     let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
         let mut error = vec![0.0f64; cells];
-        let (mut arena, mut nearest) = (Bump::new(), Nearest::default());
+        let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
             let stream = Stream::new(seed, round, Domain::GuideEye, u64::from(index));
@@ -116,7 +122,7 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: u
             let pixel = pixel.min(pixels - 1);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
             if let Some(probe) = eye.probe(&arena, &(eye.start(at, stream), stream)) {
-                weigh(eye, map, &mut nearest, &probe, &mut error);
+                weigh(eye, maps, &mut nearest, &probe, &mut error);
             }
         }
         error
@@ -130,21 +136,29 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, map: &PhotonMap<Marked>, cells: u
 }
 
 /// Adds what the photons around a probe leave in its pixel.
-fn weigh(eye: &Eye<'_>, map: &PhotonMap<Marked>, nearest: &mut Nearest<Marked>, probe: &Probe, error: &mut [f64]) {
+fn weigh(
+    eye: &Eye<'_>,
+    maps: &ByKind<PhotonMap<Marked>>,
+    nearest: &mut ByKind<Nearest<Marked>>,
+    probe: &Probe,
+    error: &mut [f64],
+) {
     let point = &probe.point;
     let cap = SCREEN_CAP * span(eye.camera, point.length);
-    let radius2 = nearest.radius2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
-    let scale = probe.weight / (PI * radius2);
-    let mut light = Vec::with_capacity(NEIGHBOURS);
+    let mut light = Vec::with_capacity(2 * NEIGHBOURS);
     let mut sum = Rgb::ZERO;
-    map.within(point.p, radius2, |marked, _| {
-        let photon = &marked.photon;
-        if photon.ng.dot(point.ng) > 0.0 {
-            let found = scale * photon.flux;
-            sum += found;
-            light.push((marked.cell, luminance(found)));
-        }
-    });
+    for (map, nearest) in maps.iter().zip(nearest) {
+        let radius2 = nearest.radius2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
+        let scale = probe.weight / (PI * radius2);
+        map.within(point.p, radius2, |marked, _| {
+            let photon = &marked.photon;
+            if photon.ng.dot(point.ng) > 0.0 {
+                let found = scale * photon.flux;
+                sum += found;
+                light.push((marked.cell, luminance(found)));
+            }
+        });
+    }
     let value = luminance(sum + probe.direct);
     let inverse = 1.0 / (value * value + DARK);
     for (cell, light) in light {

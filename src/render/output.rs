@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::estimator::rule::{memoryless::radius2_factor, volume::radius_factor};
 use crate::film::{LayerSet, output};
+use crate::photon::ByKind;
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
@@ -18,12 +19,18 @@ pub struct Present {
     pub environment: bool,
     /// Media scatter.
     pub volume: bool,
+    /// Mirrors, glass or gloss are there.
+    pub narrow_lobes: bool,
 }
 
 impl Present {
     /// In `scene`.
     pub fn of(scene: &Scene) -> Present {
-        Present { environment: scene.lights.sky().environment.is_some(), volume: scene.survey.scattering() }
+        Present {
+            environment: scene.lights.sky().environment.is_some(),
+            volume: scene.survey.scattering(),
+            narrow_lobes: scene.survey.narrow_lobes,
+        }
     }
 }
 
@@ -35,7 +42,7 @@ pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::
         levels: settings.levels.count,
         compared: settings.compared_levels(),
         own: settings.levels.own(),
-        bandwidths: settings.method.has_bandwidths(),
+        kinds: settings.kinds(present),
         radius2_factor: radius2_factor(last, settings.alpha),
         environment: present.environment,
         classes: settings.classes,
@@ -45,20 +52,24 @@ pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::
     }
 }
 
-/// Layers of pixels; `radii` of every pixel and level replace those that follow from the iteration, unless there are none.
+/// Layers of pixels; `radii` by kind of every pixel and level replace those that follow from the iteration, unless there are none.
 pub(super) fn layers(
     size: (u32, u32),
     pixels: &[Pixel],
-    radii: &[f32],
+    radii: &ByKind<Vec<f32>>,
     shape: &output::Shape,
     wanted: impl Fn(&str) -> bool,
 ) -> Result<LayerSet> {
     let mut layers = output::layers(size, pixels, shape, wanted)?;
-    for level in (0..shape.levels).filter(|_| !radii.is_empty()) {
-        let name = format!("Radius{}", level + 1);
-        let planes = layers.layers.iter_mut().filter(|layer| layer.name == name).flat_map(|layer| &mut layer.planes);
-        for plane in planes {
-            plane.values = radii.iter().skip(level).step_by(shape.levels).copied().collect();
+    for (kind, name) in output::radius_layers(shape.kinds) {
+        let radii = &radii[kind as usize];
+        for level in (0..shape.levels).filter(|_| !radii.is_empty()) {
+            let name = format!("{name}{}", level + 1);
+            let planes =
+                layers.layers.iter_mut().filter(|layer| layer.name == name).flat_map(|layer| &mut layer.planes);
+            for plane in planes {
+                plane.values = radii.iter().skip(level).step_by(shape.levels).copied().collect();
+            }
         }
     }
     Ok(layers)

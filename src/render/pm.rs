@@ -12,6 +12,7 @@
 
 use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
+use super::output::Present;
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::{keep_first_hit, trace_some};
@@ -19,7 +20,7 @@ use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::Vec3;
-use crate::photon::{MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, kernel};
+use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Bandwidths, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
@@ -32,16 +33,17 @@ const BATCH: u32 = 1 << 16;
 pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
 /// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by it.
-fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (Vec<Photon>, u32) {
-    let (mut photons, mut traced): (Vec<Photon>, _) = (Vec::new(), 0);
+fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (ByKind<Vec<Photon>>, u32) {
+    let (mut photons, mut traced): (ByKind<Vec<Photon>>, _) = (ByKind::default(), 0);
+    let number = |photons: &ByKind<Vec<Photon>>| photons.iter().map(Vec::len).sum::<usize>();
     while traced < pass.paths() {
         let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
         let end = paths.end;
         let batch = trace_some(scene, surroundings, pass, paths).surface;
-        if photons.len() + batch.len() > most {
+        if number(&photons) + number(&batch) > most {
             break;
         }
-        photons.extend(batch);
+        photons.iter_mut().zip(batch).for_each(|(all, some)| all.extend(some));
         traced = end;
     }
     // The memory ends within a batch: path by path.
@@ -50,31 +52,32 @@ fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usi
     while traced < pass.paths() {
         light_path(scene, &arena, surroundings, pass, traced, &mut path);
         arena.reset();
-        if photons.len() + path.surface.len() > most {
+        if number(&photons) + number(&path.surface) > most {
             break;
         }
-        photons.append(&mut path.surface);
+        photons.iter_mut().zip(&mut path.surface).for_each(|(all, some)| all.append(some));
         path.volume.clear();
         traced += 1;
     }
     let more = pass.paths() as f32 / traced.max(1) as f32;
-    photons.iter_mut().for_each(|photon| photon.flux *= more);
+    photons.iter_mut().flatten().for_each(|photon| photon.flux *= more);
     (photons, traced)
 }
 
 /// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this area holds on average.
 struct Neighbours<'a> {
     count: usize,
-    nearest: &'a mut Nearest,
+    nearest: &'a mut ByKind<Nearest>,
     camera: &'a Camera,
     least: f32,
 }
 
 impl Bandwidths for Neighbours<'_> {
-    fn at(&mut self, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
+    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
         let cap = (SCREEN_CAP * span(self.camera, length)).max(self.least);
         let cap2 = cap * cap;
-        let radius2 = self.nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
+        let nearest = &mut self.nearest[kind as usize];
+        let radius2 = nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
         LevelRadii::new(std::iter::once(radius2.max(self.least * self.least)))
     }
 }
@@ -85,7 +88,7 @@ pub(super) struct Pm<'a> {
     settings: &'a Settings,
     surroundings: &'a Surroundings,
     /// Built by the first iteration.
-    map: Option<PhotonMap>,
+    maps: Option<PhotonMaps>,
 }
 
 impl<'a> Pm<'a> {
@@ -99,33 +102,33 @@ impl<'a> Pm<'a> {
             indirect: Indirect::Photons,
             classes: settings.classes,
         };
-        Pm { eye, settings, surroundings, map: None }
+        Pm { eye, settings, surroundings, maps: None }
     }
 
-    fn build(&self, phases: &mut Phases) -> (PhotonMap, u32) {
+    fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32) {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
         let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
-            .wanting(self.settings.of_photons(self.eye.scene), Indirect::Photons);
+            .wanting(self.settings.of_photons(Present::of(self.eye.scene)), Indirect::Photons);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
         let (photons, traced) = trace(self.eye.scene, self.surroundings, &pass, most);
         phases.light += cpu_seconds() - start;
         let start = cpu_seconds();
-        let map = PhotonMap::build(photons);
+        let maps = photons.map(PhotonMap::build);
         phases.map += cpu_seconds() - start;
-        (map, traced)
+        (maps, traced)
     }
 }
 
 impl Iterate for Pm<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
         let (width, height) = self.eye.camera.size();
-        vec![Pixel::new(0.0); width as usize * height as usize]
+        vec![Pixel::new([0.0; 2]); width as usize * height as usize]
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let (map, traced) = match self.map.take() {
-            Some(map) => (map, 0),
+        let (maps, traced) = match self.maps.take() {
+            Some(maps) => (maps, 0),
             None => self.build(phases),
         };
         let start = cpu_seconds();
@@ -136,7 +139,7 @@ impl Iterate for Pm<'_> {
         };
         let least = LEAST * eye.scene.lights.sky().radius;
         let streams = Streams::new(self.settings.seed, i, Domain::EyeIndependent);
-        let scratch = <(Scratch, Nearest)>::default;
+        let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
             pixels.par_chunks_mut(band(camera.size().0)),
             camera.size(),
@@ -146,15 +149,15 @@ impl Iterate for Pm<'_> {
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let pixel = &mut pixels[place.at];
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    let measure = eye.measure(scratch, start, &map, None, neighbours, kernel::Box);
+                    let measure = eye.measure(scratch, start, &maps, None, neighbours, kernel::Box);
                     keep_first_hit(eye, pixel, &measure);
                     pixel.add(&measure, None, 1, 0);
                 }
             },
         );
         phases.eye += cpu_seconds() - start;
-        let photons = map.photons().len();
-        self.map = Some(map);
+        let photons = maps.iter().map(|map| map.photons().len()).sum();
+        self.maps = Some(maps);
         Work { light_paths: u64::from(traced), photons }
     }
 }

@@ -5,6 +5,7 @@ use super::method::Method;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
 use crate::estimator::{Pixel, SquaredError};
+use crate::photon::ByKind;
 use serde::Serialize;
 
 /// Where the time went: core-seconds (processor time of the whole process) per phase.
@@ -30,8 +31,8 @@ pub struct Rendered {
     pub pixels: Vec<Pixel>,
     /// A picture per technique, if [`Settings::techniques`] and the method has several.
     pub techniques: Vec<TechniquePicture>,
-    /// Bandwidths of every pixel and level after the last iteration; empty where they follow from the iteration ([`Pixel::bandwidth`]).
-    pub radii: Vec<f32>,
+    /// Bandwidths by kind of photons of every pixel and level after the last iteration; empty where they follow from the iteration ([`Pixel::bandwidths`]).
+    pub radii: ByKind<Vec<f32>>,
     /// The settings it was made with.
     pub settings: Settings,
     /// Iterations done.
@@ -125,7 +126,7 @@ mod tests {
 
     /// Two finite samples, equal ones: no error at all.
     fn certain() -> Pixel {
-        let mut pixel = Pixel::new(1.0);
+        let mut pixel = Pixel::new([1.0; 2]);
         for n in 1..=2 {
             pixel.iterations = n;
             pixel.levels[0].add(Rgb::ONE, 1.0 / f64::from(n));
@@ -136,8 +137,8 @@ mod tests {
     #[test]
     fn pixels_without_finite_samples_are_errors() {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };
-        let rejected = Pixel { rejected: 2, ..Pixel::new(1.0) };
-        let once = Pixel { rejected: 1, iterations: 1, ..Pixel::new(1.0) };
+        let rejected = Pixel { rejected: 2, ..Pixel::new([1.0; 2]) };
+        let once = Pixel { rejected: 1, iterations: 1, ..Pixel::new([1.0; 2]) };
         let relative_error = |pixels: &[Pixel], s: &Settings| error_estimate(pixels, s).map(|e| e.root());
         assert_eq!(relative_error(&[certain(), certain()], &levels), Some(0.0));
         assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], &levels), Some(0.5));

@@ -2,15 +2,16 @@
 
 use super::auto::Way;
 use super::method::Method;
+use super::output::Present;
 use super::session::Spent;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
+use crate::photon::ByKind;
 #[cfg(doc)]
 use crate::photon::kernel;
 use crate::plan::{ClassSet, Effect, EffectSet, Owner, Search};
-use crate::scene::Scene;
 use crate::transport::{Indirect, MAX_LEVELS};
 
 /// Iterations when no stop condition is given.
@@ -187,13 +188,22 @@ impl Settings {
     }
 
     /// Classes of light that photons are to bring to eye paths that gather them.
-    pub fn of_photons(&self, scene: &Scene) -> ClassSet {
+    pub fn of_photons(&self, present: Present) -> ClassSet {
         let absent = [
-            (scene.survey.scattering(), &[Effect::Volume][..]),
-            (scene.survey.narrow_lobes, &[Effect::Glossy, Effect::Caustic, Effect::Sds][..]),
+            (present.volume, &[Effect::Volume][..]),
+            (present.narrow_lobes, &[Effect::Glossy, Effect::Caustic, Effect::Sds][..]),
         ];
         let absent = absent.into_iter().filter(|(there, _)| !there).flat_map(|(_, effects)| effects.iter().copied());
         self.search().owned_by(Owner::Photons) & self.classes & ClassSet::without(absent.collect::<EffectSet>())
+    }
+
+    /// Kinds of photons that have bandwidths; where light paths are merged, which tells no kinds apart, the first.
+    pub fn kinds(&self, present: Present) -> ByKind<bool> {
+        if self.method.gathers() {
+            self.indirect.kinds(self.of_photons(present))
+        } else {
+            [self.method.has_bandwidths(), false]
+        }
     }
 
     /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any order.

@@ -6,6 +6,7 @@
 use super::control::cpu_seconds;
 use super::drive::{Iterate, Work};
 use super::guiding::learnt;
+use super::output::Present;
 use super::region::region;
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
@@ -15,7 +16,7 @@ use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths}
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::{Guide, Region};
-use crate::photon::{Kernel, Nearest, PhotonMap, kernel};
+use crate::photon::{ByKind, Kernel, Kind, Nearest, PhotonMap, kernel};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
@@ -50,8 +51,7 @@ pub(super) fn chunks(paths: u32) -> impl IndexedParallelIterator<Item = Range<u3
 fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync) -> Photons {
     let parts: Vec<Photons> = chunks(paths.len() as u32)
         .map_init(Bump::new, |arena, part| {
-            let surface = Vec::with_capacity(CHUNK as usize * 2);
-            let mut photons = Photons { surface, ..Photons::default() };
+            let mut photons = Photons::default();
             for index in part {
                 light_path(arena, paths.start + index, &mut photons);
                 arena.reset();
@@ -59,8 +59,18 @@ fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons)
             photons
         })
         .collect();
-    let (surface, volume): (Vec<_>, Vec<_>) = parts.into_iter().map(|part| (part.surface, part.volume)).unzip();
-    Photons { surface: surface.concat(), volume: volume.concat() }
+    let mut photons = Photons {
+        surface: Kind::ALL
+            .map(|kind| Vec::with_capacity(parts.iter().map(|part| part.surface[kind as usize].len()).sum())),
+        volume: Vec::with_capacity(parts.iter().map(|part| part.volume.len()).sum()),
+    };
+    for part in parts {
+        for (all, some) in photons.surface.iter_mut().zip(part.surface) {
+            all.extend(some);
+        }
+        photons.volume.extend(part.volume);
+    }
+    photons
 }
 
 /// One eye pass: adds iteration `i` (from 1) to all pixels.
@@ -87,23 +97,27 @@ fn eye_pass(
         for (k, place) in places.iter().enumerate() {
             let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
             let pixel = &mut pixels[place.at];
-            let largest2 = pixel.bandwidth * pixel.bandwidth * factor;
             // Radius squared of level k (from 0) of m: each halves that of the next larger.
-            let radius2 = |k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
-            let all = LevelRadii::new((0..levels.count).map(radius2)).later(later2 * factor);
+            let radius2 = |largest2: f32, k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
+            let radii = |range: Range<usize>| {
+                pixel.bandwidths.map(|bandwidth| {
+                    let largest2 = bandwidth * bandwidth * factor;
+                    LevelRadii::new(range.clone().map(|k| radius2(largest2, k))).later(later2 * factor)
+                })
+            };
             match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                 Some(correlated) => {
                     let volume = maps.volume(pixel, 0..1);
-                    let independent = eye.measure(scratch, start, photons, volume, &all.part(0..1), kernel);
-                    let (from, others) = if levels.count > 1 { (1, all.part(1..levels.count)) } else { (0, all) };
-                    let volume = maps.volume(pixel, from..levels.count);
-                    let correlated = eye.measure(scratch, correlated, photons, volume, &others, kernel);
+                    let independent = eye.measure(scratch, start, photons, volume, &radii(0..1), kernel);
+                    let others = usize::from(levels.count > 1)..levels.count;
+                    let volume = maps.volume(pixel, others.clone());
+                    let correlated = eye.measure(scratch, correlated, photons, volume, &radii(others), kernel);
                     keep_first_hit(eye, pixel, &independent);
                     pixel.add(&independent, Some(&correlated), levels.count, levels.own());
                 }
                 None => {
                     let volume = maps.volume(pixel, 0..levels.count);
-                    let all = eye.measure(scratch, start, photons, volume, &all, kernel);
+                    let all = eye.measure(scratch, start, photons, volume, &radii(0..levels.count), kernel);
                     keep_first_hit(eye, pixel, &all);
                     pixel.add(&all, None, levels.count, levels.own());
                 }
@@ -138,6 +152,7 @@ pub(super) struct Sppm<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
     surroundings: &'a Surroundings,
+    present: Present,
     guide: Option<Guide>,
     /// Where light from infinity is wanted.
     region: Option<Region>,
@@ -161,16 +176,22 @@ impl<'a> Sppm<'a> {
             indirect: settings.indirect,
             classes: settings.classes,
         };
-        let guided = settings.guided && !settings.of_photons(scene).is_empty();
+        let present = Present::of(scene);
+        let guided = settings.guided && !settings.of_photons(present).is_empty();
         let guide = guided.then(|| learnt(&eye, surroundings, settings)).flatten();
         // Guided passes send no light there.
         let region = if guide.is_none() { region(&eye, settings.seed) } else { None };
-        Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY }
+        Sppm { eye, settings, surroundings, present, guide, region, later2: f32::INFINITY }
     }
 
     /// Eye paths.
     pub fn eye(&self) -> Eye<'a> {
         self.eye
+    }
+
+    /// Kinds of photons that there are.
+    pub fn kinds(&self) -> ByKind<bool> {
+        self.settings.kinds(self.present)
     }
 
     /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
@@ -182,8 +203,7 @@ impl<'a> Sppm<'a> {
             let start = cpu_seconds();
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
-            let pass =
-                pass.with(Comb::new(seed, i)).wanting(self.settings.of_photons(self.eye.scene), Indirect::Photons);
+            let pass = pass.with(Comb::new(seed, i)).wanting(self.settings.of_photons(self.present), Indirect::Photons);
             let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(0..each, |arena, index, photons| {
@@ -223,7 +243,7 @@ impl<'a> Sppm<'a> {
     fn build(&self, photons: Photons, i: u64) -> Maps {
         let scatters = self.eye.scene.survey.scattering();
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
-        Maps { surface: PhotonMap::build(photons.surface), volume, comb: Comb::new(self.settings.seed, i) }
+        Maps { surface: photons.surface.map(PhotonMap::build), volume, comb: Comb::new(self.settings.seed, i) }
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass<'_> {
@@ -231,7 +251,7 @@ impl<'a> Sppm<'a> {
         LightPass::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
             .lighting(self.region)
-            .wanting(self.settings.of_photons(self.eye.scene), self.settings.indirect)
+            .wanting(self.settings.of_photons(self.present), self.settings.indirect)
             .with(Comb::new(seed, i))
     }
 }
@@ -244,10 +264,10 @@ impl Iterate for Sppm<'_> {
         } else {
             Photons::default()
         };
-        let map = PhotonMap::build(pilot.surface);
-        let bandwidths = initial_bandwidths(&self.eye, initial, widest[0], seed, &map);
+        let maps = pilot.surface.map(PhotonMap::build);
+        let bandwidths = initial_bandwidths(&self.eye, initial, widest[0], seed, maps.each_ref());
         if let (InitialBandwidth::Nearest(k), Indirect::Paths) = (initial, self.settings.indirect) {
-            self.later2 = usual_radius2(&map, k);
+            self.later2 = usual_radius2(&maps[Kind::Caustic as usize], k);
         }
         let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
         if self.eye.scene.survey.scattering() {

@@ -4,7 +4,7 @@ use super::settings::Settings;
 use crate::camera::GROUP;
 use crate::estimator::Pixel;
 use crate::estimator::rule::volume::{level_factor, radius_factor};
-use crate::photon::{PhotonMap, VolumePhoton};
+use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
 use crate::random::Stream;
 use crate::spectrum::Comb;
 use crate::transport::{PathStart, Volume};
@@ -12,7 +12,7 @@ use crate::transport::{PathStart, Volume};
 /// Photons of an iteration.
 pub(super) struct Maps {
     /// On surfaces.
-    pub surface: PhotonMap,
+    pub surface: PhotonMaps,
     /// In media, if any scatter.
     pub volume: Option<VolumeMap>,
     /// The wavelengths they have taken.
@@ -22,7 +22,8 @@ pub(super) struct Maps {
 impl Maps {
     /// Number of photons.
     pub fn len(&self) -> usize {
-        self.surface.photons().len() + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
+        let surface: usize = self.surface.iter().map(|map| map.photons().len()).sum();
+        surface + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
     }
 
     /// The starts of eye paths that take no other wavelengths.

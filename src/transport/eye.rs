@@ -27,8 +27,8 @@ use crate::camera::{Camera, GROUP, Place};
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
-use crate::photon::{Kernel, Near, Photon, PhotonMap, VolumePhoton};
-use crate::plan::{Beam, ClassSet, Event, Part, Sight};
+use crate::photon::{ByKind, Kernel, Kind, Near, Photon, PhotonMap, PhotonMaps, VolumePhoton};
+use crate::plan::{Beam, ClassSet, Event, Part, PathClass, Sight};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::spectrum::{Hue, Wavelength};
@@ -58,12 +58,6 @@ impl LevelRadii {
             radii.count += 1;
         }
         radii
-    }
-
-    /// Some of the levels.
-    #[inline]
-    pub fn part(&self, levels: std::ops::Range<usize>) -> LevelRadii {
-        LevelRadii::new(self.radius2[..self.count][levels].iter().copied()).later(self.later2)
     }
 
     /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
@@ -117,15 +111,15 @@ pub trait Bandwidths {
     fn reach2(&self, largest2: f32) -> f32 {
         largest2
     }
-    /// Those at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
-    fn at(&mut self, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+    /// Those for photons of a kind at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
+    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
 }
 
 /// The same all along the path.
-impl Bandwidths for &LevelRadii {
+impl Bandwidths for &ByKind<LevelRadii> {
     #[inline]
-    fn at(&mut self, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
-        **self
+    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
+        self[kind as usize]
     }
 }
 
@@ -195,11 +189,23 @@ pub enum Indirect {
     Paths,
 }
 
+impl Indirect {
+    /// Kinds of photons that bring these classes to eye paths.
+    pub fn kinds(self, wanted: ClassSet) -> ByKind<bool> {
+        let caustics: ClassSet = match self {
+            Indirect::Photons => [PathClass::Caustic, PathClass::Sds].into_iter().collect(),
+            Indirect::Paths => ClassSet::ALL,
+        };
+        let others = PathClass::ALL.into_iter().any(|class| wanted.has(class) && !caustics.has(class));
+        [others, !(wanted & caustics).is_empty()]
+    }
+}
+
 struct Gather<'a, B, K, const PATHS: bool> {
     kernel: K,
     scene: &'a Scene,
-    photons: &'a PhotonMap,
-    near: &'a mut Near<Photon>,
+    photons: &'a PhotonMaps,
+    near: &'a mut ByKind<Near<Photon>>,
     volume: Option<Volume<'a>>,
     near_volume: &'a mut Near<VolumePhoton>,
     bandwidths: B,
@@ -312,17 +318,27 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         }
     }
 
-    /// Photons around the vertex: kernel density estimation, all levels from one query [post-reconstruction 2021, (2) and (3)].
+    /// Photons around the vertex: kernel density estimation, all levels of a kind from one query [post-reconstruction 2021, (2) and (3)].
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
         // What a photon of caustics makes of sharp lobes is in the same class.
         let sight = self.sight.then(Event::Broad);
-        let focused = sight.receives(Beam::FOCUSED);
-        let wanted = [Beam::SCATTERED, Beam::FOCUSED].map(|beam| self.classes.has(sight.receives(beam)));
-        if wanted == [false; 2] {
-            return;
+        for (kind, beam) in [(Kind::Indirect, Beam::SCATTERED), (Kind::Caustic, Beam::FOCUSED)] {
+            let class = sight.receives(beam);
+            if self.photons[kind as usize].photons().is_empty() || !self.classes.has(class) {
+                continue;
+            }
+            // Caustics that surfaces scatter on before they are seen are indirect light.
+            let caustic = kind == Kind::Caustic && (!PATHS || class.part() == Part::Caustic);
+            self.gather_kind(kind, caustic, vertex, broad, sharp);
         }
-        let mut radii = self.bandwidths.at(self.photons, vertex.surface.p, vertex.surface.ng, self.length);
+    }
+
+    #[inline]
+    fn gather_kind(&mut self, kind: Kind, caustic: bool, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
+        let (p, ng) = (vertex.surface.p, vertex.surface.ng);
+        let photons = &self.photons[kind as usize];
+        let mut radii = self.bandwidths.at(kind, photons, p, ng, self.length);
         if PATHS && self.broadly {
             let largest2 = radii.radius2[radii.count.saturating_sub(1)];
             let factor = (radii.later2 / largest2).min(1.0);
@@ -333,35 +349,20 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let longest = self.max_depth - vertex.depth;
         let reach2 = self.bandwidths.reach2(largest);
         let mut batch = Batch::new(self.kernel, radii, vertex, broad, broad | sharp);
-        let (p, bandwidths) = (vertex.surface.p, &mut self.bandwidths);
-        match &vertex.wavelength {
-            None => self.photons.gather(self.near, p, vertex.surface.ng, reach2, |photon, distance2| {
-                if u32::from(photon.depth) <= longest {
-                    batch.push(photon, distance2, bandwidths);
-                }
-            }),
-            Some(wavelength) => {
-                let (photons, near) = (self.photons, &mut *self.near);
-                gather_dispersed(photons, near, vertex, wavelength, reach2, |photon, distance2| {
-                    if u32::from(photon.depth) <= longest {
-                        batch.push(photon, distance2, bandwidths);
-                    }
-                });
+        let (near, bandwidths) = (&mut self.near[kind as usize], &mut self.bandwidths);
+        let push = |photon: &Photon, distance2| {
+            if u32::from(photon.depth) <= longest {
+                batch.push(photon, distance2, bandwidths);
             }
+        };
+        match &vertex.wavelength {
+            None => photons.gather(near, p, ng, reach2, push),
+            Some(wavelength) => gather_dispersed(photons, near, vertex, wavelength, reach2, push),
         }
         let sums = batch.finish(&mut self.bandwidths);
-        for (level, radius2) in radii.iter().enumerate() {
-            let kernel = vertex.throughput * (FRAC_1_PI / radius2);
-            let (others, caustics) = (kernel * sums[0][level], kernel * sums[1][level]);
-            if wanted[0] {
-                self.measure.indirect_photons[level] += others;
-            }
-            if wanted[1] {
-                // Caustics that surfaces scatter on before they are seen are indirect light.
-                let caustic = !PATHS || focused.part() == Part::Caustic;
-                let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
-                into[level] += caustics;
-            }
+        let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
+        for ((into, sum), radius2) in into.iter_mut().zip(sums).zip(radii) {
+            *into += vertex.throughput * (FRAC_1_PI / radius2) * sum;
         }
     }
 }
@@ -567,7 +568,7 @@ impl Eye<'_> {
         &self,
         scratch: &mut Scratch,
         (start, stream): &(PathStart, Stream),
-        photons: &PhotonMap,
+        photons: &PhotonMaps,
         volume: Option<Volume<'_>>,
         bandwidths: impl Bandwidths,
         kernel: impl Kernel,
@@ -589,7 +590,7 @@ impl Eye<'_> {
         scratch: &mut Scratch,
         start: &PathStart,
         stream: Stream,
-        photons: &PhotonMap,
+        photons: &PhotonMaps,
         volume: Option<Volume<'_>>,
         bandwidths: B,
         kernel: K,

@@ -4,7 +4,7 @@ use super::eye::{Bandwidths, Found, MAX_LEVELS};
 use super::walk::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3, Vec3A};
-use crate::photon::{Kernel, Near, Photon, PhotonFlags, VolumePhoton};
+use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
 use bumpalo::Bump;
 use wide::{CmpEq, f32x8};
 
@@ -14,15 +14,15 @@ pub struct Scratch {
     /// What the vertices of a path need.
     pub(super) arena: Bump,
     /// Photons near the last vertices.
-    pub(super) near: Near<Photon>,
+    pub(super) near: ByKind<Near<Photon>>,
     /// Photons in media near the last vertices there.
     pub(super) near_volume: Near<VolumePhoton>,
 }
 
-/// Bins of a kind of photon: one per level, and one for those beyond the largest bandwidth, which are only counted.
+/// One bin per level, and one for those beyond the largest bandwidth, which are only counted.
 const BINS: usize = MAX_LEVELS + 1;
 
-/// Photons waiting for their BSDF, and the sums of those that have had it, by kind (other, caustic). With the box kernel a photon is in the bin of
+/// Photons of one kind waiting for their BSDF, and the sums of those that have had it. With the box kernel a photon is in the bin of
 /// the smallest level that holds it, and levels are sums of bins; with others it has its weight in every level.
 pub(super) struct Batch<'a, K> {
     kernel: std::marker::PhantomData<K>,
@@ -41,7 +41,7 @@ pub(super) struct Batch<'a, K> {
     offset: [[f32; 8]; 3],
     /// For those and for kernels: their distance squared.
     distance2: [f32; 8],
-    bins: [[Vec3A; BINS]; 2],
+    bins: [Vec3A; BINS],
 }
 
 impl<'a, K: Kernel> Batch<'a, K> {
@@ -63,7 +63,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
             bin: [0; 8],
             offset: [[0.0; 8]; 3],
             distance2: [f32::INFINITY; 8],
-            bins: [[Vec3A::ZERO; BINS]; 2],
+            bins: [Vec3A::ZERO; BINS],
         }
     }
 
@@ -76,10 +76,9 @@ impl<'a, K: Kernel> Batch<'a, K> {
         for &radius2 in &self.radii[..last] {
             level += usize::from(distance2 >= radius2);
         }
-        let caustic = usize::from(photon.flags.has(PhotonFlags::CAUSTIC));
         if let (Some(gathering), true) = (&self.unreachable, photon.flags.has(PhotonFlags::UNREACHABLE)) {
             let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
-            self.add(caustic, level, light.into(), distance2);
+            self.add(level, light.into(), distance2);
             if B::COUNTS && light != Rgb::ZERO {
                 let light = (light * self.throughput).element_sum() / 3.0;
                 counter.count(&Found::one(photon.p - self.p, distance2, light));
@@ -92,7 +91,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
             self.flux[axis][at] = photon.flux[axis];
         }
         self.cosine[at] = photon.cosine();
-        self.bin[at] = (caustic * BINS + level) as u8;
+        self.bin[at] = level as u8;
         if B::COUNTS {
             for axis in 0..3 {
                 self.offset[axis][at] = photon.p[axis] - self.p[axis];
@@ -113,8 +112,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
         let found: [f32x8; 3] = std::array::from_fn(|c| f[c] * f32x8::from(self.flux[c]));
         let [r, g, b] = found.map(f32x8::to_array);
         for k in 0..self.count {
-            let bin = usize::from(self.bin[k]);
-            self.add(bin / BINS, bin % BINS, Vec3A::new(r[k], g[k], b[k]), self.distance2[k]);
+            self.add(usize::from(self.bin[k]), Vec3A::new(r[k], g[k], b[k]), self.distance2[k]);
         }
         if B::COUNTS {
             // What is left of the last eight is not there, nor are photons that bring nothing [CPPM 2020, 7.2].
@@ -132,30 +130,28 @@ impl<'a, K: Kernel> Batch<'a, K> {
 
     /// Adds what a photon brings to the levels that hold it.
     #[inline(always)]
-    fn add(&mut self, kind: usize, level: usize, light: Vec3A, distance2: f32) {
+    fn add(&mut self, level: usize, light: Vec3A, distance2: f32) {
         if K::BOX {
-            self.bins[kind][level] += light;
+            self.bins[level] += light;
         } else {
-            for (bin, radius2) in self.bins[kind].iter_mut().zip(self.radii).skip(level) {
+            for (bin, radius2) in self.bins.iter_mut().zip(self.radii).skip(level) {
                 *bin += light * K::weight(distance2 / radius2);
             }
         }
     }
 
-    /// The sums by kind and level.
+    /// The sums by level.
     #[inline]
-    pub fn finish<B: Bandwidths>(mut self, counter: &mut B) -> [[Rgb; BINS]; 2] {
+    pub fn finish<B: Bandwidths>(mut self, counter: &mut B) -> [Rgb; BINS] {
         if self.count > 0 {
             self.flush(counter);
         }
         if K::BOX {
-            for bins in &mut self.bins {
-                for level in 1..self.radii.len() {
-                    let within = bins[level - 1];
-                    bins[level] += within;
-                }
+            for level in 1..self.radii.len() {
+                let within = self.bins[level - 1];
+                self.bins[level] += within;
             }
         }
-        self.bins.map(|levels| levels.map(Rgb::from))
+        self.bins.map(Rgb::from)
     }
 }

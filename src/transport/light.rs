@@ -8,8 +8,8 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{Rgb, Vec2};
-use crate::photon::{Photon, PhotonFlags, VolumePhoton};
-use crate::plan::{ClassSet, PathClass};
+use crate::photon::{ByKind, Kind, Photon, PhotonFlags, VolumePhoton};
+use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
 use crate::spectrum::{Band, Comb, Hue};
@@ -28,8 +28,7 @@ pub struct LightPass<'a> {
     direction: SobolPair,
     guide: Option<&'a Guide>,
     region: Option<Region>,
-    caustics_only: bool,
-    keeps_caustics: bool,
+    kinds: ByKind<bool>,
     comb: Option<Comb>,
 }
 
@@ -73,8 +72,7 @@ impl<'a> LightPass<'a> {
             direction,
             guide: None,
             region: None,
-            caustics_only: false,
-            keeps_caustics: true,
+            kinds: [true; 2],
             comb: None,
         }
     }
@@ -93,17 +91,7 @@ impl<'a> LightPass<'a> {
     /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those of caustics, or with those alone.
     #[must_use]
     pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPass<'a> {
-        let caustics: ClassSet = match indirect {
-            Indirect::Photons => [PathClass::Caustic, PathClass::Sds].into_iter().collect(),
-            Indirect::Paths => ClassSet::ALL,
-        };
-        let others = PathClass::ALL.into_iter().any(|class| wanted.has(class) && !caustics.has(class));
-        LightPass {
-            paths: if wanted.is_empty() { 0 } else { self.paths },
-            caustics_only: !others,
-            keeps_caustics: !(wanted & caustics).is_empty(),
-            ..self
-        }
+        LightPass { paths: if wanted.is_empty() { 0 } else { self.paths }, kinds: indirect.kinds(wanted), ..self }
     }
 
     /// Whose paths take no other wavelengths than these.
@@ -185,7 +173,7 @@ impl<'a> LightPass<'a> {
 #[derive(Default)]
 pub struct Photons {
     /// On surfaces.
-    pub surface: Vec<Photon>,
+    pub surface: ByKind<Vec<Photon>>,
     /// In media.
     pub volume: Vec<VolumePhoton>,
 }
@@ -200,7 +188,7 @@ struct Deposit<'a> {
     photons: &'a mut Photons,
     /// Lobes that a path goes on with.
     onward: LobeSet,
-    keeps_caustics: bool,
+    kinds: ByKind<bool>,
     caustic: bool,
     unreachable: bool,
     /// The path may go on after a broad bounce, and its flux then is multiplied by this.
@@ -219,12 +207,12 @@ impl<'a> Deposit<'a> {
         emitted: &Emitted,
         probability: f32,
     ) -> Deposit<'a> {
-        let onward = if pass.caustics_only { LobeSet::SHARP | LobeSet::DELTA } else { LobeSet::ALL };
+        let onward = if pass.kinds[Kind::Indirect as usize] { LobeSet::ALL } else { LobeSet::SHARP | LobeSet::DELTA };
         Deposit {
             scene,
             photons,
             onward,
-            keeps_caustics: pass.keeps_caustics,
+            kinds: pass.kinds,
             caustic: true,
             unreachable: emitted.delta,
             goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
@@ -258,10 +246,10 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders of
         // materials and dark texels.
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
-        if scattered.is_some() && gathers && (self.keeps_caustics || !self.caustic) {
-            let flags = (u8::from(self.caustic) * PhotonFlags::CAUSTIC)
-                | (u8::from(self.unreachable) * PhotonFlags::UNREACHABLE);
-            self.photons.surface.push(Photon {
+        let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
+        if scattered.is_some() && gathers && self.kinds[kind as usize] {
+            let flags = u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
+            self.photons.surface[kind as usize].push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,
                 ng: vertex.surface.ng,

@@ -22,7 +22,7 @@ fn a_render_leaves_all_layers_and_its_account() {
     let mut expected: Vec<String> =
         ["", "Noisy", "Direct", "Indirect", "Caustic", "Emission", "Error"].map(String::from).into();
     for k in 1..=5 {
-        expected.extend(["Level", "Variance", "Radius"].map(|stem| format!("{stem}{k}")));
+        expected.extend(["Level", "Variance", "Radius", "CausticRadius"].map(|stem| format!("{stem}{k}")));
     }
     expected.extend(["albedo", "normal", "depth", "Z", "P", "Rejected"].map(String::from));
     for k in 0..3 {

@@ -3,6 +3,7 @@
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
 use caustique::estimator::rule::{adaptive, chi_squared, local};
+use caustique::photon;
 use caustique::render::{MAX_TECHNIQUES, Method, Settings};
 use caustique::transport::EyeMeasure;
 use std::mem::size_of;
@@ -37,7 +38,8 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
         _ => 0,
     };
     let apart = if method == Method::Cppm && settings.chi_squared.plus { 3 } else { 1 };
-    let own = (settings.levels.count * apart * state) as u64;
+    // At most: a scene may have photons of one kind alone.
+    let own = (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
     let per_pixel = own + pictures + (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
     pixels * per_pixel + photons
 }

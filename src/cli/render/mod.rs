@@ -36,7 +36,8 @@ const COMBINED_LAYERS: [&str; 5] = ["Level", "Variance", "albedo", "normal", "de
 pub fn run(args: &RenderArgs) -> Result<()> {
     let settings = args.settings()?;
     // Whether media scatter is not known yet.
-    let selection = selection(args, &settings, true)?;
+    let anything = Present { environment: true, volume: true, narrow_lobes: true };
+    let selection = selection(args, &settings, anything)?;
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     techniques::prepare(args)?;
@@ -50,7 +51,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let camera = scene.camera(&args.view())?;
     plan::check_media(args, &scene)?;
     let present = Present::of(&scene);
-    self::selection(args, settings, present.volume)?;
+    self::selection(args, settings, present)?;
     // Before anything is tried, which takes time.
     memory::check(settings, camera.size(), channels(settings, present))?;
     let choice = auto(args, &scene, &camera, present);
@@ -124,7 +125,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
 
 /// What auto chooses, where it is to: among ways whose pictures have the layers asked for.
 fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, present: Present) -> Option<Choice> {
-    let layers = |settings: &Settings| selection(args, settings, present.volume).is_ok();
+    let layers = |settings: &Settings| selection(args, settings, present).is_ok();
     let make = |way| args.allowed(way).filter(layers);
     (args.method == Method::Auto).then(|| choose(scene, camera, args.free(), make)).flatten()
 }
@@ -196,10 +197,10 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
     (0..RANKS / 2).map(move |index| format!("{kind}{index:02}"))
 }
 
-/// `--layers`, checked against what this render will have, where media scatter (`volume`) or not.
-fn selection(args: &RenderArgs, settings: &Settings, volume: bool) -> Result<Selection> {
+/// `--layers`, checked against what this render will have.
+fn selection(args: &RenderArgs, settings: &Settings, present: Present) -> Result<Selection> {
     let selection = Selection::parse(&args.layers)?;
-    let mut names = film::names(&shape(settings, 1, Present { volume, ..Present::default() }));
+    let mut names = film::names(&shape(settings, 1, present));
     names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
     let layers = names.into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;

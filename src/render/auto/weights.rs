@@ -10,6 +10,7 @@ use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
 use crate::plan::{ClassSet, Effect, PathClass};
+use crate::render::output::Present;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -113,7 +114,7 @@ pub(super) fn saved(
                 classes: settings.classes & ClassSet::without([effect].into_iter().collect()),
                 ..settings.clone()
             };
-            let (now, then) = (settings.of_photons(scene).is_empty(), left.of_photons(scene).is_empty());
+            let [now, then] = [settings, &left].map(|settings| settings.of_photons(Present::of(scene)).is_empty());
             Some(if then && !now { cost.of_photons(way, settings, pixels) } else { 0.0 })
         }
         _ => None,
