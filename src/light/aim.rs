@@ -152,22 +152,28 @@ impl Targets {
         self.weigh(sky, emission);
     }
 
-    /// The same with the disc of a region in the mixture; the density stays that without it. Returns the share of the density that all light has: without the targets.
-    pub fn aim_and_light(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) -> f32 {
-        let lit = if self.choice.is_none() { LIT.0 } else { LIT.1 };
-        let plain = emission.flux;
+    /// The same, and part of the paths through the disc of a region. Flux and density are those without the region: [`Targets::lit`] has the mixture's.
+    pub fn aim_or_light(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
+        let lit = self.share_lit();
         if u < lit {
             emission.origin = Self::point(sky, emission.direction, (region.center, region.radius), point);
             self.weigh(sky, emission);
         } else {
             self.aim(sky, emission, (u - lit) / (1.0 - lit), point);
         }
+    }
+
+    fn share_lit(&self) -> f32 {
+        if self.choice.is_none() { LIT.0 } else { LIT.1 }
+    }
+
+    /// Density of an aimed start in the mixture with a region, and the part of it that all light has: without the targets.
+    pub fn lit(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
+        let lit = self.share_lit();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
         let area = PI * region.radius * region.radius;
         let through = if from_line(region.center, p, d) < region.radius * region.radius { lit / area } else { 0.0 };
-        let mixed = (1.0 - lit) * aimed + through;
-        emission.flux = plain / (PI * sky.radius * sky.radius * mixed);
-        ((1.0 - lit) * aimed * self.unaimed(sky, emission) + through) / mixed
+        ((1.0 - lit) * aimed + through, (1.0 - lit) * aimed * self.unaimed(sky, emission) + through)
     }
 
     /// The same, drawn through the disc of one target.
@@ -268,7 +274,12 @@ mod tests {
                 };
                 let (u, point) = (draws.one(Purpose::Lobe), draws.two(Purpose::Lens));
                 let unaimed = match region {
-                    Some(region) => targets.aim_and_light(&sky, &mut emission, region, u, point),
+                    Some(region) => {
+                        targets.aim_or_light(&sky, &mut emission, region, u, point);
+                        let (mixed, unaimed) = targets.lit(&sky, &emission, region);
+                        emission.flux *= emission.density.onward / mixed;
+                        unaimed / mixed
+                    }
                     None => {
                         targets.aim(&sky, &mut emission, u, point);
                         targets.unaimed(&sky, &emission)

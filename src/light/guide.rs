@@ -8,7 +8,7 @@
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
 use super::lights::{EmissionSample, Lights};
-use super::{Cdf, Emitter};
+use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, spawn};
 use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
@@ -55,6 +55,8 @@ pub struct Guided {
     pub cell: usize,
     /// Native density over the mixture's: what the flux was multiplied by.
     pub ratio: f32,
+    /// Share of the mixture's density that paths of all light have, without those sent where caustics are made.
+    pub unaimed: f32,
 }
 
 impl Guide {
@@ -142,13 +144,14 @@ impl Guide {
         }
     }
 
-    /// A start. `choice`, `point` and `direction` are uniform on the unit square.
+    /// A start; unguided ones from infinity are in part sent through a region, if there is one. `choice`, `point` and `direction` are uniform on the unit square.
     #[inline]
     pub fn emit(
         &self,
         lights: &Lights,
         shapes: &Shapes,
         materials: &Materials,
+        region: Option<Region>,
         choice: Vec2,
         point: Vec2,
         direction: Vec2,
@@ -156,7 +159,7 @@ impl Guide {
         let (cell, _, rest) = self.choice.sample(choice.y);
         let (emission, made) = if cell == UNGUIDED {
             let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
-            lights.aim(&mut emission, rest, point);
+            lights.aim_or_light(&mut emission, region, rest, point);
             (emission, None)
         } else {
             let (lamp, target) = self.cells[cell];
@@ -167,18 +170,19 @@ impl Guide {
             (self.turn(lights, emission, target, point, direction)?, Some(target))
         };
         let lamp = self.lamp_of[emission.light as usize];
-        let native = emission.density.onward;
-        let mut mixed = self.unguided() * native;
+        let (unguided, unaimed) = lights.lit(&emission, region);
+        let mut mixed = self.unguided() * unguided;
         if let Some(lamp) = self.lamps.get(lamp as usize) {
             for &(target, weight) in &lamp.targets {
                 mixed += weight * Self::density(lights, &emission, target, made == Some(target));
             }
         }
-        let ratio = native / mixed;
+        let ratio = emission.density.onward / mixed;
         if ratio.is_nan() || ratio <= 0.0 {
             return None;
         }
-        Some(Guided { emission: EmissionSample { flux: emission.flux * ratio, ..emission }, cell, ratio })
+        let unaimed = self.unguided() * unaimed / mixed;
+        Some(Guided { emission: EmissionSample { flux: emission.flux * ratio, ..emission }, cell, ratio, unaimed })
     }
 
     /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give it there.

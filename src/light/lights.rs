@@ -519,23 +519,27 @@ impl Lights {
         }
     }
 
-    /// The same, and part of the paths from infinity through the disc of a region of interest. Returns the share of the start's density that all light has, that of the
-    /// whole scene and the region, without what is aimed.
+    /// The same, and part of the paths from infinity through the disc of a region of interest, if there is one. Flux and density are those without the region.
     #[inline]
-    pub fn aim_and_light(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) -> f32 {
+    pub fn aim_or_light(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) {
         match region {
-            Some(region) if emission.infinite => self.targets.aim_and_light(&self.sky, emission, region, u, point),
-            _ => {
-                self.aim(emission, u, point);
-                self.unaimed(emission)
+            Some(region) if emission.infinite => {
+                self.targets.aim_or_light(&self.sky, emission, region, u, point);
             }
+            _ => self.aim(emission, u, point),
         }
     }
 
-    /// Share of an aimed start's density that paths of all light have.
+    /// Density that an aimed start has with the region in the mixture, and the part of it that paths of all light have: those through the whole scene and the
+    /// region, without what is aimed.
     #[inline]
-    pub fn unaimed(&self, emission: &EmissionSample) -> f32 {
-        if emission.infinite { self.targets.unaimed(&self.sky, emission) } else { 1.0 }
+    pub fn lit(&self, emission: &EmissionSample, region: Option<Region>) -> (f32, f32) {
+        let onward = emission.density.onward;
+        match region {
+            _ if !emission.infinite => (onward, onward),
+            Some(region) => self.targets.lit(&self.sky, emission, region),
+            None => (onward, onward * self.targets.unaimed(&self.sky, emission)),
+        }
     }
 
     /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.

@@ -99,7 +99,7 @@ impl<'a> Passes<'a> {
             merged_paths: pixels * pairs.len() as f32,
         });
         let guided = settings.guided && shared.is_some();
-        let guide = guided.then(|| learnt(&eye, surroundings, settings)).flatten().map(Arc::new);
+        let guide = guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);
         let tiles = Tiles::new(camera);
         let measures = pairs.iter().map(|_| vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS]).collect();
         let techniques = settings.techniques.then(|| (0..tiles.count()).map(|_| TilePictures::new()).collect());

@@ -7,7 +7,7 @@
 use super::settings::Settings;
 use super::sppm::chunks;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
-use crate::light::Guide;
+use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap};
 use crate::plan::ClassSet;
@@ -54,12 +54,17 @@ impl Located for Marked {
 }
 
 /// The guide of a view, learnt; `None` where nothing can make caustics.
-pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, settings: &Settings) -> Option<Guide> {
+pub(super) fn learnt(
+    eye: &Eye<'_>,
+    surroundings: &Surroundings,
+    settings: &Settings,
+    region: Option<Region>,
+) -> Option<Guide> {
     let seed = settings.seed;
     let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
     let mut guide = Guide::new(&eye.scene.lights)?;
     for round in 0..ROUNDS {
-        let (maps, paths) = photons(eye, surroundings, light_paths, seed, round, &guide);
+        let (maps, paths) = photons(eye, surroundings, (light_paths, region), seed, round, &guide);
         let error = error(eye, seed, round, &maps, guide.cells());
         guide.learn(&error, &paths);
     }
@@ -70,13 +75,14 @@ pub(super) fn learnt(eye: &Eye<'_>, surroundings: &Surroundings, settings: &Sett
 fn photons(
     eye: &Eye<'_>,
     surroundings: &Surroundings,
-    light_paths: u32,
+    (light_paths, region): (u32, Option<Region>),
     seed: u64,
     round: u64,
     guide: &Guide,
 ) -> (ByKind<PhotonMap<Marked>>, Vec<f64>) {
     let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
         .guided(Some(guide))
+        .lighting(region)
         .wanting(ClassSet::ALL, eye.indirect);
     let trace = |paths: std::ops::Range<u32>| {
         let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());

@@ -178,9 +178,8 @@ impl<'a> Sppm<'a> {
         };
         let present = Present::of(scene);
         let guided = settings.guided && !settings.of_photons(present).is_empty();
-        let guide = guided.then(|| learnt(&eye, surroundings, settings)).flatten();
-        // Guided passes send no light there.
-        let region = if guide.is_none() { region(&eye, settings.seed) } else { None };
+        let region = region(&eye, settings.seed);
+        let guide = guided.then(|| learnt(&eye, surroundings, settings, region)).flatten();
         Sppm { eye, settings, surroundings, present, guide, region, later2: f32::INFINITY }
     }
 

@@ -82,7 +82,7 @@ impl<'a> LightPass<'a> {
         LightPass { guide, ..self }
     }
 
-    /// The same with part of the light from infinity through a region, if there is one; guided passes have none.
+    /// The same with part of the light from infinity through a region, if there is one.
     #[must_use]
     pub fn lighting(self, region: Option<Region>) -> LightPass<'a> {
         LightPass { region, ..self }
@@ -129,14 +129,15 @@ impl<'a> LightPass<'a> {
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
         let (emission, cell, ratio, unaimed) = match self.guide {
             Some(guide) => {
-                let guided = guide.emit(lights, shapes, materials, choice, point, direction)?;
-                let unaimed = guide.unguided() * guided.ratio * lights.unaimed(&guided.emission);
-                (guided.emission, guided.cell, guided.ratio, unaimed)
+                let guided = guide.emit(lights, shapes, materials, self.region, choice, point, direction)?;
+                (guided.emission, guided.cell, guided.ratio, guided.unaimed)
             }
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
-                let unaimed = lights.aim_and_light(&mut emission, self.region, choice.y, point);
-                (emission, guide::UNGUIDED, 1.0, unaimed)
+                lights.aim_or_light(&mut emission, self.region, choice.y, point);
+                let (mixed, unaimed) = lights.lit(&emission, self.region);
+                emission.flux *= emission.density.onward / mixed;
+                (emission, guide::UNGUIDED, 1.0, unaimed / mixed)
             }
         };
         let mut flux = emission.flux / self.paths as f32;
