@@ -49,5 +49,5 @@ pub(super) fn region(eye: &Eye<'_>, seed: u64) -> Option<Region> {
     let mut distances: Vec<f32> = seen.iter().map(|p| p.distance(center)).collect();
     let radius = HELD.1 * *distances.select_nth_unstable_by(held, f32::total_cmp).1;
     let whole = lights.sky().radius;
-    (radius > 0.0 && radius * radius < WIDEST * whole * whole).then_some(Region { center, radius })
+    (radius > 0.0 && radius * radius < WIDEST * whole * whole).then(|| Region::new(center, radius, whole))
 }
