@@ -23,19 +23,19 @@ WIDTH = int(os.environ.get("WIDTH", "320"))
 ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))
 SCENES = os.environ["SCENES"].split(",") if "SCENES" in os.environ else ALL
 METHODS = ["auto", "path", "bdpt", "vcm", "sppm", "cppm"]
-# Only guided light paths find the caustic of a ball of ten centimetres: a render of sppm, whose error a second one tells.
+# Only guided light paths find the caustic of a ball of ten centimetres: a render of vcm, whose error a second one tells.
 GUIDED = ["stadium"]
 # What converges soonest: elsewhere a long run of vcm, which finds all light.
 SURELY = {"blocks": "bdpt", "fog": "sppm", "godrays": "sppm", "interior": "bdpt", "torus": "vcm", "slide": "sppm"}
 
 
 def guided(scene, reference):
-    """Makes a reference by guided sppm, if there is none, and another one; returns its error in relMSE."""
+    """Makes a reference by guided vcm, if there is none, and another one; returns its error in relMSE."""
     other = reference.with_name(f"{reference.stem}-other.exr")
     for seed, path in enumerate((reference, other), 77):
         if not path.exists():
             command = [BIN, "render", ROOT / "scenes" / f"{scene}.glb", "-o", path, "--progress", "none", "--layers", "beauty"]
-            command += ["--method", "sppm", "--guide", "on", "--indirect", "paths", "--levels", "1", "--no-combine", "--width", str(WIDTH)]
+            command += ["--method", "vcm", "--guide", "on", "--levels", "1", "--no-combine", "--width", str(WIDTH)]
             subprocess.run(command + ["--time", str(REFERENCE), "--seed", str(seed)], check=True, stderr=subprocess.DEVNULL)
     return read("compare", other, reference)["relmse"] / 2
 

@@ -1,18 +1,14 @@
 //! How wide to gather and how many photons to send: what the levels of a pilot tell.
 //!
 //! With n iterations of p light paths, in bandwidths of f times the usual squared radius, the relative squared error is
-//! `a / n + b / (n f p) + c sqrt(f)`: noise that no photon changes, noise of the photons, and squared bias. Most bias is at edges, which a kernel blurs
-//! by as much whatever its radius, in an area that grows with the radius. Levels differ in f alone, so their variances tell a and b, and their differences
-//! c ([`EDGES`]).
+//! `a / n + b / (n f p) + c f^e`: noise that no photon changes, noise of the photons, and squared bias. Levels differ in f alone, so their variances tell a
+//! and b, and their differences c and e ([`super::bias`]).
 
 use super::Free;
+use super::bias::Bias;
 use crate::estimator::InitialBandwidth;
 use crate::photon::MAX_NEIGHBOURS;
 use crate::render::settings::Settings;
-
-/// Squared bias over the squared difference between a level and the next larger one, summed across a straight edge. A box kernel at u radii from it takes
-/// `f(u) = (acos u - u sqrt(1 - u^2)) / pi` from the other side: the integral of f(u)^2 over that of `(f(u / sqrt 2) - f(u))^2`, for u from 0 to where these end.
-pub(super) const EDGES: f64 = 9.367;
 
 /// Bounds of what the usual settings are multiplied by: estimates are rough, and the combiner has learnt on the usual ones.
 const NEIGHBOURS: (f64, f64) = (1.0, 4.0);
@@ -36,13 +32,13 @@ impl Balance {
     /// The usual settings.
     pub const USUAL: Balance = Balance { neighbours: 1.0, photons: 1.0 };
 
-    /// The factors of least error for a given cost. `fixed` and `photons`: the parts a and b / p of the variance; `squared_bias`: c, all for the usual
+    /// The factors of least error for a given cost. `fixed` and `photons`: the parts a and b / p of the variance; `bias`: c and e, all for the usual
     /// settings after as many iterations; costs of an iteration: of its eye paths, and of its light paths.
-    pub fn new(fixed: f64, photons: f64, squared_bias: f64, eye_cost: f64, light_cost: f64) -> Balance {
+    pub(super) fn new(fixed: f64, photons: f64, bias: Bias, eye_cost: f64, light_cost: f64) -> Balance {
         // For the cost of one iteration of the usual settings; neighbours are area times light paths.
         let error = |neighbours: f64, q: f64| {
             let n = (eye_cost + light_cost) / (eye_cost + q * light_cost);
-            fixed / n + photons / (n * neighbours) + squared_bias * (neighbours / q).sqrt()
+            fixed / n + photons / (n * neighbours) + bias.at(neighbours / q)
         };
         let steps = |(low, high): (f64, f64)| {
             (0..=STEPS).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(STEPS)))
@@ -80,31 +76,25 @@ impl Balance {
 mod tests {
     use super::*;
 
-    #[test]
-    fn edges_are_the_integrals() {
-        let share = |u: f64| if u < 1.0 { (u.acos() - u * (1.0 - u * u).sqrt()) / std::f64::consts::PI } else { 0.0 };
-        let steps = (0..200_000).map(|i| (f64::from(i) + 0.5) * 1e-5);
-        let (bias, difference) = steps.fold((0.0, 0.0), |(bias, difference), u| {
-            let (own, larger) = (share(u), share(u / 2f64.sqrt()));
-            (bias + own * own, difference + (larger - own).powi(2))
-        });
-        assert!((bias / difference / EDGES - 1.0).abs() < 1e-3, "{}", bias / difference);
-    }
-
     /// Where one part rules, the factors go where it falls; where nothing can be had, they stay.
     #[test]
     fn factors_follow_what_rules_the_error() {
+        let edges = |squared| Bias { squared, exponent: 0.5 };
         // Noise of photons, hardly any bias: as many neighbours as there may be.
-        assert_eq!(Balance::new(1e-4, 1e-2, 1e-6, 1.0, 1.0).neighbours, NEIGHBOURS.1);
+        assert_eq!(Balance::new(1e-4, 1e-2, edges(1e-6), 1.0, 1.0).neighbours, NEIGHBOURS.1);
         // Bias: few.
-        assert_eq!(Balance::new(1e-4, 1e-4, 1e-1, 1.0, 1.0).neighbours, NEIGHBOURS.0);
+        assert_eq!(Balance::new(1e-4, 1e-4, edges(1e-1), 1.0, 1.0).neighbours, NEIGHBOURS.0);
         // Light paths that change nothing.
-        assert_eq!(Balance::new(1e-2, 1e-9, 1e-9, 1.0, 1.0).photons, PHOTONS.0);
+        assert_eq!(Balance::new(1e-2, 1e-9, edges(1e-9), 1.0, 1.0).photons, PHOTONS.0);
         // They cost nothing beside the eye paths.
-        assert_eq!(Balance::new(1e-3, 1e-2, 1e-3, 1.0, 1e-3).photons, PHOTONS.1);
-        assert_eq!(Balance::new(0.0, 0.0, 0.0, 1.0, 1.0), Balance::USUAL);
+        assert_eq!(Balance::new(1e-3, 1e-2, edges(1e-3), 1.0, 1e-3).photons, PHOTONS.1);
+        assert_eq!(Balance::new(0.0, 0.0, edges(0.0), 1.0, 1.0), Balance::USUAL);
         // In between: four times as many light paths cost nothing, and b / k + c sqrt(k / 4) is least where k^1.5 = 4 b / c, at k = 2.
-        let between = Balance::new(1e-9, 1e-3, 2f64.sqrt() * 1e-3, 1.0, 1e-9);
+        let between = Balance::new(1e-9, 1e-3, edges(2f64.sqrt() * 1e-3), 1.0, 1e-9);
+        assert!(between.photons == PHOTONS.1 && (between.neighbours / 2.0 - 1.0).abs() < 0.05, "{between:?}");
+        // Smooth light: b / k + c (k / 4)^2 is least where k^3 = 8 b / c.
+        let smooth = Bias { squared: 1e-3, exponent: 2.0 };
+        let between = Balance::new(1e-9, 1e-3, smooth, 1.0, 1e-9);
         assert!(between.photons == PHOTONS.1 && (between.neighbours / 2.0 - 1.0).abs() < 0.05, "{between:?}");
     }
 }

@@ -9,6 +9,7 @@
 //! ([`Balance`]).
 
 mod balance;
+mod bias;
 mod cost;
 mod tail;
 mod trial;

@@ -1,12 +1,12 @@
 //! One candidate tried on a small picture.
 
-use super::balance::EDGES;
+use super::bias::{Bias, Differences};
 use super::cost::Cost;
 use super::tail::Tail;
 use super::{Balance, Free, Way};
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
-use crate::estimator::{Pixel, SquaredError};
+use crate::estimator::Pixel;
 use crate::light::Guide;
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
@@ -116,7 +116,7 @@ struct Sums {
     variance: [f64; MAX_LEVELS],
     /// The largest at the own level.
     tail: Tail,
-    squared_bias: f64,
+    differences: Differences,
     /// Number of pixels in these.
     pixels: f64,
     /// Light of all pixels, and its caustics.
@@ -138,7 +138,9 @@ impl Sums {
         let most = *variances.select_nth_unstable_by(last, f64::total_cmp).1;
         let mut sums = Sums { tail: Tail::of(&mut variances), ..Sums::default() };
         for (pixel, value) in pixels.iter().zip(values) {
-            let Some(error) = SquaredError::of(pixel, own, levels.count) else { continue };
+            if pixel.iterations < 2 {
+                continue;
+            }
             let (n, variance, scale) = (f64::from(pixel.iterations), relative((pixel, value)), scale(value));
             let parts = &pixel.parts;
             let all = parts.emission + parts.direct + parts.indirect + parts.caustic + parts.volume;
@@ -150,7 +152,7 @@ impl Sums {
             for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
                 *sum += mean(level.variance_of_mean(n)) * scale;
             }
-            sums.squared_bias += mean(error.squared_bias) * scale;
+            sums.differences.add(pixel, *value);
             sums.pixels += 1.0;
         }
         sums
@@ -200,21 +202,19 @@ impl Trial {
         let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };
         let (all, light) = (cost.of(way, of, plan.pixels), cost.of(way, of, 0.0));
         let alpha = of.alpha;
-        let mut squared_bias = relative(sums.squared_bias).max(0.0);
         let counted = of.method == Method::Cppm;
-        if gathers {
-            // The same neighbours in a smaller area.
-            squared_bias *= EDGES * plan.photons.sqrt();
-        }
+        // The same neighbours in a smaller area.
+        let bias = if gathers { sums.differences.bias(pixels).scaled(plan.photons) } else { Bias::default() };
         // After n times as many iterations as in the trial: noise of photons and bias.
         let ruled = |n: f64| {
             let counted = if counted { COUNTED } else { 1.0 };
-            (counted * photons / n.powf(alpha), counted * squared_bias / n.powf(0.5 * (1.0 - alpha)))
+            let bias = bias.scaled(n.powf(alpha - 1.0));
+            (counted * photons / n.powf(alpha), Bias { squared: counted * bias.squared, ..bias })
         };
         let usual = plan.budget / all / done;
         let mut balance = if gathers {
-            let (photons, squared_bias) = ruled(usual);
-            Balance::new(fixed / usual, photons, squared_bias, all - light, light)
+            let (photons, bias) = ruled(usual);
+            Balance::new(fixed / usual, photons, bias, all - light, light)
         } else {
             Balance::USUAL
         };
@@ -231,8 +231,8 @@ impl Trial {
             + match of.method {
                 Method::Path | Method::Bdpt => 0.0,
                 _ => {
-                    let (photons, squared_bias) = ruled(n);
-                    photons / balance.neighbours + squared_bias * (balance.neighbours / balance.photons).sqrt()
+                    let (photons, bias) = ruled(n);
+                    photons / balance.neighbours + bias.at(balance.neighbours / balance.photons)
                 }
             };
         let tail = sums.tail.sum(NOBODYS, WORST) * sums.tail.after(n);

@@ -16,7 +16,9 @@ use std::path::PathBuf;
 /// 1,000 iterations.
 const REFERENCE: (u32, usize) = (1 << 18, 8);
 /// Scenes that bidirectional path tracing, which has no bias, is done with soon.
-const CONNECTED: [&str; 3] = ["blocks", "cornell", "interior"];
+const CONNECTED: [&str; 2] = ["blocks", "interior"];
+/// Scenes where single bright samples of it take too long to average out, and vertex connection and merging, whose bias is far below that of any rule, does.
+const MERGED: [&str; 1] = ["cornell"];
 
 /// The methods of the paper's comparison.
 pub const METHODS: [Method; 3] = [Method::Sppm, Method::Appm, Method::Cppm];
@@ -59,7 +61,11 @@ impl Ground {
 
     /// Two independent halves that take so many core-seconds together: by bidirectional path tracing, if it converges here, else by SPPM with more light paths and narrower bandwidths. Kept in out/rules.
     pub fn reference(&self, seconds: f64) -> Reference {
-        let method = if CONNECTED.contains(&self.name.as_str()) { Method::Bdpt } else { Method::Sppm };
+        let method = match self.name.as_str() {
+            name if CONNECTED.contains(&name) => Method::Bdpt,
+            name if MERGED.contains(&name) => Method::Vcm,
+            _ => Method::Sppm,
+        };
         let (width, height) = self.size();
         let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("out/rules");
         std::fs::create_dir_all(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
@@ -77,8 +83,13 @@ impl Ground {
             return Reference { halves, iterations };
         }
         let (photons, neighbours) = REFERENCE;
-        let settings =
-            |seed| Settings { initial: InitialBandwidth::Nearest(neighbours), ..settings(method, photons, seed) };
+        let initial = match method {
+            Method::Vcm => InitialBandwidth::Footprint,
+            _ => InitialBandwidth::Nearest(neighbours),
+        };
+        // The usual alpha of a method that merges.
+        let alpha = method.alpha();
+        let settings = |seed| Settings { initial, alpha, ..settings(method, photons, seed) };
         let stages = [1_000_001, 1_000_002].map(|seed| self.stage(&settings(seed)));
         let [mut a, mut b] = [0, 1].map(|half| Session::new(&stages[half]));
         while a.spent().cpu_seconds + b.spent().cpu_seconds < seconds {
