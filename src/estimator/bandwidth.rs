@@ -1,7 +1,7 @@
-//! Initial bandwidths: one per pixel, for both eye paths, from a pilot pass whose photons are not accumulated.
+//! Initial bandwidths: one per pixel and kind of photons, for both eye paths, from a pilot pass whose photons are not accumulated.
 //!
 //! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest bandwidth is
-//! the distance to the k-th nearest photon of its own surface around its pilot path's gathering point, at most [`SCREEN_CAP`] of the
+//! the distance to the k-th nearest photon of the kind on its own surface around its pilot path's gathering point, at most [`SCREEN_CAP`] of the
 //! picture's width there (by default). With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
 //! gets the median of the others (or, with no others, the cap at the scene's size).
 

@@ -83,12 +83,12 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
     if count == 0 { DVec3::ZERO } else { sum / f64::from(count) }
 }
 
-/// The layers that the pixels of a render give, cryptomattes excepted.
 /// The kinds of photons that have bandwidths, and their layers: of one kind alone they are `Radius`.
 pub fn radius_layers(kinds: ByKind<bool>) -> impl Iterator<Item = (Kind, &'static str)> {
     Kind::ALL.into_iter().filter(move |kind| kinds[*kind as usize]).zip(["Radius", "CausticRadius"])
 }
 
+/// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
     let Shape { levels, compared, own, kinds, radius2_factor, environment, classes, volume, volume_radius_factor } =
         *shape;

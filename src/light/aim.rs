@@ -41,7 +41,7 @@ impl Region {
     /// In a scene that light from infinity enters through a disc of radius `whole`.
     pub fn new(center: Vec3, radius: f32, whole: f32) -> Region {
         let doublings = (whole / radius).log2();
-        // The last one is below half of the whole, which has its own paths.
+        // The last one is at most half of the whole, which has its own paths.
         let wider = if doublings.is_finite() { (doublings - 1.0).clamp(0.0, 64.0) as u32 } else { 0 };
         Region { center, radius, wider }
     }

@@ -3,7 +3,8 @@
 //! A start is drawn from a mixture: with probability [`Guide::unguided`] as [`Lights::sample_emission`] draws it, else from a cell, a pair of a lamp
 //! and a target. The lamp gives the origin; the direction is uniform in the cone that the target's bounding sphere fills from there (for light from
 //! infinity, the line is uniform over the sphere's disc). Whatever component made it, a start carries its native flux times the ratio of its native
-//! density to its density in the mixture \[Veach 1997, (9.15), the balance heuristic\], at most 1 / unguided: the mean is that of unguided emission.
+//! density to its density in the mixture \[Veach 1997, (9.15), the balance heuristic\], at most 1 / unguided (half as much again where part of
+//! the unguided ones go to a region of interest): the mean is that of unguided emission.
 //!
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
@@ -152,9 +153,7 @@ impl Guide {
         shapes: &Shapes,
         materials: &Materials,
         region: Option<Region>,
-        choice: Vec2,
-        point: Vec2,
-        direction: Vec2,
+        (choice, point, direction): (Vec2, Vec2, Vec2),
     ) -> Option<Guided> {
         let (cell, _, rest) = self.choice.sample(choice.y);
         let (emission, made) = if cell == UNGUIDED {

@@ -20,5 +20,17 @@ impl Kind {
 /// Something of each kind, at `kind as usize`.
 pub type ByKind<T> = [T; 2];
 
+/// Adds more of each kind.
+pub fn append<T>(all: &mut ByKind<Vec<T>>, more: ByKind<Vec<T>>) {
+    for (all, more) in all.iter_mut().zip(more) {
+        all.extend(more);
+    }
+}
+
+/// Number of both.
+pub fn count<T>(all: &ByKind<Vec<T>>) -> usize {
+    all.iter().map(Vec::len).sum()
+}
+
 /// The photons on surfaces of a pass.
 pub type PhotonMaps = ByKind<PhotonMap>;

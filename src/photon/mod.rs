@@ -1,7 +1,7 @@
 //! The photon map: photons in Morton order under an implicit 8-wide tree of boxes, and the kernels that weigh them.
 
 pub mod kernel;
-mod kind;
+pub mod kind;
 mod map;
 mod near;
 mod nearest;

@@ -1,5 +1,5 @@
 //! The methods whose bandwidths follow from the photons found: the passes of stochastic progressive photon mapping with a state of its own for every
-//! pixel and level, and a [`CountingRule`] that says what becomes of it.
+//! pixel, kind of photons and level, and a [`CountingRule`] that says what becomes of it.
 //!
 //! In media the rules are not defined, and bandwidths follow the memoryless rule of volumes.
 //!
@@ -15,7 +15,7 @@ use super::volume::Maps;
 use crate::camera::{band, par_pixels};
 use crate::estimator::rule::CountingRule;
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::math::{Frame, Rgb, Vec3};
+use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
 use crate::random::{Domain, Streams};
 use crate::transport::{Bandwidths, EqualFlux, EyeMeasure, Found, LevelRadii, MAX_LEVELS, PathStart, Scratch};
@@ -44,18 +44,6 @@ impl<'a, R: CountingRule> States<'a, R> {
     fn ascending(&self) -> impl Iterator<Item = usize> {
         self.order.into_iter().take(self.bandwidths.len())
     }
-
-    /// Puts the levels of photons on surfaces, which are in the order of bandwidths, where they belong.
-    #[inline]
-    fn by_level(&self, light: &mut [Rgb; MAX_LEVELS]) {
-        if self.order.is_sorted() {
-            return;
-        }
-        let found = *light;
-        for (at, level) in self.ascending().enumerate() {
-            light[level] = found[at];
-        }
-    }
 }
 
 /// Both kinds; of one that is not there, no levels.
@@ -73,13 +61,10 @@ impl<'a, R: CountingRule> Counter<'a, R> {
         Counter { rule, states, kind: Kind::Indirect, frame: Frame::from_normal(Vec3::Z) }
     }
 
-    /// After the eye path of iteration `i` that has measured `measure`.
+    /// After the eye path of iteration `i`.
     #[inline]
-    fn finish(self, i: u64, measure: &mut EyeMeasure) {
-        let [indirect, caustic] = self.states;
-        indirect.by_level(&mut measure.indirect_photons);
-        caustic.by_level(&mut measure.caustic_photons);
-        for States { bandwidths, tallies, .. } in [indirect, caustic] {
+    fn finish(self, i: u64) {
+        for States { bandwidths, tallies, .. } in self.states {
             if !bandwidths.is_empty() {
                 self.rule.update(i, bandwidths, tallies);
             }
@@ -95,7 +80,7 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
         // One function of the normal in all iterations: counts of different gathering points are added.
         (self.kind, self.frame) = (kind, Frame::from_normal(ng));
         let states = &self.states[kind as usize];
-        LevelRadii::new(states.ascending().map(|level| R::radius2(&states.bandwidths[level])))
+        LevelRadii::new(states.ascending().map(|level| R::radius2(&states.bandwidths[level]))).of(states.order)
     }
 
     #[inline]
@@ -132,7 +117,11 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     pub fn new(sppm: Sppm<'a>, settings: &'a Settings, rule: R, kernel: K) -> Self {
         let apart = settings.method == Method::Cppm && settings.chi_squared.plus;
         let channels = apart.then(|| sppm.equal_flux());
-        let kinds = sppm.kinds();
+        // Where photons bring nothing, pixels still have a state.
+        let kinds = match sppm.kinds() {
+            [false, false] => [true, false],
+            kinds => kinds,
+        };
         Counting { sppm, settings, rule, kernel, channels, kinds, bandwidths: Vec::new(), tallies: Vec::new() }
     }
 
@@ -178,47 +167,49 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
-                let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
-                    let mut channel = |channel: usize| {
-                        let volume = maps[channel].volume(pixel, levels.clone());
-                        let own = channel * each_map..(channel + 1) * each_map;
-                        let mut of_kinds = bandwidths[own.clone()]
-                            .chunks_exact_mut(count)
-                            .zip(tallies[own.start * each..own.end * each].chunks_exact_mut(count * each));
-                        let mut counter = Counter::new(
-                            rule,
-                            kinds.map(|there| {
-                                let some = if there { of_kinds.next() } else { None };
-                                let (bandwidths, tallies) = some.unwrap_or_default();
-                                let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
-                                let counted = levels.start * each..levels.end * each;
-                                States::new(&mut bandwidths[levels], &mut tallies[counted])
-                            }),
-                        );
-                        let scratch = &mut scratches[channel];
-                        let photons = &maps[channel].surface;
-                        let mut measure = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
-                        counter.finish(i, &mut measure);
-                        measure
+                let mut measure =
+                    |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>, into: &mut EyeMeasure| {
+                        let mut channel = |channel: usize, into: &mut EyeMeasure| {
+                            let volume = maps[channel].volume(pixel, levels.clone());
+                            let own = channel * each_map..(channel + 1) * each_map;
+                            let mut of_kinds = bandwidths[own.clone()]
+                                .chunks_exact_mut(count)
+                                .zip(tallies[own.start * each..own.end * each].chunks_exact_mut(count * each));
+                            let mut counter = Counter::new(
+                                rule,
+                                kinds.map(|there| {
+                                    let some = if there { of_kinds.next() } else { None };
+                                    let (bandwidths, tallies) = some.unwrap_or_default();
+                                    let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
+                                    let counted = levels.start * each..levels.end * each;
+                                    States::new(&mut bandwidths[levels], &mut tallies[counted])
+                                }),
+                            );
+                            let scratch = &mut scratches[channel];
+                            let photons = &maps[channel].surface;
+                            *into = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
+                            counter.finish(i);
+                        };
+                        channel(0, into);
+                        // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
+                        for other in 1..maps.len() {
+                            let mut more = EyeMeasure::default();
+                            channel(other, &mut more);
+                            add_photons(into, &more);
+                        }
                     };
-                    let mut all = channel(0);
-                    // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
-                    for other in 1..maps.len() {
-                        add_photons(&mut all, &channel(other));
-                    }
-                    all
-                };
+                let (mut first, mut others) = (EyeMeasure::default(), EyeMeasure::default());
                 match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                     Some(correlated) => {
-                        let first = measure(pixel, start, 0..1);
-                        let others = measure(pixel, correlated, 1..count);
+                        measure(pixel, start, 0..1, &mut first);
+                        measure(pixel, correlated, 1..count, &mut others);
                         keep_first_hit(&eye, pixel, &first);
                         pixel.add(&first, Some(&others), count, levels.own());
                     }
                     None => {
-                        let all = measure(pixel, start, 0..count);
-                        keep_first_hit(&eye, pixel, &all);
-                        pixel.add(&all, None, count, levels.own());
+                        measure(pixel, start, 0..count, &mut first);
+                        keep_first_hit(&eye, pixel, &first);
+                        pixel.add(&first, None, count, levels.own());
                     }
                 }
             }

@@ -9,7 +9,7 @@ use super::sppm::chunks;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
-use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap};
+use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
 use crate::transport::{Eye, LightPass, Photons, Probe, Surroundings, light_path};
@@ -27,7 +27,7 @@ const EYE_PATHS: u32 = 1 << 13;
 const PIXELS_PER_EYE_PATH: u64 = 4;
 /// Eye paths per unit of work.
 const CHUNK: u32 = 256;
-/// Photons that a pixel gathers.
+/// Photons of either kind that a pixel gathers.
 const NEIGHBOURS: usize = 16;
 /// Added to a pixel's squared value: the relative error of [`super::Rendered::relative_error`].
 const DARK: f32 = 0.01;
@@ -106,7 +106,7 @@ fn photons(
     }
     let mut all = ByKind::<Vec<Marked>>::default();
     for (marked, _) in parts {
-        all.iter_mut().zip(marked).for_each(|(all, some)| all.extend(some));
+        kind::append(&mut all, marked);
     }
     (all.map(PhotonMap::build), paths)
 }

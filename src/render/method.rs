@@ -17,7 +17,7 @@ pub enum Method {
     Light,
     /// Bidirectional path tracing.
     Bdpt,
-    /// Classical photon mapping: one map, nearest neighbours.
+    /// Classical photon mapping: photons traced once, nearest neighbours.
     Pm,
     /// Progressive photon mapping: measurement points stay where they are, bandwidths follow local statistics.
     Ppm,

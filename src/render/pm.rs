@@ -1,7 +1,7 @@
-//! Classical photon mapping \[Jensen 1996\]: one photon map, traced once, and the nearest photons around every point that an eye path sees.
+//! Classical photon mapping \[Jensen 1996\]: photons traced once, and the nearest of caustics and of all others around every point that an eye path sees.
 //!
 //! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by next-event estimation, caustics and
-//! all other indirect light from the map. Eye paths accumulate over iterations, the map stays. So the picture tends to the map's
+//! all other indirect light from the maps. Eye paths accumulate over iterations, the maps stay. So the picture tends to their
 //! own blurred and blotched one, never to the truth: only more photons help, and memory bounds their number. The
 //! estimated error, which is told from differences between iterations, does not know of it.
 //!
@@ -20,7 +20,7 @@ use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::Vec3;
-use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel};
+use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Bandwidths, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
@@ -35,15 +35,14 @@ pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 /// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by it.
 fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (ByKind<Vec<Photon>>, u32) {
     let (mut photons, mut traced): (ByKind<Vec<Photon>>, _) = (ByKind::default(), 0);
-    let number = |photons: &ByKind<Vec<Photon>>| photons.iter().map(Vec::len).sum::<usize>();
     while traced < pass.paths() {
         let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
         let end = paths.end;
         let batch = trace_some(scene, surroundings, pass, paths).surface;
-        if number(&photons) + number(&batch) > most {
+        if kind::count(&photons) + kind::count(&batch) > most {
             break;
         }
-        photons.iter_mut().zip(batch).for_each(|(all, some)| all.extend(some));
+        kind::append(&mut photons, batch);
         traced = end;
     }
     // The memory ends within a batch: path by path.
@@ -52,10 +51,10 @@ fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usi
     while traced < pass.paths() {
         light_path(scene, &arena, surroundings, pass, traced, &mut path);
         arena.reset();
-        if number(&photons) + number(&path.surface) > most {
+        if kind::count(&photons) + kind::count(&path.surface) > most {
             break;
         }
-        photons.iter_mut().zip(&mut path.surface).for_each(|(all, some)| all.append(some));
+        kind::append(&mut photons, std::mem::take(&mut path.surface));
         path.volume.clear();
         traced += 1;
     }

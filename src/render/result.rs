@@ -52,7 +52,7 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Whether the one map of [`Method::Pm`] had no room for the photons of all its light paths.
+    /// Whether the maps of [`Method::Pm`], traced once, had no room for the photons of all its light paths.
     pub fn map_is_full(&self) -> bool {
         self.settings.method == Method::Pm && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)
     }

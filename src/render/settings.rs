@@ -18,9 +18,9 @@ use crate::transport::{Indirect, MAX_LEVELS};
 pub const DEFAULT_ITERATIONS: u64 = 64;
 /// Light paths per iteration: the papers' setting.
 pub const DEFAULT_PHOTONS: u32 = 100_000;
-/// Light paths of the one map of [`Method::Pm`].
+/// Light paths of [`Method::Pm`], traced once.
 pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
-/// Bytes that this map may take.
+/// Bytes that their photons may take.
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 /// Neighbours whose distance is its bandwidth.
 pub const DEFAULT_MAP_KNN: usize = 100;

@@ -16,7 +16,7 @@ use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths}
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::{Guide, Region};
-use crate::photon::{ByKind, Kernel, Kind, Nearest, PhotonMap, kernel};
+use crate::photon::{ByKind, Kernel, Kind, Nearest, PhotonMap, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
@@ -59,15 +59,9 @@ fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons)
             photons
         })
         .collect();
-    let mut photons = Photons {
-        surface: Kind::ALL
-            .map(|kind| Vec::with_capacity(parts.iter().map(|part| part.surface[kind as usize].len()).sum())),
-        volume: Vec::with_capacity(parts.iter().map(|part| part.volume.len()).sum()),
-    };
+    let mut photons = Photons::default();
     for part in parts {
-        for (all, some) in photons.surface.iter_mut().zip(part.surface) {
-            all.extend(some);
-        }
+        kind::append(&mut photons.surface, part.surface);
         photons.volume.extend(part.volume);
     }
     photons

@@ -46,13 +46,20 @@ pub struct LevelRadii {
     count: usize,
     /// Largest radius squared beyond the eye path's first broad bounce.
     later2: f32,
+    /// The level of each radius.
+    order: [usize; MAX_LEVELS],
 }
 
 impl LevelRadii {
     /// From radii squared in ascending order; at most [`MAX_LEVELS`].
     #[inline]
     pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
-        let mut radii = LevelRadii { radius2: [0.0; MAX_LEVELS], count: 0, later2: f32::INFINITY };
+        let mut radii = LevelRadii {
+            radius2: [0.0; MAX_LEVELS],
+            count: 0,
+            later2: f32::INFINITY,
+            order: std::array::from_fn(|level| level),
+        };
         for r in radius2.take(MAX_LEVELS) {
             radii.radius2[radii.count] = r;
             radii.count += 1;
@@ -66,6 +73,13 @@ impl LevelRadii {
     #[must_use]
     pub fn later(self, later2: f32) -> LevelRadii {
         LevelRadii { later2, ..self }
+    }
+
+    /// The same, of these levels (each below [`MAX_LEVELS`]) in this order instead of from 0 up.
+    #[inline]
+    #[must_use]
+    pub fn of(self, order: [usize; MAX_LEVELS]) -> LevelRadii {
+        LevelRadii { order, ..self }
     }
 
     /// Number of levels.
@@ -344,7 +358,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             let factor = (radii.later2 / largest2).min(1.0);
             radii.radius2.iter_mut().for_each(|radius2| *radius2 *= factor);
         }
-        let radii = &radii.radius2[..radii.count];
+        let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
         let reach2 = self.bandwidths.reach2(largest);
@@ -361,8 +375,8 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         }
         let sums = batch.finish(&mut self.bandwidths);
         let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
-        for ((into, sum), radius2) in into.iter_mut().zip(sums).zip(radii) {
-            *into += vertex.throughput * (FRAC_1_PI / radius2) * sum;
+        for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
+            into[level] += vertex.throughput * (FRAC_1_PI / radius2) * sum;
         }
     }
 }

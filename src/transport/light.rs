@@ -47,7 +47,7 @@ pub struct Emitted {
     pub density: EmissionDensity,
     /// Component of the guide that made it; [`guide::UNGUIDED`] where there is none.
     pub cell: usize,
-    /// Density of unguided emission over that of the guide.
+    /// Density of unguided emission, without a region of interest, over that of the guide; 1 where there is no guide.
     pub ratio: f32,
     /// Share of the start's density that paths of all light have, without those sent where caustics are made.
     pub unaimed: f32,
@@ -129,14 +129,18 @@ impl<'a> LightPass<'a> {
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
         let (emission, cell, ratio, unaimed) = match self.guide {
             Some(guide) => {
-                let guided = guide.emit(lights, shapes, materials, self.region, choice, point, direction)?;
+                let guided = guide.emit(lights, shapes, materials, self.region, (choice, point, direction))?;
                 (guided.emission, guided.cell, guided.ratio, guided.unaimed)
             }
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
                 lights.aim_or_light(&mut emission, self.region, choice.y, point);
                 let (mixed, unaimed) = lights.lit(&emission, self.region);
-                emission.flux *= emission.density.onward / mixed;
+                let ratio = emission.density.onward / mixed;
+                if ratio.is_nan() || ratio <= 0.0 {
+                    return None;
+                }
+                emission.flux *= ratio;
                 (emission, guide::UNGUIDED, 1.0, unaimed / mixed)
             }
         };

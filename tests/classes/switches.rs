@@ -110,6 +110,12 @@ fn every_method_leaves_out_what_is_switched_off() {
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
         let layers = rendered.layers(Present::of(&scene), |_| true).expect("there are layers");
         assert!(layers.get("Caustic").is_none() && layers.get("Emission").is_none() && layers.get("Direct").is_some());
+        // Nothing is left for photons.
+        let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);
+        let rendered = picture(&scene, 16, &settings(method, Indirect::Photons, lit));
+        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts).element_sum()).sum::<f64>();
+        assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) == 0.0, "{method:?}");
+        assert!(rendered.pixels.iter().all(|p| p.iterations > 0), "{method:?}");
     }
 }
 

@@ -13,7 +13,7 @@ fn a_render_leaves_all_layers_and_its_account() {
         "method: auto: sppm, for the render is too short to try others\n",
         "\niteration 6 of 6, ",
         "\npeak memory ",
-        "\nout.exr: 64 x 48, 93 channels\n",
+        "\nout.exr: 64 x 48, 98 channels\n",
     ] {
         assert!(outcome.stderr.contains(part), "{part:?} in {}", outcome.stderr);
     }
@@ -52,8 +52,10 @@ fn a_render_leaves_all_layers_and_its_account() {
     assert!(caustic > 0.0 && values(&set, "") != noisy);
     // Each level's radius is 1/sqrt(2) of the next larger.
     for k in 1..5 {
-        let (small, large) = (values(&set, &format!("Radius{k}")), values(&set, &format!("Radius{}", k + 1)));
-        assert!(small.iter().zip(&large).all(|(s, l)| (s[0] / l[0] * 2f32.sqrt() - 1.0).abs() < 1e-5));
+        for stem in ["Radius", "CausticRadius"] {
+            let [small, large] = [k, k + 1].map(|k| values(&set, &format!("{stem}{k}")));
+            assert!(small.iter().zip(&large).all(|(s, l)| (s[0] / l[0] * 2f32.sqrt() - 1.0).abs() < 1e-5));
+        }
     }
 
     assert_eq!(header["version"], env!("CARGO_PKG_VERSION"));

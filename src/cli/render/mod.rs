@@ -35,7 +35,7 @@ const COMBINED_LAYERS: [&str; 5] = ["Level", "Variance", "albedo", "normal", "de
 /// Renders: everything that can be wrong is found before the first light path.
 pub fn run(args: &RenderArgs) -> Result<()> {
     let settings = args.settings()?;
-    // Whether media scatter is not known yet.
+    // What is in the scene is not known yet.
     let anything = Present { environment: true, volume: true, narrow_lobes: true };
     let selection = selection(args, &settings, anything)?;
     output::check(&args.output, "exr")?;

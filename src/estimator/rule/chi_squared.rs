@@ -258,6 +258,22 @@ mod tests {
         let (total, p) = (22.0, 1.0 / 6.0);
         let direct: f64 = counts.iter().map(|&o| (f64::from(o) - total * p).powi(2) / (total * p)).sum();
         assert!((ChiSquared::statistic(&counts) - direct).abs() < 1e-12);
+        // The rule asks without a division.
+        let rule = rule();
+        let critical = rule.critical[1];
+        for trial in 0..2000 {
+            let mut counts = [0; 12];
+            for i in 0..10 + trial % 50 {
+                let (x, y) = uniform(trial, i);
+                count(&rule, &mut counts, (x.abs(), y));
+            }
+            let statistic = ChiSquared::statistic(&counts);
+            assert_eq!(
+                rule.looks_uniform(2, ChiSquared::sums(&counts)),
+                statistic <= critical,
+                "{statistic} {critical}"
+            );
+        }
     }
 
     /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials and the error of the chi-squared

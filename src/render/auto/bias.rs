@@ -4,7 +4,7 @@
 //! with the exponent 2 \[Knaus and Zwicker 2011, 3\]; an edge is blurred by as much whatever the kernel's size, within an area that grows with its radius: 1/2.
 //! Which of them rules is what the differences of three pairs of levels tell, each pair of twice the area of the one before.
 
-use super::trial::DARK;
+use super::trial::{DARK, mean};
 use crate::estimator::Pixel;
 
 /// Exponents of edges and of smooth light, between which it is searched, and in how many steps.
@@ -31,8 +31,8 @@ impl Differences {
     pub fn add(&mut self, pixel: &Pixel, value: f64) {
         let (n, scale) = (f64::from(pixel.iterations), 1.0 / (value * value + DARK));
         for (at, difference) in pixel.differences[PAIRS].iter().enumerate() {
-            let noise = difference.variance_of_mean(n).element_sum() / 3.0 * scale;
-            self.squared[at] += (difference.mean * difference.mean).element_sum() / 3.0 * scale - noise;
+            let noise = mean(difference.variance_of_mean(n)) * scale;
+            self.squared[at] += mean(difference.mean * difference.mean) * scale - noise;
             self.noise[at] += noise;
         }
     }
@@ -104,7 +104,10 @@ mod tests {
         };
         let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
         let (smooth, edges, between) = (of(2.0), of(0.5), of(1.25));
-        assert!(close(smooth.exponent, 2.0) && close(smooth.squared, 1.5) && close(smooth.at(0.5), 0.375), "{smooth:?}");
+        assert!(
+            close(smooth.exponent, 2.0) && close(smooth.squared, 1.5) && close(smooth.at(0.5), 0.375),
+            "{smooth:?}"
+        );
         assert!(close(edges.exponent, 0.5) && close(edges.squared, 1.5 * EDGES), "{edges:?}");
         assert!(close(between.exponent, 1.25) && close(between.squared, 1.5 * EDGES.sqrt()), "{between:?}");
         // Beyond either law.

@@ -27,8 +27,9 @@ const MERGE: f64 = 1.0e-6;
 
 /// What counting photons adds to gathering them.
 const COUNTING: f64 = 0.15e-6;
-/// Times as much where media scatter: vertices on the way, which are not counted, and paths that are longer.
-const MEDIA: f64 = 2.2;
+/// Times as much where media scatter: vertices on the way, which are not counted, and paths that are longer. The second where both paths are kept: every
+/// connection goes through the medium.
+const MEDIA: (f64, f64) = (2.4, 2.8);
 
 /// Eye paths of a pixel in an iteration.
 fn eye_paths(settings: &Settings) -> f64 {
@@ -66,11 +67,12 @@ impl Cost {
                 paths * (both + eye * (EYE_VERTEX + light * CONNECTION + merges))
             }
         };
-        seconds * self.media()
+        let both = matches!(way.method, Method::Bdpt | Method::Vcm);
+        seconds * if both && self.scattering { MEDIA.1 } else { self.media() }
     }
 
     fn media(&self) -> f64 {
-        if self.scattering { MEDIA } else { 1.0 }
+        if self.scattering { MEDIA.0 } else { 1.0 }
     }
 
     /// Core-seconds of an iteration that go to photons, where they are gathered.

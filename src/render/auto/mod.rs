@@ -3,7 +3,8 @@
 //!
 //! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants (`cost`). So the same arguments give the
 //! same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances: noise falls as
-//! 1/n where paths are whole, and as n^-alpha, the squared bias as n^-(1 - alpha), where photons are gathered \[Knaus and Zwicker 2011\].
+//! 1/n where paths are whole, and as n^-alpha where photons are gathered; the squared bias there as the area n^-(1 - alpha) to an exponent that levels
+//! tell (`bias`) \[Knaus and Zwicker 2011\].
 //!
 //! Where photons are gathered the pilot also balances: noise that bandwidths can smooth against the bias they bring, and light paths against eye paths
 //! ([`Balance`]).
@@ -116,7 +117,7 @@ fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
     let mut ways = vec![plain(gathering)];
     if focusing {
-        // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and of those none is sent where the picture is.
+        // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and guided paths take longer.
         if !scattering {
             ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
         }
