@@ -33,7 +33,7 @@ def caustics(scene):
     def error(of, to):
         return read("compare", of, to, "--layer", "Caustic")["relmse"]
 
-    reference, other = (render("caustics", RUNS["sppm guided"], auto.REFERENCE, seed) for seed in (77, 78))
+    reference, other = (render("caustics", RUNS["vcm guided"], auto.REFERENCE, seed) for seed in (77, 78))
     own = error(other, reference) / 2
     found = {name: [] for name in RUNS}
     for seed in (1, 2, 3):

@@ -22,7 +22,7 @@ SEEDS = int(os.environ.get("SEEDS", "1"))
 WIDTH = int(os.environ.get("WIDTH", "64"))
 PHOTONS = int(os.environ.get("PHOTONS", "65536"))
 # Core-seconds of the references.
-REFERENCES = {"torus": 300, "pool": 300, "cornell": 300, "gems": 300, "blocks": 200, "interior": 300}
+REFERENCES = {"torus": 200, "pool": 200, "cornell": 300, "gems": 200, "blocks": 200, "interior": 300}
 SCENES = os.environ.get("SCENES", ",".join(REFERENCES)).split(",")
 ERRORS = ["all", "photons", "display"]
 

@@ -348,7 +348,8 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         }
     }
 
-    #[inline]
+    // Once for both kinds and all who gather: by far the most code of all that compilers see here.
+    #[inline(never)]
     fn gather_kind(&mut self, kind: Kind, caustic: bool, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
         let (p, ng) = (vertex.surface.p, vertex.surface.ng);
         let photons = &self.photons[kind as usize];
