@@ -3,10 +3,10 @@
 
 One level, bandwidths from ten neighbours, 2^16 light paths, the same seeds for all and so the same photon maps, pictures of 64 pixels across. Three
 errors are measured: mean squared error of all light; of photons' light alone, which is what the rules differ in; and of what a screen shows (sRGB, 0 to 255), which no single
-bright sample rules. References are two halves, by bidirectional path tracing where it converges and else by SPPM with four times the light paths in less than a quarter of the
+bright sample rules. References are two halves, by bidirectional path tracing or VCM where they converge and else by SPPM with four times the light paths in less than a quarter of the
 area, kept in out/rules; what is measured leaves their noise out.
 
-Environment: SCENES (default: all six), ITERATIONS (1000), SEEDS (1), WIDTH (64), PHOTONS (65536) and REFERENCE core-seconds (by scene, 200 to 600). Scenes that are done are kept in
+Environment: SCENES (default: all six), ITERATIONS (1000), SEEDS (1), WIDTH (64), PHOTONS (65536) and REFERENCE core-seconds (by scene, 200 to 300). Scenes that are done are kept in
 out/time_to_target: two hours of one core.
 """
 

@@ -94,7 +94,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
         return vec![[r; MAPS]; pixels];
     }
     let least = LEAST * scene.lights.sky().radius;
-    let of_point = |(pilot, nearest): (&PhotonMap<P>, &mut Nearest<P>), point: &GatherPoint| {
+    let of_point = |pilot: &PhotonMap<P>, nearest: &mut Nearest<P>, point: &GatherPoint| {
         let span = span(camera, point.length);
         let cap = widest * span;
         let r = match rule {
@@ -114,10 +114,8 @@ fn bandwidths<P: Located, const MAPS: usize>(
         |(arena, nearest), found, places| {
             let starts = eye.starts(places, streams);
             for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                found[place.at] = find(arena, start).map(|point| {
-                    let mut maps = pilots.into_iter().zip(&mut *nearest);
-                    std::array::from_fn(|_| maps.next().map_or(least, |map| of_point(map, &point)))
-                });
+                let of = |point| std::array::from_fn(|map| of_point(pilots[map], &mut nearest[map], &point));
+                found[place.at] = find(arena, start).map(of);
                 arena.reset();
             }
         },

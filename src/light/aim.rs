@@ -4,7 +4,7 @@
 //! hit anything. Paths are drawn from a mixture of the whole disc and of the discs of the targets' bounding spheres; each carries the
 //! flux that its density in the mixture asks for, so the estimate is the same and no path is lost.
 
-use super::{Cdf, EmissionSample, Sky};
+use super::{Cdf, EmissionSample, Region, Sky};
 use crate::geometry::Shapes;
 use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
@@ -19,67 +19,6 @@ const MAX_SPHERES: usize = 512;
 
 /// Shares of the paths that go through a region of interest and its surroundings, without targets and with them.
 const LIT: (f32, f32) = (0.5, 1.0 / 3.0);
-/// Share of those that go through the region itself.
-const INNER: f32 = 0.5;
-
-/// A sphere that holds most of what a picture shows, and what lights it: in a wide scene, few of the paths that light all of it would come there.
-///
-/// What is around it lights it, too, the less the farther away, but there is more of that: light from ground at distances d to 2 d counts for about as much as
-/// from d / 2 to d. So the rest of the paths goes through discs each twice as wide as the one before, in equal shares. Without them, photons
-/// that come from just outside are few, and glare.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region {
-    /// Its centre.
-    pub center: Vec3,
-    /// Its radius (m).
-    pub radius: f32,
-    /// Wider discs.
-    wider: u32,
-}
-
-impl Region {
-    /// In a scene that light from infinity enters through a disc of radius `whole`.
-    pub fn new(center: Vec3, radius: f32, whole: f32) -> Region {
-        let doublings = (whole / radius).log2();
-        // The last one is at most half of the whole, which has its own paths.
-        let wider = if doublings.is_finite() { (doublings - 1.0).clamp(0.0, 64.0) as u32 } else { 0 };
-        Region { center, radius, wider }
-    }
-
-    /// Share of the region's own disc.
-    fn inner(&self) -> f32 {
-        if self.wider == 0 { 1.0 } else { INNER }
-    }
-
-    /// Radius of a disc drawn by a uniform number.
-    #[inline]
-    fn sample(&self, u: f32) -> f32 {
-        let inner = self.inner();
-        if u < inner {
-            return self.radius;
-        }
-        let wider = self.wider as f32;
-        let disc = ((u - inner) / (1.0 - inner) * wider).floor().min(wider - 1.0);
-        self.radius * (disc + 1.0).exp2()
-    }
-
-    /// Density per area, in the mixture of discs, at a squared distance from the centre.
-    #[inline]
-    fn density(&self, distance2: f32) -> f32 {
-        let mut radius2 = self.radius * self.radius;
-        let mut share = self.inner();
-        let mut density = 0.0;
-        for _ in 0..=self.wider {
-            if distance2 < radius2 {
-                density += share / (PI * radius2);
-            }
-            share = (1.0 - INNER) / self.wider as f32;
-            radius2 *= 4.0;
-        }
-        density
-    }
-}
-
 /// Squared distance of a line from a point.
 #[inline]
 fn from_line(center: Vec3, p: Vec3, d: Vec3) -> f32 {

@@ -176,12 +176,8 @@ impl Guide {
                 mixed += weight * Self::density(lights, &emission, target, made == Some(target));
             }
         }
-        let ratio = emission.density.onward / mixed;
-        if ratio.is_nan() || ratio <= 0.0 {
-            return None;
-        }
-        let unaimed = self.unguided() * unaimed / mixed;
-        Some(Guided { emission: EmissionSample { flux: emission.flux * ratio, ..emission }, cell, ratio, unaimed })
+        let (emission, ratio) = emission.drawn_with(mixed)?;
+        Some(Guided { emission, cell, ratio, unaimed: self.unguided() * unaimed / mixed })
     }
 
     /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give it there.

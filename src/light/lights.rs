@@ -1,6 +1,7 @@
 //! All lights of a scene: choosing one, sampling it from a point, sampling emission, and the densities for MIS.
 
-use super::aim::{Region, Targets};
+use super::Region;
+use super::aim::Targets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emitter::{Emitter, Sky, spot_falloff};
@@ -70,6 +71,15 @@ pub struct EmissionSample {
     pub infinite: bool,
     /// Densities of the start.
     pub density: EmissionDensity,
+}
+
+impl EmissionSample {
+    /// The same start, drawn with the density `mixed` onward instead of its own, and its flux over that before; `None` where nothing is left of it.
+    #[inline]
+    pub fn drawn_with(self, mixed: f32) -> Option<(EmissionSample, f32)> {
+        let ratio = self.density.onward / mixed;
+        (ratio > 0.0).then(|| (EmissionSample { flux: self.flux * ratio, ..self }, ratio))
+    }
 }
 
 /// The lights of a scene.

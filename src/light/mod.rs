@@ -8,9 +8,10 @@ mod environment;
 pub mod guide;
 mod lights;
 mod receiver;
+mod region;
 mod tree;
 
-pub use aim::{Region, Targets};
+pub use aim::Targets;
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use emitter::{Emitter, Sky};
@@ -18,3 +19,4 @@ pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;
 pub use lights::{DirectSample, EmissionDensity, EmissionSample, Lights};
 pub use receiver::Receiver;
+pub use region::Region;

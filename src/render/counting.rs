@@ -18,31 +18,77 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
 use crate::random::{Domain, Streams};
-use crate::transport::{Bandwidths, EqualFlux, EyeMeasure, Found, LevelRadii, MAX_LEVELS, PathStart, Scratch};
+use crate::transport::{Bandwidths, EqualFlux, EyeMeasure, Found, LevelRadii, PathStart, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// The bandwidths of some levels for one kind of photons, and what is counted within them.
 struct States<'a, R: CountingRule> {
     bandwidths: &'a mut [R::Bandwidth],
-    /// Levels by ascending bandwidth: each may shrink on its own, so they may change places.
-    order: [usize; MAX_LEVELS],
     tallies: &'a mut [R::Tally],
+    /// Levels in which something has been counted, one bit each.
+    counted: u32,
 }
 
-impl<'a, R: CountingRule> States<'a, R> {
+impl<R: CountingRule> States<'_, R> {
+    /// Each level may shrink on its own, so they may change places.
     #[inline]
-    fn new(bandwidths: &'a mut [R::Bandwidth], tallies: &'a mut [R::Tally]) -> States<'a, R> {
-        let mut order = std::array::from_fn(|k| k);
-        let radius2 = |level: usize| R::radius2(&bandwidths[level]);
-        if !bandwidths.is_sorted_by(|a, b| R::radius2(a) <= R::radius2(b)) {
-            order[..bandwidths.len()].sort_by(|&a, &b| radius2(a).total_cmp(&radius2(b)));
+    fn radii(&self) -> LevelRadii {
+        let radius2 = |bandwidth| R::radius2(bandwidth);
+        if self.bandwidths.is_sorted_by(|a, b| radius2(a) <= radius2(b)) {
+            return LevelRadii::new(self.bandwidths.iter().map(radius2));
         }
-        States { bandwidths, order, tallies }
+        let mut order = std::array::from_fn(|level| level as u8);
+        let radius2 = |level: u8| R::radius2(&self.bandwidths[usize::from(level)]);
+        let ascending = &mut order[..self.bandwidths.len()];
+        ascending.sort_by(|&a, &b| radius2(a).total_cmp(&radius2(b)));
+        LevelRadii::new(ascending.iter().map(|&level| radius2(level))).of(order)
+    }
+}
+
+/// Where the states of a pixel and channel are among those of the pixel: by kind, and then by level.
+#[derive(Clone, Copy)]
+struct Layout {
+    /// Kinds of photons that there are.
+    kinds: ByKind<bool>,
+    levels: usize,
+    /// Tallies per bandwidth.
+    tallies: usize,
+}
+
+impl Layout {
+    /// Bandwidths of a channel.
+    fn count(&self) -> usize {
+        self.levels * self.kinds.iter().filter(|there| **there).count()
     }
 
-    fn ascending(&self) -> impl Iterator<Item = usize> {
-        self.order.into_iter().take(self.bandwidths.len())
+    /// Those of a kind of a channel, if it is there.
+    #[inline]
+    fn range(&self, channel: usize, kind: Kind) -> Option<Range<usize>> {
+        let before = self.kinds[..kind as usize].iter().filter(|there| **there).count();
+        let first = channel * self.count() + before * self.levels;
+        self.kinds[kind as usize].then(|| first..first + self.levels)
+    }
+
+    /// Some levels of a channel, of all that a pixel has.
+    #[inline]
+    fn states<'a, R: CountingRule>(
+        &self,
+        channel: usize,
+        levels: Range<usize>,
+        bandwidths: &'a mut [R::Bandwidth],
+        tallies: &'a mut [R::Tally],
+    ) -> ByKind<States<'a, R>> {
+        let own = channel * self.count()..(channel + 1) * self.count();
+        let first = if self.kinds[0] { self.levels } else { 0 };
+        let (indirect, caustic) = bandwidths[own.clone()].split_at_mut(first);
+        let tallies = &mut tallies[own.start * self.tallies..own.end * self.tallies];
+        let (indirect_tallies, caustic_tallies) = tallies.split_at_mut(first * self.tallies);
+        [(indirect, indirect_tallies), (caustic, caustic_tallies)].map(|(bandwidths, tallies)| {
+            let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
+            let tallies = &mut tallies[levels.start * self.tallies..levels.end * self.tallies];
+            States { bandwidths: &mut bandwidths[levels], tallies, counted: 0 }
+        })
     }
 }
 
@@ -64,10 +110,8 @@ impl<'a, R: CountingRule> Counter<'a, R> {
     /// After the eye path of iteration `i`.
     #[inline]
     fn finish(self, i: u64) {
-        for States { bandwidths, tallies, .. } in self.states {
-            if !bandwidths.is_empty() {
-                self.rule.update(i, bandwidths, tallies);
-            }
+        for States { bandwidths, tallies, counted } in self.states {
+            self.rule.update(i, bandwidths, tallies, counted);
         }
     }
 }
@@ -79,8 +123,7 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
     fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {
         // One function of the normal in all iterations: counts of different gathering points are added.
         (self.kind, self.frame) = (kind, Frame::from_normal(ng));
-        let states = &self.states[kind as usize];
-        LevelRadii::new(states.ascending().map(|level| R::radius2(&states.bandwidths[level]))).of(states.order)
+        self.states[kind as usize].radii()
     }
 
     #[inline]
@@ -90,8 +133,8 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
 
     #[inline]
     fn count(&mut self, photon: &Found) {
-        let States { bandwidths, tallies, .. } = &mut self.states[self.kind as usize];
-        self.rule.count(bandwidths, tallies, &self.frame, photon);
+        let States { bandwidths, tallies, counted } = &mut self.states[self.kind as usize];
+        *counted |= self.rule.count(bandwidths, tallies, &self.frame, photon);
     }
 }
 
@@ -104,8 +147,7 @@ pub(super) struct Counting<'a, R: CountingRule, K> {
     kernel: K,
     /// What photons of each channel carry, where channels are apart; then each has bandwidths of its own.
     channels: Option<[Option<EqualFlux>; 3]>,
-    /// Kinds of photons that there are.
-    kinds: ByKind<bool>,
+    layout: Layout,
     /// Of every pixel, channel, kind and level.
     bandwidths: Vec<R::Bandwidth>,
     /// Of every pixel, channel, kind and level.
@@ -122,7 +164,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             [false, false] => [true, false],
             kinds => kinds,
         };
-        Counting { sppm, settings, rule, kernel, channels, kinds, bandwidths: Vec::new(), tallies: Vec::new() }
+        let layout = Layout { kinds, levels: settings.levels.count, tallies: rule.tallies() };
+        Counting { sppm, settings, rule, kernel, channels, layout, bandwidths: Vec::new(), tallies: Vec::new() }
     }
 
     /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all else.
@@ -132,20 +175,15 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         [film, i].map(|pass| Streams::new(self.settings.seed, pass, domain))
     }
 
-    /// Bandwidths of a pixel and channel.
-    fn states(&self) -> usize {
-        self.settings.levels.count * self.kinds.iter().filter(|there| **there).count()
-    }
-
     /// `maps` holds the photons, or those of each channel.
     fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &mut [Pixel]) {
         let [independent, correlated] =
             [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
-        let each_map = self.states();
-        let Counting { sppm, settings, rule, kernel, kinds, bandwidths, tallies, .. } = self;
-        let (eye, rule, kernel, levels) = (sppm.eye(), &*rule, *kernel, settings.levels);
-        let (size, count, each) = (eye.camera.size(), levels.count, rule.tallies());
-        let states = each_map * maps.len();
+        let Counting { sppm, settings, rule, kernel, layout, bandwidths, tallies, .. } = self;
+        let (eye, rule, kernel, layout, levels) = (sppm.eye(), &*rule, *kernel, *layout, settings.levels);
+        let (size, count, each) = (eye.camera.size(), levels.count, layout.tallies);
+        let states = layout.count() * maps.len();
+        let line = (64 / size_of::<R::Tally>()).max(1);
         let bands = pixels
             .par_chunks_mut(band(size.0))
             .zip(bandwidths.par_chunks_mut(band(size.0) * states))
@@ -153,8 +191,10 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
         par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), tallies), places| {
             let waiting = places.iter().flatten().map(|place| {
-                let (first, end) = (place.at * states, (place.at + 1) * states);
-                std::hint::black_box((tallies[first * each], tallies[end * each - 1]));
+                let first = place.at * states;
+                for tally in tallies[first * each..][..states * each].iter().step_by(line) {
+                    std::hint::black_box(*tally);
+                }
                 pixels[place.at].touch() + f64::from(R::radius2(&bandwidths[first]))
             });
             std::hint::black_box(waiting.sum::<f64>());
@@ -167,49 +207,34 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
-                let mut measure =
-                    |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>, into: &mut EyeMeasure| {
-                        let mut channel = |channel: usize, into: &mut EyeMeasure| {
-                            let volume = maps[channel].volume(pixel, levels.clone());
-                            let own = channel * each_map..(channel + 1) * each_map;
-                            let mut of_kinds = bandwidths[own.clone()]
-                                .chunks_exact_mut(count)
-                                .zip(tallies[own.start * each..own.end * each].chunks_exact_mut(count * each));
-                            let mut counter = Counter::new(
-                                rule,
-                                kinds.map(|there| {
-                                    let some = if there { of_kinds.next() } else { None };
-                                    let (bandwidths, tallies) = some.unwrap_or_default();
-                                    let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
-                                    let counted = levels.start * each..levels.end * each;
-                                    States::new(&mut bandwidths[levels], &mut tallies[counted])
-                                }),
-                            );
-                            let scratch = &mut scratches[channel];
-                            let photons = &maps[channel].surface;
-                            *into = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
-                            counter.finish(i);
-                        };
-                        channel(0, into);
-                        // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
-                        for other in 1..maps.len() {
-                            let mut more = EyeMeasure::default();
-                            channel(other, &mut more);
-                            add_photons(into, &more);
-                        }
+                let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
+                    let mut channel = |channel: usize| {
+                        let volume = maps[channel].volume(pixel, levels.clone());
+                        let states = layout.states(channel, levels.clone(), bandwidths, tallies);
+                        let mut counter = Counter::new(rule, states);
+                        let (scratch, photons) = (&mut scratches[channel], &maps[channel].surface);
+                        let measure = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
+                        counter.finish(i);
+                        measure
                     };
-                let (mut first, mut others) = (EyeMeasure::default(), EyeMeasure::default());
+                    let mut all = channel(0);
+                    // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
+                    for other in 1..maps.len() {
+                        add_photons(&mut all, &channel(other));
+                    }
+                    all
+                };
                 match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
                     Some(correlated) => {
-                        measure(pixel, start, 0..1, &mut first);
-                        measure(pixel, correlated, 1..count, &mut others);
+                        let first = measure(pixel, start, 0..1);
+                        let others = measure(pixel, correlated, 1..count);
                         keep_first_hit(&eye, pixel, &first);
                         pixel.add(&first, Some(&others), count, levels.own());
                     }
                     None => {
-                        measure(pixel, start, 0..count, &mut first);
-                        keep_first_hit(&eye, pixel, &first);
-                        pixel.add(&first, None, count, levels.own());
+                        let all = measure(pixel, start, 0..count);
+                        keep_first_hit(&eye, pixel, &all);
+                        pixel.add(&all, None, count, levels.own());
                     }
                 }
             }
@@ -241,10 +266,10 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
             self.rule.begin(bandwidth * bandwidth * scale, neighbours * scale, above)
         };
         let channels = self.channels.map_or(1, |channels| channels.len());
-        self.bandwidths = Vec::with_capacity(pixels.len() * channels * self.states());
+        self.bandwidths = Vec::with_capacity(pixels.len() * channels * self.layout.count());
         for pixel in &pixels {
             for _ in 0..channels {
-                for kind in Kind::ALL.into_iter().filter(|kind| self.kinds[*kind as usize]) {
+                for kind in Kind::ALL.into_iter().filter(|kind| self.layout.kinds[*kind as usize]) {
                     let bandwidth = pixel.bandwidths[kind as usize];
                     self.bandwidths.extend((0..levels.count).map(|level| begin(bandwidth, level)));
                 }
@@ -272,16 +297,12 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
     }
 
     fn radii(&mut self) -> ByKind<Vec<f32>> {
-        let (count, each) = (self.settings.levels.count, self.states());
         // Of three channels the one in the middle.
-        let (all, first) = if self.channels.is_some() { (3 * each, each) } else { (each, 0) };
-        let mut shown = first..first;
-        self.kinds.map(|there| {
-            if !there {
-                return Vec::new();
-            }
-            shown = shown.end..shown.end + count;
-            let bandwidths = self.bandwidths.chunks(all).flat_map(|bandwidths| &bandwidths[shown.clone()]);
+        let (channels, channel) = if self.channels.is_some() { (3, 1) } else { (1, 0) };
+        let of_pixels = self.bandwidths.chunks(channels * self.layout.count());
+        Kind::ALL.map(|kind| {
+            let Some(range) = self.layout.range(channel, kind) else { return Vec::new() };
+            let bandwidths = of_pixels.clone().flat_map(|bandwidths| &bandwidths[range.clone()]);
             bandwidths.map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
         })
     }

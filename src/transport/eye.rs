@@ -13,6 +13,7 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
+use super::bandwidths::{Bandwidths, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch};
 use super::interior::Interior;
@@ -34,108 +35,6 @@ use crate::scene::Scene;
 use crate::spectrum::{Hue, Wavelength};
 use crate::trace::Ray;
 use std::f32::consts::FRAC_1_PI;
-use wide::f32x8;
-
-/// Most bandwidth levels of one eye path.
-pub const MAX_LEVELS: usize = 5;
-
-/// Bandwidths of the levels of one eye path: radii squared in ascending order.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelRadii {
-    radius2: [f32; MAX_LEVELS],
-    count: usize,
-    /// Largest radius squared beyond the eye path's first broad bounce.
-    later2: f32,
-    /// The level of each radius.
-    order: [usize; MAX_LEVELS],
-}
-
-impl LevelRadii {
-    /// From radii squared in ascending order; at most [`MAX_LEVELS`].
-    #[inline]
-    pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
-        let mut radii = LevelRadii {
-            radius2: [0.0; MAX_LEVELS],
-            count: 0,
-            later2: f32::INFINITY,
-            order: std::array::from_fn(|level| level),
-        };
-        for r in radius2.take(MAX_LEVELS) {
-            radii.radius2[radii.count] = r;
-            radii.count += 1;
-        }
-        radii
-    }
-
-    /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
-    /// its path may come to where they are dense, which nobody sees sharply.
-    #[inline]
-    #[must_use]
-    pub fn later(self, later2: f32) -> LevelRadii {
-        LevelRadii { later2, ..self }
-    }
-
-    /// The same, of these levels (each below [`MAX_LEVELS`]) in this order instead of from 0 up.
-    #[inline]
-    #[must_use]
-    pub fn of(self, order: [usize; MAX_LEVELS]) -> LevelRadii {
-        LevelRadii { order, ..self }
-    }
-
-    /// Number of levels.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-}
-
-/// Up to eight photons that bring light to a vertex.
-#[derive(Clone, Copy, Debug)]
-pub struct Found {
-    /// Where they are from the vertex.
-    pub offset: [f32x8; 3],
-    /// Their distances squared; infinite where there is none.
-    pub distance2: f32x8,
-    /// What they add to the path's measure, mean of RGB, before it is divided by an area.
-    pub light: f32x8,
-}
-
-impl Found {
-    /// One photon.
-    pub fn one(offset: Vec3, distance2: f32, light: f32) -> Found {
-        let lane = |x: f32, others: f32| f32x8::from([x, others, others, others, others, others, others, others]);
-        Found {
-            offset: offset.to_array().map(|x| lane(x, 0.0)),
-            distance2: lane(distance2, f32::INFINITY),
-            light: lane(light, 0.0),
-        }
-    }
-}
-
-/// Bandwidths where an eye path gathers.
-pub trait Bandwidths {
-    /// Whether [`Bandwidths::count`] is to be called.
-    const COUNTS: bool = false;
-    /// Photons within reach of the vertex of the last call of [`Bandwidths::at`].
-    #[inline]
-    fn count(&mut self, photons: &Found) {
-        let _ = photons;
-    }
-    /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
-    #[inline]
-    fn reach2(&self, largest2: f32) -> f32 {
-        largest2
-    }
-    /// Those for photons of a kind at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
-    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
-}
-
-/// The same all along the path.
-impl Bandwidths for &ByKind<LevelRadii> {
-    #[inline]
-    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
-        self[kind as usize]
-    }
-}
 
 /// What denoisers want to know about a pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -377,7 +276,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let sums = batch.finish(&mut self.bandwidths);
         let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
         for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
-            into[level] += vertex.throughput * (FRAC_1_PI / radius2) * sum;
+            into[usize::from(level)] += vertex.throughput * (FRAC_1_PI / radius2) * sum;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Photons gathered at a vertex, eight at a time.
 
-use super::eye::{Bandwidths, Found, MAX_LEVELS};
+use super::bandwidths::{Bandwidths, Found, MAX_LEVELS};
 use super::walk::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3, Vec3A};
@@ -68,7 +68,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
     }
 
     /// Adds a photon at a distance squared within reach.
-    #[inline]
+    #[inline(always)]
     pub fn push<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
         let mut level = 0;
         // Without a counter nothing is beyond the largest bandwidth.

@@ -136,11 +136,7 @@ impl<'a> LightPass<'a> {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
                 lights.aim_or_light(&mut emission, self.region, choice.y, point);
                 let (mixed, unaimed) = lights.lit(&emission, self.region);
-                let ratio = emission.density.onward / mixed;
-                if ratio.is_nan() || ratio <= 0.0 {
-                    return None;
-                }
-                emission.flux *= ratio;
+                let (emission, _) = emission.drawn_with(mixed)?;
                 (emission, guide::UNGUIDED, 1.0, unaimed / mixed)
             }
         };

@@ -1,5 +1,6 @@
 //! Light transport: the one bounce loop, and the visitors that make algorithms of it.
 
+mod bandwidths;
 pub mod bidirectional;
 mod bidirectional_eye;
 mod bidirectional_light;
@@ -20,11 +21,12 @@ mod site;
 mod volume;
 mod walk;
 
+pub use bandwidths::{Bandwidths, Found, LevelRadii, MAX_LEVELS};
 pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Strategies, Technique};
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Left, LightVertices, Splat};
 pub use direct::{balance, direct_light};
-pub use eye::{Bandwidths, Eye, EyeMeasure, Features, FirstHit, Found, Indirect, LevelRadii, MAX_LEVELS};
+pub use eye::{Eye, EyeMeasure, Features, FirstHit, Indirect};
 pub use gather::Scratch;
 pub use interior::{Crossing, Interior, Surroundings};
 pub use lengths::Lengths;

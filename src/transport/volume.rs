@@ -4,7 +4,8 @@
 //! coefficient and phase function, the eye path's vertex knows \[Jensen and Christensen 1998, "Efficient simulation of light transport in scenes with
 //! participating media using photon maps", (10), with the coefficient taken out of the photon\].
 
-use super::eye::{Eye, MAX_LEVELS};
+use super::bandwidths::MAX_LEVELS;
+use super::eye::Eye;
 use super::probe::GatherPoint;
 use super::site::MediumVertex;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

@@ -89,8 +89,8 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [Tally], _: &Frame, photons: &Found) {
-        let (Some(bandwidth), Some(tally)) = (bandwidths.last(), tallies.last_mut()) else { return };
+    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [Tally], _: &Frame, photons: &Found) -> u32 {
+        let (Some(bandwidth), Some(tally)) = (bandwidths.last(), tallies.last_mut()) else { return 0 };
         let within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2));
         tally.photons += within.move_mask().count_ones();
         tally.squares += f64::from((within & (photons.light * photons.light)).reduce_add());
@@ -101,9 +101,10 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         let scale = f64::from(bandwidth.pilot2).powi(-2);
         tally.laplacian += f64::from(parts.reduce_add()) * scale;
         tally.noise += f64::from((parts * parts).reduce_add()) * scale * scale;
+        0
     }
 
-    fn update(&self, i: u64, bandwidths: &mut [Bandwidth], tallies: &mut [Tally]) {
+    fn update(&self, i: u64, bandwidths: &mut [Bandwidth], tallies: &mut [Tally], _: u32) {
         let (Some(last), Some(tally)) = (bandwidths.last_mut(), tallies.last_mut()) else { return };
         let found = std::mem::take(tally);
         last.photons = last.photons.saturating_add(found.photons);
@@ -179,7 +180,7 @@ mod tests {
                         rule.count(b, t, &Frame::from_normal(Vec3::Z), &photon);
                     }
                 }
-                rule.update(i, std::slice::from_mut(&mut bandwidth), std::slice::from_mut(&mut tally));
+                rule.update(i, std::slice::from_mut(&mut bandwidth), std::slice::from_mut(&mut tally), 0);
                 assert!(bandwidth.radius2 > 0.0 && bandwidth.radius2.is_finite());
             }
             bandwidth

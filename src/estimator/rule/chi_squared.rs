@@ -5,7 +5,7 @@
 
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
-use crate::transport::Found;
+use crate::transport::{Found, MAX_LEVELS};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 use wide::{CmpEq, CmpGe, CmpLt, CmpNe, f32x8};
 
@@ -187,26 +187,36 @@ impl CountingRule for ChiSquared {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) {
+    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
         let sectors = self.sectors(frame, &photons.offset);
-        let (annuli, each) = (self.annuli as f32, self.sectors as f32);
-        for (bandwidth, counts) in bandwidths.iter().zip(counts.chunks_mut(self.tallies())) {
-            let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
+        let (annuli, each, cells) = (self.annuli as f32, self.sectors as f32, self.tallies());
+        let mut counted = 0;
+        // Photons within each level, eight bits a level, and their cells among all of them: one loop over all, the length of which is guessed once.
+        let (mut within, mut at) = (0u64, [[0i32; 8]; MAX_LEVELS]);
+        for (level, (bandwidth, at)) in bandwidths.iter().zip(&mut at).enumerate() {
+            let inside = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
             let annulus =
                 (photons.distance2 * (annuli / bandwidth.radius2)).floor().fast_min(f32x8::splat(annuli - 1.0));
-            let cells = (annulus * each + sectors).fast_trunc_int().to_array();
-            while within != 0 {
-                let k = within.trailing_zeros() as usize;
-                within &= within - 1;
-                counts[cells[k & 7] as usize] += 1;
-            }
+            *at = (annulus * each + sectors + (level * cells) as f32).fast_trunc_int().to_array();
+            within |= (inside as u64) << (8 * level);
+            counted |= u32::from(inside != 0) << level;
         }
+        let at = at.as_flattened();
+        while within != 0 {
+            counts[at[within.trailing_zeros() as usize] as usize] += 1;
+            within &= within - 1;
+        }
+        counted
     }
 
+    /// Tests that have been passed need not be taken again before more photons are there.
     #[inline]
-    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32]) {
-        for (bandwidth, counts) in bandwidths.iter_mut().zip(counts.chunks_mut(self.tallies())) {
-            self.test(bandwidth, counts);
+    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32], mut counted: u32) {
+        let cells = self.tallies();
+        while counted != 0 {
+            let level = counted.trailing_zeros() as usize;
+            counted &= counted - 1;
+            self.test(&mut bandwidths[level], &mut counts[level * cells..][..cells]);
         }
     }
 }
@@ -250,6 +260,32 @@ mod tests {
             }
             assert_eq!((sector(Vec3::ZERO), sector(frame.n)), (0, 0));
         }
+    }
+
+    /// Levels that are counted together have what each has alone, and those with photons are told.
+    #[test]
+    fn levels_do_not_disturb_each_other() {
+        let rule = rule();
+        let frame = Frame::from_normal(Vec3::Z);
+        let levels: [Bandwidth; MAX_LEVELS] =
+            std::array::from_fn(|level| rule.begin([0.3, 1.0, 0.05, 0.3, 0.7][level], 10.0, 0));
+        let (mut together, mut apart) = ([0u32; 12 * MAX_LEVELS], [0u32; 12 * MAX_LEVELS]);
+        for trial in 0..500 {
+            let (mut offset, mut distance2) = ([[0.0f32; 8]; 3], [f32::INFINITY; 8]);
+            for k in 0..trial as usize % 9 {
+                let (x, y) = uniform(trial, k as u64);
+                (offset[0][k], offset[1][k], distance2[k]) = (x, y, x * x + y * y);
+            }
+            let found = Found { offset: offset.map(f32x8::from), distance2: f32x8::from(distance2), light: f32x8::ONE };
+            let counted = rule.count(&levels, &mut together, &frame, &found);
+            for (level, counts) in apart.chunks_exact_mut(12).enumerate() {
+                let bit = rule.count(&levels[level..=level], counts, &frame, &found);
+                assert_eq!(bit, counted >> level & 1);
+                assert_eq!(bit == 1, distance2.iter().any(|d2| *d2 < levels[level].radius2));
+            }
+            assert_eq!(together, apart);
+        }
+        assert!(together.chunks(12).all(|counts| counts.iter().all(|&count| count > 0)));
     }
 
     #[test]

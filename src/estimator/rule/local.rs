@@ -41,13 +41,14 @@ impl CountingRule for LocalStatistics {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [u32], _: &Frame, photons: &Found) {
+    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [u32], _: &Frame, photons: &Found) -> u32 {
         for (bandwidth, tally) in bandwidths.iter().zip(tallies) {
             *tally += photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask().count_ones();
         }
+        0
     }
 
-    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], tallies: &mut [u32]) {
+    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], tallies: &mut [u32], _: u32) {
         for (bandwidth, tally) in bandwidths.iter_mut().zip(tallies) {
             let new = f64::from(std::mem::take(tally));
             if new > 0.0 {
@@ -84,7 +85,7 @@ mod tests {
                 (n, radius2, tau) = (kept, radius2 * factor, (tau + flux) * factor);
             }
             let before = ours;
-            rule.update(i, std::slice::from_mut(&mut ours), &mut [new]);
+            rule.update(i, std::slice::from_mut(&mut ours), &mut [new], 0);
             assert!(ours.radius2 > 0.0 && ours.radius2 <= before.radius2 && ours.photons >= before.photons);
             assert!((f64::from(ours.radius2) / radius2 - 1.0).abs() < 1e-4 && (ours.photons - n).abs() < 1e-9 * n);
             assert!((tau / radius2 - sum).abs() < 1e-9 * sum, "iteration {i}");
@@ -101,7 +102,7 @@ mod tests {
         for i in 1..=1000 {
             // So many photons that rounding to whole ones is nothing.
             let new = (1e8 * f64::from(bandwidth.radius2)).round() as u32;
-            rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [new]);
+            rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [new], 0);
             let expected = 0.7 * super::super::memoryless::radius2_factor(i, 0.7);
             assert!((f64::from(bandwidth.radius2) / expected - 1.0).abs() < 1e-4, "iteration {i}");
         }

@@ -32,8 +32,10 @@ pub trait CountingRule: Sync {
         let _ = bandwidths;
         largest2
     }
-    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all iterations.
-    fn count(&self, bandwidths: &[Self::Bandwidth], tallies: &mut [Self::Tally], frame: &Frame, photons: &Found);
-    /// After iteration `i` (from 1).
-    fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], tallies: &mut [Self::Tally]);
+    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all iterations. Returns the
+    /// levels in which something was counted, one bit each; none where the rule does not ask for them.
+    fn count(&self, bandwidths: &[Self::Bandwidth], tallies: &mut [Self::Tally], frame: &Frame, photons: &Found)
+    -> u32;
+    /// After iteration `i` (from 1). `counted` are the levels that [`CountingRule::count`] has returned in this iteration.
+    fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], tallies: &mut [Self::Tally], counted: u32);
 }

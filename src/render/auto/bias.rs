@@ -4,7 +4,7 @@
 //! with the exponent 2 \[Knaus and Zwicker 2011, 3\]; an edge is blurred by as much whatever the kernel's size, within an area that grows with its radius: 1/2.
 //! Which of them rules is what the differences of three pairs of levels tell, each pair of twice the area of the one before.
 
-use super::trial::{DARK, mean};
+use super::trial::mean;
 use crate::estimator::Pixel;
 
 /// Exponents of edges and of smooth light, between which it is searched, and in how many steps.
@@ -27,9 +27,9 @@ pub(super) struct Differences {
 }
 
 impl Differences {
-    /// Adds a pixel of this worth.
-    pub fn add(&mut self, pixel: &Pixel, value: f64) {
-        let (n, scale) = (f64::from(pixel.iterations), 1.0 / (value * value + DARK));
+    /// Adds a pixel whose squares are relative by this factor.
+    pub fn add(&mut self, pixel: &Pixel, scale: f64) {
+        let n = f64::from(pixel.iterations);
         for (at, difference) in pixel.differences[PAIRS].iter().enumerate() {
             let noise = mean(difference.variance_of_mean(n)) * scale;
             self.squared[at] += mean(difference.mean * difference.mean) * scale - noise;

@@ -67,12 +67,15 @@ impl Cost {
                 paths * (both + eye * (EYE_VERTEX + light * CONNECTION + merges))
             }
         };
-        let both = matches!(way.method, Method::Bdpt | Method::Vcm);
-        seconds * if both && self.scattering { MEDIA.1 } else { self.media() }
+        seconds * self.media(way.method)
     }
 
-    fn media(&self) -> f64 {
-        if self.scattering { MEDIA.0 } else { 1.0 }
+    fn media(&self, method: Method) -> f64 {
+        match method {
+            _ if !self.scattering => 1.0,
+            Method::Bdpt | Method::Vcm => MEDIA.1,
+            _ => MEDIA.0,
+        }
     }
 
     /// Core-seconds of an iteration that go to photons, where they are gathered.
@@ -80,14 +83,14 @@ impl Cost {
         let without = Settings { photons: 0, ..settings.clone() };
         let paths = pixels * eye_paths(settings);
         self.of(way, settings, pixels) - self.of(way, &without, pixels)
-            + self.media() * paths * self.lengths.eye_to_broad * GATHER
+            + self.media(way.method) * paths * self.lengths.eye_to_broad * GATHER
     }
 
     /// Core-seconds of an iteration that indirect light takes, and caustics, where one can be done without the other.
     pub fn parts(&self, way: Way, settings: &Settings, pixels: f64) -> [Option<f64>; 2] {
         let Lengths { eye, eye_to_broad, .. } = self.lengths;
         let beyond = (eye - eye_to_broad).max(0.0);
-        let media = self.media();
+        let media = self.media(way.method);
         let all = self.of(way, settings, pixels);
         match (way.method, way.indirect) {
             (Method::Path, _) => [Some(media * pixels * beyond * EYE_VERTEX), None],

@@ -5,8 +5,7 @@ use super::cost::Cost;
 use super::tail::Tail;
 use super::{Balance, Free, Way};
 use crate::camera::Camera;
-use crate::estimator::InitialBandwidth;
-use crate::estimator::Pixel;
+use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::Guide;
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
@@ -152,7 +151,7 @@ impl Sums {
             for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
                 *sum += mean(level.variance_of_mean(n)) * scale;
             }
-            sums.differences.add(pixel, *value);
+            sums.differences.add(pixel, scale);
             sums.pixels += 1.0;
         }
         sums

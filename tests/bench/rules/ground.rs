@@ -59,7 +59,7 @@ impl Ground {
         Shot::of(&session)
     }
 
-    /// Two independent halves that take so many core-seconds together: by bidirectional path tracing, if it converges here, else by SPPM with more light paths and narrower bandwidths. Kept in out/rules.
+    /// Two independent halves that take so many core-seconds together: by bidirectional path tracing or VCM, if they converge here, else by SPPM with more light paths and narrower bandwidths. Kept in out/rules.
     pub fn reference(&self, seconds: f64) -> Reference {
         let method = match self.name.as_str() {
             name if CONNECTED.contains(&name) => Method::Bdpt,

@@ -1,0 +1,101 @@
+//! Bandwidths where eye paths gather: what gathering asks of those who set them, and tells them.
+
+use crate::math::Vec3;
+use crate::photon::{ByKind, Kind, PhotonMap};
+use wide::f32x8;
+
+/// Most bandwidth levels of one eye path.
+pub const MAX_LEVELS: usize = 5;
+
+/// Bandwidths of the levels of one eye path: radii squared in ascending order.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelRadii {
+    pub(super) radius2: [f32; MAX_LEVELS],
+    pub(super) count: usize,
+    /// Largest radius squared beyond the eye path's first broad bounce.
+    pub(super) later2: f32,
+    /// The level of each radius.
+    pub(super) order: [u8; MAX_LEVELS],
+}
+
+impl LevelRadii {
+    /// From radii squared in ascending order; at most [`MAX_LEVELS`].
+    #[inline]
+    pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
+        let mut radii = LevelRadii {
+            radius2: [0.0; MAX_LEVELS],
+            count: 0,
+            later2: f32::INFINITY,
+            order: std::array::from_fn(|level| level as u8),
+        };
+        for r in radius2.take(MAX_LEVELS) {
+            radii.radius2[radii.count] = r;
+            radii.count += 1;
+        }
+        radii
+    }
+
+    /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
+    /// its path may come to where they are dense, which nobody sees sharply.
+    #[inline]
+    #[must_use]
+    pub fn later(self, later2: f32) -> LevelRadii {
+        LevelRadii { later2, ..self }
+    }
+
+    /// The same, of these levels (each below [`MAX_LEVELS`]) in this order instead of from 0 up.
+    #[inline]
+    #[must_use]
+    pub fn of(self, order: [u8; MAX_LEVELS]) -> LevelRadii {
+        LevelRadii { order, ..self }
+    }
+}
+
+/// Up to eight photons that bring light to a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// Where they are from the vertex.
+    pub offset: [f32x8; 3],
+    /// Their distances squared; infinite where there is none.
+    pub distance2: f32x8,
+    /// What they add to the path's measure, mean of RGB, before it is divided by an area.
+    pub light: f32x8,
+}
+
+impl Found {
+    /// One photon.
+    pub fn one(offset: Vec3, distance2: f32, light: f32) -> Found {
+        let lane = |x: f32, others: f32| f32x8::from([x, others, others, others, others, others, others, others]);
+        Found {
+            offset: offset.to_array().map(|x| lane(x, 0.0)),
+            distance2: lane(distance2, f32::INFINITY),
+            light: lane(light, 0.0),
+        }
+    }
+}
+
+/// Bandwidths where an eye path gathers.
+pub trait Bandwidths {
+    /// Whether [`Bandwidths::count`] is to be called.
+    const COUNTS: bool = false;
+    /// Photons within reach of the vertex of the last call of [`Bandwidths::at`].
+    #[inline]
+    fn count(&mut self, photons: &Found) {
+        let _ = photons;
+    }
+    /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
+    #[inline]
+    fn reach2(&self, largest2: f32) -> f32 {
+        largest2
+    }
+    /// Those for photons of a kind at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
+    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+}
+
+/// The same all along the path.
+impl Bandwidths for &ByKind<LevelRadii> {
+    #[inline]
+    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
+        self[kind as usize]
+    }
+}
