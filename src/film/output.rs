@@ -84,8 +84,11 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
 }
 
 /// The kinds of photons that have bandwidths, and their layers: of one kind alone they are `Radius`.
-pub fn radius_layers(kinds: ByKind<bool>) -> impl Iterator<Item = (Kind, &'static str)> {
-    Kind::ALL.into_iter().filter(move |kind| kinds[*kind as usize]).zip(["Radius", "CausticRadius"])
+// Optimisers followed every way through this and its caller's loops, for minutes.
+#[inline(never)]
+pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
+    let there = Kind::ALL.into_iter().filter(|kind| kinds[*kind as usize]);
+    there.zip(["Radius", "CausticRadius"]).collect()
 }
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
@@ -129,8 +132,10 @@ fn columns(shape: &Shape) -> Vec<Column> {
         (Part::Volume, "Volume", |parts| parts.volume),
     ];
     let present = |part: Part| classes.has_part(part) && (part != Part::Volume || volume);
-    for (_, name, get) in parts.into_iter().filter(|(part, ..)| present(*part)) {
-        columns.push(Column::rgb(name, move |p| mean(get(&p.parts), p.iterations)));
+    for (part, name, get) in parts {
+        if present(part) {
+            columns.push(Column::rgb(name, move |p| mean(get(&p.parts), p.iterations)));
+        }
     }
     columns.extend([
         Column::rgb("Error", move |p| match SquaredError::of(p, own, compared) {

@@ -208,35 +208,27 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
                 let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
-                    let mut channel = |channel: usize| {
-                        let volume = maps[channel].volume(pixel, levels.clone());
+                    let mut all = EyeMeasure::default();
+                    for (channel, (maps, scratch)) in maps.iter().zip(&mut *scratches).enumerate() {
+                        let volume = maps.volume(pixel, levels.clone());
                         let states = layout.states(channel, levels.clone(), bandwidths, tallies);
                         let mut counter = Counter::new(rule, states);
-                        let (scratch, photons) = (&mut scratches[channel], &maps[channel].surface);
-                        let measure = eye.measure(scratch, start, photons, volume, &mut counter, kernel);
+                        let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter, kernel);
                         counter.finish(i);
-                        measure
-                    };
-                    let mut all = channel(0);
-                    // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
-                    for other in 1..maps.len() {
-                        add_photons(&mut all, &channel(other));
+                        // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
+                        if channel == 0 {
+                            all = measure;
+                        } else {
+                            add_photons(&mut all, &measure);
+                        }
                     }
                     all
                 };
-                match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
-                    Some(correlated) => {
-                        let first = measure(pixel, start, 0..1);
-                        let others = measure(pixel, correlated, 1..count);
-                        keep_first_hit(&eye, pixel, &first);
-                        pixel.add(&first, Some(&others), count, levels.own());
-                    }
-                    None => {
-                        let all = measure(pixel, start, 0..count);
-                        keep_first_hit(&eye, pixel, &all);
-                        pixel.add(&all, None, count, levels.own());
-                    }
-                }
+                let correlated = correlated.as_ref().and_then(|starts| starts[k].as_ref());
+                let first = measure(pixel, start, if correlated.is_some() { 0..1 } else { 0..count });
+                let others = correlated.map(|start| measure(pixel, start, 1..count));
+                keep_first_hit(&eye, pixel, &first);
+                pixel.add(&first, others.as_ref(), count, levels.own());
             }
         });
     }
