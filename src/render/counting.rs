@@ -192,7 +192,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), tallies), places| {
             let waiting = places.iter().flatten().map(|place| {
                 let first = place.at * states;
-                for tally in tallies[first * each..][..states * each].iter().step_by(line) {
+                // Those of the first kind, which most pixels see.
+                for tally in tallies[first * each..][..count * each].iter().step_by(line) {
                     std::hint::black_box(*tally);
                 }
                 pixels[place.at].touch() + f64::from(R::radius2(&bandwidths[first]))
@@ -208,19 +209,19 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, and updates them.
                 let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
-                    let mut all = EyeMeasure::default();
-                    for (channel, (maps, scratch)) in maps.iter().zip(&mut *scratches).enumerate() {
+                    let mut channel = |channel: usize| {
+                        let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
                         let volume = maps.volume(pixel, levels.clone());
                         let states = layout.states(channel, levels.clone(), bandwidths, tallies);
                         let mut counter = Counter::new(rule, states);
                         let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter, kernel);
                         counter.finish(i);
-                        // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
-                        if channel == 0 {
-                            all = measure;
-                        } else {
-                            add_photons(&mut all, &measure);
-                        }
+                        measure
+                    };
+                    let mut all = channel(0);
+                    // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
+                    for other in 1..maps.len() {
+                        add_photons(&mut all, &channel(other));
                     }
                     all
                 };

@@ -142,7 +142,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
 
     /// The sums by level.
     #[inline]
-    pub fn finish<B: Bandwidths>(mut self, counter: &mut B) -> [Rgb; BINS] {
+    pub fn finish<B: Bandwidths>(&mut self, counter: &mut B) -> [Rgb; BINS] {
         if self.count > 0 {
             self.flush(counter);
         }
