@@ -148,7 +148,8 @@ fn cost(arguments: &[String]) -> Value {
         println!("the rule: {rule:+.1} %");
         let state = levels * (12 * 4 + 8);
         let pixel = size_of::<caustique::estimator::Pixel>();
-        println!("memory: {state} bytes a pixel on top of {pixel}, {:+.1} %", state as f64 / pixel as f64 * 100.0);
+        let share = state as f64 / pixel as f64 * 100.0;
+        println!("memory: {state} bytes a pixel and kind of photons on top of {pixel}, {share:+.1} %");
         rows.push(json!({"levels": levels, "seconds": best, "rule_percent": rule, "state_bytes": state, "pixel_bytes": pixel}));
     }
     json!(rows)
