@@ -48,6 +48,7 @@ def options(method):
 def measure(scene, runs):
     """Runs by name, with options, against a reference; returns what points.json says, and what auto has chosen."""
     folder = OUT / scene
+    OUT.mkdir(parents=True, exist_ok=True)
     reference = OUT / f"{scene}-{WIDTH}-{REFERENCE:g}s.exr"
     command = [BIN, "converge", ROOT / "scenes" / f"{scene}.glb", "-o", folder, "--progress", "none"]
     command += ["--width", str(WIDTH), "--time", str(SECONDS), "--seed", "1"]
