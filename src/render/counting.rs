@@ -34,9 +34,8 @@ impl<R: CountingRule> States<'_, R> {
     /// Each level may shrink on its own, so they may change places.
     #[inline]
     fn radii(&self) -> LevelRadii {
-        let radius2 = |bandwidth| R::radius2(bandwidth);
-        if self.bandwidths.is_sorted_by(|a, b| radius2(a) <= radius2(b)) {
-            return LevelRadii::new(self.bandwidths.iter().map(radius2));
+        if self.bandwidths.is_sorted_by_key(R::radius2) {
+            return LevelRadii::new(self.bandwidths.iter().map(R::radius2));
         }
         let mut order = std::array::from_fn(|level| level as u8);
         let radius2 = |level: u8| R::radius2(&self.bandwidths[usize::from(level)]);
@@ -57,17 +56,16 @@ struct Layout {
 }
 
 impl Layout {
-    /// Bandwidths of a channel.
-    fn count(&self) -> usize {
-        self.levels * self.kinds.iter().filter(|there| **there).count()
+    /// Bandwidths of a kind of a channel.
+    #[inline]
+    fn of_kind(&self, kind: Kind) -> usize {
+        if self.kinds[kind as usize] { self.levels } else { 0 }
     }
 
-    /// Those of a kind of a channel, if it is there.
+    /// Bandwidths of a channel.
     #[inline]
-    fn range(&self, channel: usize, kind: Kind) -> Option<Range<usize>> {
-        let before = self.kinds[..kind as usize].iter().filter(|there| **there).count();
-        let first = channel * self.count() + before * self.levels;
-        self.kinds[kind as usize].then(|| first..first + self.levels)
+    fn count(&self) -> usize {
+        self.of_kind(Kind::Indirect) + self.of_kind(Kind::Caustic)
     }
 
     /// Some levels of a channel, of all that a pixel has.
@@ -80,7 +78,7 @@ impl Layout {
         tallies: &'a mut [R::Tally],
     ) -> ByKind<States<'a, R>> {
         let own = channel * self.count()..(channel + 1) * self.count();
-        let first = if self.kinds[0] { self.levels } else { 0 };
+        let first = self.of_kind(Kind::Indirect);
         let (indirect, caustic) = bandwidths[own.clone()].split_at_mut(first);
         let tallies = &mut tallies[own.start * self.tallies..own.end * self.tallies];
         let (indirect_tallies, caustic_tallies) = tallies.split_at_mut(first * self.tallies);
@@ -262,9 +260,9 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         self.bandwidths = Vec::with_capacity(pixels.len() * channels * self.layout.count());
         for pixel in &pixels {
             for _ in 0..channels {
-                for kind in Kind::ALL.into_iter().filter(|kind| self.layout.kinds[*kind as usize]) {
+                for kind in Kind::ALL {
                     let bandwidth = pixel.bandwidths[kind as usize];
-                    self.bandwidths.extend((0..levels.count).map(|level| begin(bandwidth, level)));
+                    self.bandwidths.extend((0..self.layout.of_kind(kind)).map(|level| begin(bandwidth, level)));
                 }
             }
         }
@@ -292,10 +290,11 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
     fn radii(&mut self) -> ByKind<Vec<f32>> {
         // Of three channels the one in the middle.
         let (channels, channel) = if self.channels.is_some() { (3, 1) } else { (1, 0) };
-        let of_pixels = self.bandwidths.chunks(channels * self.layout.count());
-        Kind::ALL.map(|kind| {
-            let Some(range) = self.layout.range(channel, kind) else { return Vec::new() };
-            let bandwidths = of_pixels.clone().flat_map(|bandwidths| &bandwidths[range.clone()]);
+        let count = self.layout.count();
+        let of_pixels = self.bandwidths.chunks(channels * count).map(|all| &all[channel * count..][..count]);
+        let first = self.layout.of_kind(Kind::Indirect);
+        [0..first, first..count].map(|of_kind| {
+            let bandwidths = of_pixels.clone().flat_map(|all| &all[of_kind.clone()]);
             bandwidths.map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
         })
     }

@@ -22,12 +22,13 @@ const ITERATIONS: usize = 8;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let mut found = json!({});
     if arguments.is_empty() {
-        let (size, looks) = (sizes(), looks());
-        println!("{}", json!({"size": size, "looks": looks, "cost": cost(&arguments)}));
-    } else {
-        println!("{}", json!({"cost": cost(&arguments)}));
+        found["size"] = json!(sizes());
+        found["looks"] = looks();
     }
+    found["cost"] = cost(&arguments);
+    println!("{found}");
 }
 
 /// A photon at a uniform point of the unit disc.
