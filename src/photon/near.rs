@@ -32,6 +32,16 @@ struct Eight {
     n: [f32x8; 3],
 }
 
+/// Photons of an [`Eight`] that a query has found.
+#[derive(Clone, Copy)]
+struct Hits {
+    distance2: f32x8,
+    /// One bit each.
+    inside: u32,
+    /// Index of the first.
+    first: u32,
+}
+
 /// The photons around a place. One per worker and map.
 pub struct Near<P> {
     center: Vec3,
@@ -41,12 +51,14 @@ pub struct Near<P> {
     last: Vec3,
     photons: Vec<P>,
     eights: Vec<Eight>,
+    /// What the last scan has found, room for as many as there are eights and one.
+    hits: Vec<Hits>,
 }
 
 impl<P> Default for Near<P> {
     fn default() -> Self {
         let nowhere = Vec3::splat(f32::INFINITY);
-        Near { center: nowhere, radius: 0.0, last: nowhere, photons: Vec::new(), eights: Vec::new() }
+        Near { center: nowhere, radius: 0.0, last: nowhere, photons: Vec::new(), eights: Vec::new(), hits: Vec::new() }
     }
 }
 
@@ -93,6 +105,7 @@ impl<P: Located> PhotonMap<P> {
                 n: std::array::from_fn(|a| of(&|photon| photon.normal()[a])),
             });
         }
+        near.hits.resize(near.eights.len() + 1, Hits { distance2: f32x8::ZERO, inside: 0, first: 0 });
         (near.center, near.radius) = (center, radius);
         true
     }
@@ -100,25 +113,37 @@ impl<P: Located> PhotonMap<P> {
 
 impl<P: Located> Near<P> {
     #[inline]
-    fn scan(&self, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
-        let (p, ng) = (p.to_array().map(f32x8::splat), ng.to_array().map(f32x8::splat));
-        let (radius2, cosine) = (f32x8::splat(radius2), f32x8::splat(NORMAL_COSINE));
-        for (eight, photons) in self.eights.iter().zip(self.photons.chunks(8)) {
-            let d: [f32x8; 3] = std::array::from_fn(|a| eight.p[a] - p[a]);
-            let distance2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            // As `Vec3::dot` adds.
-            let cos = eight.n[0] * ng[0] + eight.n[1] * ng[1] + eight.n[2] * ng[2];
-            let mut inside = (distance2.cmp_lt(radius2) & cos.cmp_gt(cosine)).move_mask() as u32;
-            if inside == 0 {
-                continue;
-            }
-            let distance2 = distance2.to_array();
+    fn scan(&mut self, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
+        // First all distances, without a branch or a call between them, then the visits.
+        let found = self.find(p, ng, radius2);
+        for hits in &self.hits[..found] {
+            let (photons, distance2) = (&self.photons[hits.first as usize..], hits.distance2.to_array());
+            let mut inside = hits.inside;
             while inside != 0 {
                 let i = inside.trailing_zeros() as usize;
                 inside &= inside - 1;
                 visit(&photons[i], distance2[i]);
             }
         }
+    }
+
+    /// Puts what is near into [`Near::hits`] and says how many those are.
+    #[inline(never)]
+    fn find(&mut self, p: Vec3, ng: Vec3, radius2: f32) -> usize {
+        let (p, ng) = (p.to_array().map(f32x8::splat), ng.to_array().map(f32x8::splat));
+        let (radius2, cosine) = (f32x8::splat(radius2), f32x8::splat(NORMAL_COSINE));
+        let mut found = 0;
+        for (k, eight) in self.eights.iter().enumerate() {
+            let d: [f32x8; 3] = std::array::from_fn(|a| eight.p[a] - p[a]);
+            let distance2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            // As `Vec3::dot` adds.
+            let cos = eight.n[0] * ng[0] + eight.n[1] * ng[1] + eight.n[2] * ng[2];
+            let inside = (distance2.cmp_lt(radius2) & cos.cmp_gt(cosine)).move_mask() as u32;
+            // The next takes the place of those without any.
+            self.hits[found] = Hits { distance2, inside, first: 8 * k as u32 };
+            found += usize::from(inside != 0);
+        }
+        found
     }
 }
 

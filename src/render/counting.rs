@@ -116,6 +116,7 @@ impl<'a, R: CountingRule> Counter<'a, R> {
 
 impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
     const COUNTS: bool = true;
+    const BEYOND: bool = R::BEYOND;
 
     #[inline]
     fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {
@@ -129,10 +130,10 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
         self.rule.reach2(self.states[self.kind as usize].bandwidths, largest2)
     }
 
-    #[inline]
-    fn count(&mut self, photon: &Found) {
+    #[inline(always)]
+    fn count(&mut self, photons: &Found) {
         let States { bandwidths, tallies, counted } = &mut self.states[self.kind as usize];
-        *counted |= self.rule.count(bandwidths, tallies, &self.frame, photon);
+        *counted |= self.rule.count(bandwidths, tallies, &self.frame, photons);
     }
 }
 
@@ -205,27 +206,27 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let pixel = &mut pixels[place.at];
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let tallies = &mut tallies[place.at * states * each..][..states * each];
-                // Measures some levels by one eye path, and updates them.
-                let mut measure = |pixel: &Pixel, start: &(PathStart, _), levels: Range<usize>| {
-                    let mut channel = |channel: usize| {
-                        let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
-                        let volume = maps.volume(pixel, levels.clone());
-                        let states = layout.states(channel, levels.clone(), bandwidths, tallies);
-                        let mut counter = Counter::new(rule, states);
-                        let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter, kernel);
-                        counter.finish(i);
-                        measure
-                    };
-                    let mut all = channel(0);
-                    // The same eye path each time: only the photons differ, and those of one channel bring light to it alone.
-                    for other in 1..maps.len() {
-                        add_photons(&mut all, &channel(other));
-                    }
-                    all
+                // Measures some levels by one eye path, with the photons of a channel, and updates them.
+                let mut measure = |pixel: &Pixel, start: &(PathStart, _), channel: usize, levels: Range<usize>| {
+                    let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
+                    let volume = maps.volume(pixel, levels.clone());
+                    let states = layout.states(channel, levels, bandwidths, tallies);
+                    let mut counter = Counter::new(rule, states);
+                    let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter, kernel);
+                    counter.finish(i);
+                    measure
                 };
                 let correlated = correlated.as_ref().and_then(|starts| starts[k].as_ref());
-                let first = measure(pixel, start, if correlated.is_some() { 0..1 } else { 0..count });
-                let others = correlated.map(|start| measure(pixel, start, 1..count));
+                let own = if correlated.is_some() { 0..1 } else { 0..count };
+                let mut first = measure(pixel, start, 0, own.clone());
+                let mut others = correlated.map(|start| measure(pixel, start, 0, 1..count));
+                // The same eye paths each time: only the photons differ, and those of one channel bring light to it alone.
+                for channel in 1..maps.len() {
+                    add_photons(&mut first, &measure(pixel, start, channel, own.clone()));
+                    if let (Some(others), Some(start)) = (&mut others, correlated) {
+                        add_photons(others, &measure(pixel, start, channel, 1..count));
+                    }
+                }
                 keep_first_hit(&eye, pixel, &first);
                 pixel.add(&first, others.as_ref(), count, levels.own());
             }

@@ -78,6 +78,8 @@ impl Found {
 pub trait Bandwidths {
     /// Whether [`Bandwidths::count`] is to be called.
     const COUNTS: bool = false;
+    /// Whether [`Bandwidths::reach2`] may be larger than the largest bandwidth.
+    const BEYOND: bool = false;
     /// Photons within reach of the vertex of the last call of [`Bandwidths::at`].
     #[inline]
     fn count(&mut self, photons: &Found) {

@@ -71,19 +71,12 @@ impl<'a, K: Kernel> Batch<'a, K> {
     #[inline(always)]
     pub fn push<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
         let mut level = 0;
-        // Without a counter nothing is beyond the largest bandwidth.
-        let last = self.radii.len() - usize::from(!B::COUNTS);
+        let last = self.radii.len() - usize::from(!B::BEYOND);
         for &radius2 in &self.radii[..last] {
             level += usize::from(distance2 >= radius2);
         }
-        if let (Some(gathering), true) = (&self.unreachable, photon.flags.has(PhotonFlags::UNREACHABLE)) {
-            let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
-            self.add(level, light.into(), distance2);
-            if B::COUNTS && light != Rgb::ZERO {
-                let light = (light * self.throughput).element_sum() / 3.0;
-                counter.count(&Found::one(photon.p - self.p, distance2, light));
-            }
-            return;
+        if photon.flags.has(PhotonFlags::UNREACHABLE) && self.unreachable.is_some() {
+            return self.push_unreachable(photon, level, distance2, counter);
         }
         let at = self.count;
         for axis in 0..3 {
@@ -103,6 +96,18 @@ impl<'a, K: Kernel> Batch<'a, K> {
         self.count += 1;
         if self.count == 8 {
             self.flush(counter);
+        }
+    }
+
+    /// Adds a photon that no eye path could find: few, and out of the way of the others.
+    #[inline(never)]
+    fn push_unreachable<B: Bandwidths>(&mut self, photon: &Photon, level: usize, distance2: f32, counter: &mut B) {
+        let Some(gathering) = &self.unreachable else { return };
+        let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
+        self.add(level, light.into(), distance2);
+        if B::COUNTS && light != Rgb::ZERO {
+            let light = (light * self.throughput).element_sum() / 3.0;
+            counter.count(&Found::one(photon.p - self.p, distance2, light));
         }
     }
 

@@ -126,27 +126,41 @@ fn cost(arguments: &[String]) -> Value {
         ];
         // Of every iteration the least of all rounds, the variants one after the other: what a noisy machine adds is not theirs.
         let mut least = [[f64::INFINITY; ITERATIONS]; 4];
-        for _ in 0..rounds {
-            for (least, (_, settings)) in least.iter_mut().zip(&variants) {
+        // With the rule over without it, iterations of renders that followed one another, in either order.
+        let mut ratios = Vec::new();
+        for round in 0..rounds {
+            let mut taken = [[f64::NAN; ITERATIONS]; 4];
+            for at in 0..variants.len() {
+                // Pairs change places from round to round.
+                let variant = at ^ (round & 1) as usize;
                 let mut last = None;
-                render(&scene, &camera, settings, |progress, _| {
+                render(&scene, &camera, &variants[variant].1, |progress, _| {
                     let now = cpu_seconds();
-                    let at = progress.iteration as usize - 1;
                     if let Some(last) = last.replace(now) {
-                        least[at] = least[at].min(now - last);
+                        taken[variant][progress.iteration as usize - 1] = now - last;
                     }
                     Control::Continue
                 });
             }
+            // The first iteration has the pilot and whatever is made once.
+            ratios.extend((1..ITERATIONS).map(|i| taken[1][i] / taken[0][i]));
+            for (least, taken) in least.as_flattened_mut().iter_mut().zip(taken.as_flattened()) {
+                *least = least.min(*taken);
+            }
         }
-        // The first iteration has the pilot and whatever is made once.
         let best = least.map(|least| least[1..].iter().sum::<f64>() / (ITERATIONS - 1) as f64);
         println!("{path}, {:?}, {levels} level(s), core-seconds per iteration (least of {rounds})", camera.size());
         for (seconds, (name, _)) in best.iter().zip(&variants) {
             println!("{name:<24}{seconds:>8.3}");
         }
-        let rule = (best[1] / best[0] - 1.0) * 100.0;
-        println!("the rule: {rule:+.1} %");
+        ratios.sort_by(f64::total_cmp);
+        let [low, rule, high] =
+            [0.25, 0.5, 0.75].map(|q| (ratios[(q * (ratios.len() - 1) as f64).round() as usize] - 1.0) * 100.0);
+        println!(
+            "the rule: {rule:+.1} % (median of {} pairs; quartiles {low:+.1} and {high:+.1}; by the least {:+.1})",
+            ratios.len(),
+            (best[1] / best[0] - 1.0) * 100.0
+        );
         let state = levels * (12 * 4 + 8);
         let pixel = size_of::<caustique::estimator::Pixel>();
         let share = state as f64 / pixel as f64 * 100.0;

@@ -83,6 +83,8 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         bandwidth.radius2
     }
 
+    const BEYOND: bool = true;
+
     #[inline]
     fn reach2(&self, bandwidths: &[Bandwidth], largest2: f32) -> f32 {
         bandwidths.last().map_or(largest2, |bandwidth| bandwidth.pilot2.max(largest2))

@@ -7,7 +7,7 @@ use super::CountingRule;
 use crate::math::{Frame, Vec3};
 use crate::transport::{Found, MAX_LEVELS};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
-use wide::{CmpEq, CmpGe, CmpLt, CmpNe, f32x8};
+use wide::{CmpGt, CmpLt, f32x8};
 
 /// Parameters, with the paper's defaults (section 9.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +40,8 @@ pub const LEAST_BOUND: f32 = 10.0;
 pub struct ChiSquared {
     annuli: usize,
     sectors: usize,
+    /// Both as numbers of the kind that photons are counted with.
+    cells: [f32; 2],
     k: f32,
     beta: f32,
     /// Quantile for the disc of the `j + 1` innermost annuli; infinite where there is but one cell.
@@ -73,6 +75,7 @@ impl ChiSquared {
         ChiSquared {
             annuli,
             sectors,
+            cells: [annuli as f32, sectors as f32],
             k: k as f32,
             beta: beta as f32,
             critical: (1..=annuli).map(|annuli| quantile(annuli * sectors)).collect(),
@@ -84,7 +87,8 @@ impl ChiSquared {
     /// the normal through the point has none and counts in the first sector.
     #[inline]
     fn sectors(&self, frame: &Frame, [x, y, z]: &[f32x8; 3]) -> f32x8 {
-        let along = |axis: Vec3| *x * axis.x + *y * axis.y + *z * axis.z;
+        let by = f32x8::splat;
+        let along = |axis: Vec3| x.mul_add(by(axis.x), y.mul_add(by(axis.y), *z * axis.z));
         let (u, v) = (along(frame.t), along(frame.b));
         if !self.sectors.is_multiple_of(2) {
             let turn = |u: f32, v: f32| (v.atan2(u) / std::f32::consts::TAU).rem_euclid(1.0);
@@ -93,15 +97,13 @@ impl ChiSquared {
             let sector = |k: usize| (turn(u[k], v[k]) * self.sectors as f32).floor().min(last);
             return f32x8::from(std::array::from_fn(sector));
         }
-        // The lower half is the upper, turned by half the sectors.
-        let (zero, one) = (f32x8::ZERO, f32x8::ONE);
-        let lower = v.cmp_lt(zero) | (v.cmp_eq(zero) & u.cmp_lt(zero));
-        let sign = lower.blend(-one, one);
-        let (u, v) = (u * sign, v * sign);
-        let somewhere = u.cmp_ne(zero) | v.cmp_ne(zero);
-        let mut passed = lower & f32x8::splat((self.sectors / 2) as f32);
+        // The lower half is the upper, turned by half the sectors. A border belongs to the sector before it.
+        let lower = v.cmp_lt(f32x8::ZERO);
+        let sign = lower & by(-0.0);
+        let (u, v) = (u ^ sign, v ^ sign);
+        let mut passed = lower & by(0.5 * self.cells[1]);
         for &(c, s) in &self.borders {
-            passed += (v * c - u * s).cmp_ge(zero) & somewhere & one;
+            passed += (v * c).cmp_gt(u * s) & f32x8::ONE;
         }
         passed
     }
@@ -186,10 +188,10 @@ impl CountingRule for ChiSquared {
         bandwidth.radius2
     }
 
-    #[inline]
+    #[inline(always)]
     fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
         let sectors = self.sectors(frame, &photons.offset);
-        let (annuli, each, cells) = (self.annuli as f32, self.sectors as f32, self.tallies());
+        let ([annuli, each], cells) = (self.cells, self.tallies());
         let mut counted = 0;
         // Photons within each level, eight bits a level, and their cells among all of them: one loop over all, the length of which is guessed once.
         let (mut within, mut at) = (0u64, [[0i32; 8]; MAX_LEVELS]);
@@ -197,13 +199,14 @@ impl CountingRule for ChiSquared {
             let inside = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
             let annulus =
                 (photons.distance2 * (annuli / bandwidth.radius2)).floor().fast_min(f32x8::splat(annuli - 1.0));
-            *at = (annulus * each + sectors + (level * cells) as f32).fast_trunc_int().to_array();
+            *at = annulus.mul_add(f32x8::splat(each), sectors).fast_trunc_int().to_array();
             within |= (inside as u64) << (8 * level);
             counted |= u32::from(inside != 0) << level;
         }
         let at = at.as_flattened();
         while within != 0 {
-            counts[at[within.trailing_zeros() as usize] as usize] += 1;
+            let photon = within.trailing_zeros() as usize;
+            counts[photon / 8 * cells + at[photon] as usize] += 1;
             within &= within - 1;
         }
         counted

@@ -17,6 +17,9 @@ pub trait CountingRule: Sync {
     /// What is counted.
     type Tally: Copy + Default + Send + Sync;
 
+    /// Whether photons beyond the largest bandwidth may be counted.
+    const BEYOND: bool = false;
+
     /// Tallies per bandwidth.
     fn tallies(&self) -> usize {
         1
@@ -26,7 +29,7 @@ pub trait CountingRule: Sync {
     fn begin(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
     /// Its radius squared.
     fn radius2(bandwidth: &Self::Bandwidth) -> f32;
-    /// Radius squared within which photons are to be counted.
+    /// Radius squared within which photons are to be counted, if [`CountingRule::BEYOND`].
     #[inline]
     fn reach2(&self, bandwidths: &[Self::Bandwidth], largest2: f32) -> f32 {
         let _ = bandwidths;
