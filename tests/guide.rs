@@ -252,6 +252,27 @@ fn effects_are_weighed() {
     }
 }
 
+/// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor the light: what guided ones find tells.
+#[test]
+fn rare_caustics_are_left_to_guided_light_paths() {
+    let mut description = Description::default();
+    add(
+        &mut description,
+        "hall",
+        cuboid(Vec3::new(-20.0, 0.0, -20.0), Vec3::new(20.0, 30.0, 20.0), true),
+        matte(0.3, 0.0),
+    );
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.1, 0.0), 0.05, 64), glass(1.5));
+    description.lights.push(point_light(DVec3::new(8.0, 20.0, 0.0), 5000.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.5), DVec3::new(0.0, 0.05, 0.0), 50.0));
+    let choice = auto(&build(description), 2, 20_000);
+    for trial in &choice.trials {
+        println!("{}: {:.3e}, caustics {:.4}", trial.way.name(), trial.expected, trial.caustics);
+        assert_eq!(trial.expected.is_infinite(), !trial.way.guided);
+    }
+    assert!(choice.trials.len() == 3 && choice.way.guided, "{}", choice.way.name());
+}
+
 /// What a scene does not call for is not tried, and a short render tries nothing.
 #[test]
 fn only_what_is_called_for_is_tried() {

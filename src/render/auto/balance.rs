@@ -12,12 +12,14 @@ use crate::render::settings::Settings;
 
 /// Bounds of what the usual settings are multiplied by: estimates are rough, and the combiner has learnt on the usual ones.
 const NEIGHBOURS: (f64, f64) = (1.0, 4.0);
-const PHOTONS: (f64, f64) = (0.25, 4.0);
+const PHOTONS: (f64, f64) = (1.0 / 16.0, 4.0);
 /// And of the area that they are found in.
-const AREA: (f64, f64) = (0.5, 4.0);
+const AREA: (f64, f64) = (0.5, 16.0);
 
 /// Steps in which either is searched.
 const STEPS: u32 = 48;
+/// What rounding may do to a step.
+const ROUNDING: f64 = 1e-9;
 
 /// Factors of the usual settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +46,8 @@ impl Balance {
             (0..=STEPS).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(STEPS)))
         };
         let all = steps(PHOTONS).flat_map(|q| steps(NEIGHBOURS).map(move |neighbours| (neighbours, q)));
-        let all = all.filter(|(neighbours, q)| (AREA.0..=AREA.1).contains(&(neighbours / q)));
+        let bounds = AREA.0 * (1.0 - ROUNDING)..AREA.1 * (1.0 + ROUNDING);
+        let all = all.filter(|(neighbours, q)| bounds.contains(&(neighbours / q)));
         let usual = (error(1.0, 1.0), Balance::USUAL);
         let better = |best: (f64, Balance), (neighbours, photons): (f64, f64)| {
             let error = error(neighbours, photons);

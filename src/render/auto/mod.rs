@@ -46,6 +46,8 @@ const CORES: f64 = 2.0;
 const UNLIMITED: f64 = 1000.0;
 /// A candidate that finds less than this share of the caustics that photons find has not seen them all, and its noise is not known.
 const FOUND: f64 = 0.7;
+/// The same for one that sends photons, of the caustics that guided ones find: those of either kind are a few bright discs where they are rare.
+const SENT: f64 = 0.25;
 
 /// A way to render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -279,10 +281,14 @@ impl<'a> Pilot<'a> {
 
 /// Rules out what has not seen the caustics that photons show.
 fn rule_out(trials: &mut [Trial]) {
-    let gathers = |trial: &&Trial| trial.way.method.gathers() && trial.way.indirect == Indirect::Photons;
-    let caustics = trials.iter().filter(gathers).map(|trial| trial.caustics).fold(0.0, f64::max);
-    for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
-        if trial.caustics < FOUND * caustics {
+    let most = |guided: bool| {
+        let gathers = |trial: &&Trial| trial.way.method.gathers() && trial.way.guided == guided;
+        trials.iter().filter(gathers).map(|trial| trial.caustics).fold(0.0, f64::max)
+    };
+    let [unguided, guided] = [false, true].map(most);
+    for trial in trials.iter_mut().filter(|trial| !trial.way.guided) {
+        let least = if trial.way.method.has_bandwidths() { SENT * guided } else { FOUND * unguided.max(guided) };
+        if trial.caustics < least {
             trial.expected = f64::INFINITY;
         }
     }
