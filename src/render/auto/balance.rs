@@ -21,6 +21,10 @@ const STEPS: u32 = 48;
 /// What rounding may do to a step.
 const ROUNDING: f64 = 1e-9;
 
+fn steps((low, high): (f64, f64)) -> impl Iterator<Item = f64> {
+    (0..=STEPS).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(STEPS)))
+}
+
 /// Factors of the usual settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
@@ -42,9 +46,6 @@ impl Balance {
             let n = (eye_cost + light_cost) / (eye_cost + q * light_cost);
             fixed / n + photons / (n * neighbours) + bias.at(neighbours / q)
         };
-        let steps = |(low, high): (f64, f64)| {
-            (0..=STEPS).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(STEPS)))
-        };
         let all = steps(PHOTONS).flat_map(|q| steps(NEIGHBOURS).map(move |neighbours| (neighbours, q)));
         let bounds = AREA.0 * (1.0 - ROUNDING)..AREA.1 * (1.0 + ROUNDING);
         let all = all.filter(|(neighbours, q)| bounds.contains(&(neighbours / q)));
@@ -54,6 +55,21 @@ impl Balance {
             if error < best.0 { (error, Balance { neighbours, photons }) } else { best }
         };
         all.fold(usual, better).1
+    }
+
+    /// The same where bandwidths follow the photons' counts, and so the number of all photons sent, whatever the iterations that send them: `error` is that
+    /// of so many light paths in so many iterations, over those of the usual settings.
+    pub(super) fn counted(error: impl Fn(f64, f64) -> f64, eye_cost: f64, light_cost: f64) -> Balance {
+        let with = |photons: f64| {
+            let n = (eye_cost + light_cost) / (eye_cost + photons * light_cost);
+            (error(n * photons, n), Balance { photons, ..Balance::USUAL })
+        };
+        let better = |best: (f64, Balance), other: (f64, Balance)| if other.0 < best.0 { other } else { best };
+        steps(PHOTONS)
+            .filter(|q| *q * AREA.1 >= 1.0 - ROUNDING && *q * AREA.0 <= 1.0 + ROUNDING)
+            .map(with)
+            .fold(with(1.0), better)
+            .1
     }
 
     /// Leaves alone what the user has asked for.
@@ -78,6 +94,19 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Many light paths where only their number counts, few where only iterations do, as far as areas may go; in between where the parts are equal:
+    /// a (1 + q) + b (1 + q) / q is least where q^2 = b / a.
+    #[test]
+    fn counting_rules_ask_for_photons_in_all() {
+        let of = |a: f64, b: f64| Balance::counted(move |photons, n| a / n + b / photons, 1.0, 1.0);
+        let close = |photons: f64, to: f64| assert!((photons / to - 1.0).abs() < 2.0 * ROUNDING, "{photons} for {to}");
+        close(of(0.0, 1.0).photons, 1.0 / AREA.0);
+        close(of(1.0, 0.0).photons, 1.0 / AREA.1);
+        let between = of(4.0, 1.0);
+        assert!((between.photons * 2.0 - 1.0).abs() < 0.05 && between.neighbours == 1.0, "{between:?}");
+        assert_eq!(of(0.0, 0.0), Balance::USUAL);
+    }
 
     /// Where one part rules, the factors go where it falls; where nothing can be had, they stay.
     #[test]

@@ -211,17 +211,20 @@ impl Trial {
             (counted * photons / n.powf(alpha), Bias { squared: counted * bias.squared, ..bias })
         };
         let usual = plan.budget / all / done;
-        let mut balance = if gathers {
+        let tail = |n: f64| sums.tail.sum(NOBODYS, WORST) * sums.tail.after(n);
+        let mut balance = if counted {
+            let error = |photons: f64, n: f64| {
+                let (photons, bias) = ruled(photons * usual);
+                (1.0 - WORST) * (fixed / (n * usual) + photons + bias.at(1.0)) + tail(n * usual)
+            };
+            Balance::counted(error, all - light, light)
+        } else if gathers {
             let (photons, bias) = ruled(usual);
             Balance::new(fixed / usual, photons, bias, all - light, light)
         } else {
             Balance::USUAL
         };
         balance.keep(plan.free);
-        if counted {
-            // They find their own size.
-            balance.neighbours = 1.0;
-        }
         let mut balanced = of.clone();
         balance.apply(&mut balanced);
         let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
@@ -230,17 +233,17 @@ impl Trial {
             + match of.method {
                 Method::Path | Method::Bdpt => 0.0,
                 _ => {
-                    let (photons, bias) = ruled(n);
-                    photons / balance.neighbours + bias.at(balance.neighbours / balance.photons)
+                    let (photons, bias) = ruled(if counted { n * balance.photons } else { n });
+                    let area = if counted { 1.0 } else { balance.neighbours / balance.photons };
+                    photons / balance.neighbours + bias.at(area)
                 }
             };
-        let tail = sums.tail.sum(NOBODYS, WORST) * sums.tail.after(n);
         Trial {
             way,
             caustics: sums.caustics / sums.light.max(f64::MIN_POSITIVE),
             seconds_per_iteration,
             cost,
-            expected: (1.0 - WORST) * mean + tail,
+            expected: (1.0 - WORST) * mean + tail(n),
             balance,
         }
     }
