@@ -72,6 +72,8 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     type Bandwidth = Bandwidth;
     type Tally = Tally;
 
+    const BEYOND: bool = true;
+
     fn begin(&self, radius2: f32, _: f32, above: i32) -> Bandwidth {
         let scale = 2f32.powi(above);
         let pilot2 = PILOT * radius2 / scale;
@@ -82,8 +84,6 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     fn radius2(bandwidth: &Bandwidth) -> f32 {
         bandwidth.radius2
     }
-
-    const BEYOND: bool = true;
 
     #[inline]
     fn reach2(&self, bandwidths: &[Bandwidth], largest2: f32) -> f32 {

@@ -41,35 +41,38 @@ impl Balance {
     /// The factors of least error for a given cost. `fixed` and `photons`: the parts a and b / p of the variance; `bias`: c and e, all for the usual
     /// settings after as many iterations; costs of an iteration: of its eye paths, and of its light paths.
     pub(super) fn new(fixed: f64, photons: f64, bias: Bias, eye_cost: f64, light_cost: f64) -> Balance {
-        // For the cost of one iteration of the usual settings; neighbours are area times light paths.
-        let error = |neighbours: f64, q: f64| {
-            let n = (eye_cost + light_cost) / (eye_cost + q * light_cost);
-            fixed / n + photons / (n * neighbours) + bias.at(neighbours / q)
+        // Neighbours are area times light paths.
+        let error = |balance: Balance, n: f64| {
+            fixed / n + photons / (n * balance.neighbours) + bias.at(balance.neighbours / balance.photons)
         };
-        let all = steps(PHOTONS).flat_map(|q| steps(NEIGHBOURS).map(move |neighbours| (neighbours, q)));
-        let bounds = AREA.0 * (1.0 - ROUNDING)..AREA.1 * (1.0 + ROUNDING);
-        let all = all.filter(|(neighbours, q)| bounds.contains(&(neighbours / q)));
-        let usual = (error(1.0, 1.0), Balance::USUAL);
-        let better = |best: (f64, Balance), (neighbours, photons): (f64, f64)| {
-            let error = error(neighbours, photons);
-            if error < best.0 { (error, Balance { neighbours, photons }) } else { best }
-        };
-        all.fold(usual, better).1
+        let all =
+            steps(PHOTONS).flat_map(|photons| steps(NEIGHBOURS).map(move |neighbours| Balance { neighbours, photons }));
+        Balance::least(all, error, eye_cost, light_cost)
     }
 
     /// The same where bandwidths follow the photons' counts, and so the number of all photons sent, whatever the iterations that send them: `error` is that
-    /// of so many light paths in so many iterations, over those of the usual settings.
-    pub(super) fn counted(error: impl Fn(f64, f64) -> f64, eye_cost: f64, light_cost: f64) -> Balance {
-        let with = |photons: f64| {
-            let n = (eye_cost + light_cost) / (eye_cost + photons * light_cost);
-            (error(n * photons, n), Balance { photons, ..Balance::USUAL })
+    /// of some factors in so many iterations, over those of the usual settings.
+    pub(super) fn counted(error: impl Fn(Balance, f64) -> f64, eye_cost: f64, light_cost: f64) -> Balance {
+        let all = steps(PHOTONS).map(|photons| Balance { photons, ..Balance::USUAL });
+        Balance::least(all, error, eye_cost, light_cost)
+    }
+
+    /// Those of some, in areas within bounds, whose error is least in as many iterations as take as long as one of the usual settings.
+    fn least(
+        all: impl Iterator<Item = Balance>,
+        error: impl Fn(Balance, f64) -> f64,
+        eye_cost: f64,
+        light_cost: f64,
+    ) -> Balance {
+        let error =
+            |balance: Balance| error(balance, (eye_cost + light_cost) / (eye_cost + balance.photons * light_cost));
+        let bounds = AREA.0 * (1.0 - ROUNDING)..AREA.1 * (1.0 + ROUNDING);
+        let better = |best: (f64, Balance), balance: Balance| {
+            let error = error(balance);
+            if error < best.0 { (error, balance) } else { best }
         };
-        let better = |best: (f64, Balance), other: (f64, Balance)| if other.0 < best.0 { other } else { best };
-        steps(PHOTONS)
-            .filter(|q| *q * AREA.1 >= 1.0 - ROUNDING && *q * AREA.0 <= 1.0 + ROUNDING)
-            .map(with)
-            .fold(with(1.0), better)
-            .1
+        let usual = (error(Balance::USUAL), Balance::USUAL);
+        all.filter(|balance| bounds.contains(&(balance.neighbours / balance.photons))).fold(usual, better).1
     }
 
     /// Leaves alone what the user has asked for.
@@ -99,7 +102,7 @@ mod tests {
     /// a (1 + q) + b (1 + q) / q is least where q^2 = b / a.
     #[test]
     fn counting_rules_ask_for_photons_in_all() {
-        let of = |a: f64, b: f64| Balance::counted(move |photons, n| a / n + b / photons, 1.0, 1.0);
+        let of = |a: f64, b: f64| Balance::counted(move |balance, n| a / n + b / (n * balance.photons), 1.0, 1.0);
         let close = |photons: f64, to: f64| assert!((photons / to - 1.0).abs() < 2.0 * ROUNDING, "{photons} for {to}");
         close(of(0.0, 1.0).photons, 1.0 / AREA.0);
         close(of(1.0, 0.0).photons, 1.0 / AREA.1);

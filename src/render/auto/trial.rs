@@ -212,12 +212,15 @@ impl Trial {
         };
         let usual = plan.budget / all / done;
         let tail = |n: f64| sums.tail.sum(NOBODYS, WORST) * sums.tail.after(n);
+        // relMSE after as many; where photons are counted, bandwidths follow the number of all that are sent.
+        let expected = |balance: Balance, n: f64| {
+            let area = balance.neighbours / balance.photons;
+            let (sent, area) = if counted { (n * balance.photons, 1.0) } else { (n, area) };
+            let (photons, bias) = ruled(sent);
+            (1.0 - WORST) * (fixed / n + photons / balance.neighbours + bias.at(area)) + tail(n)
+        };
         let mut balance = if counted {
-            let error = |photons: f64, n: f64| {
-                let (photons, bias) = ruled(photons * usual);
-                (1.0 - WORST) * (fixed / (n * usual) + photons + bias.at(1.0)) + tail(n * usual)
-            };
-            Balance::counted(error, all - light, light)
+            Balance::counted(|balance, n| expected(balance, n * usual), all - light, light)
         } else if gathers {
             let (photons, bias) = ruled(usual);
             Balance::new(fixed / usual, photons, bias, all - light, light)
@@ -229,21 +232,12 @@ impl Trial {
         balance.apply(&mut balanced);
         let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
-        let mean = fixed / n
-            + match of.method {
-                Method::Path | Method::Bdpt => 0.0,
-                _ => {
-                    let (photons, bias) = ruled(if counted { n * balance.photons } else { n });
-                    let area = if counted { 1.0 } else { balance.neighbours / balance.photons };
-                    photons / balance.neighbours + bias.at(area)
-                }
-            };
         Trial {
             way,
             caustics: sums.caustics / sums.light.max(f64::MIN_POSITIVE),
             seconds_per_iteration,
             cost,
-            expected: (1.0 - WORST) * mean + tail(n),
+            expected: expected(balance, n),
             balance,
         }
     }
