@@ -32,8 +32,11 @@ struct States<'a, R: CountingRule> {
 
 impl<R: CountingRule> States<'_, R> {
     /// Each level may shrink on its own, so they may change places.
-    #[inline]
+    #[inline(always)]
     fn radii(&self) -> LevelRadii {
+        if let [only] = &self.bandwidths {
+            return LevelRadii::one(R::radius2(only));
+        }
         if self.bandwidths.is_sorted_by_key(R::radius2) {
             return LevelRadii::new(self.bandwidths.iter().map(R::radius2));
         }
@@ -57,19 +60,19 @@ struct Layout {
 
 impl Layout {
     /// Bandwidths of a kind of a channel.
-    #[inline]
+    #[inline(always)]
     fn of_kind(&self, kind: Kind) -> usize {
         if self.kinds[kind as usize] { self.levels } else { 0 }
     }
 
     /// Bandwidths of a channel.
-    #[inline]
+    #[inline(always)]
     fn count(&self) -> usize {
         self.of_kind(Kind::Indirect) + self.of_kind(Kind::Caustic)
     }
 
     /// Some levels of a channel, of all that a pixel has.
-    #[inline]
+    #[inline(always)]
     fn states<'a, R: CountingRule>(
         &self,
         channel: usize,
@@ -100,13 +103,13 @@ struct Counter<'a, R: CountingRule> {
 }
 
 impl<'a, R: CountingRule> Counter<'a, R> {
-    #[inline]
+    #[inline(always)]
     fn new(rule: &'a R, states: ByKind<States<'a, R>>) -> Counter<'a, R> {
         Counter { rule, states, kind: Kind::Indirect, frame: Frame::from_normal(Vec3::Z) }
     }
 
     /// After the eye path of iteration `i`.
-    #[inline]
+    #[inline(always)]
     fn finish(self, i: u64) {
         for States { bandwidths, tallies, counted } in self.states {
             self.rule.update(i, bandwidths, tallies, counted);
@@ -118,7 +121,7 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
     const COUNTS: bool = true;
     const BEYOND: bool = R::BEYOND;
 
-    #[inline]
+    #[inline(always)]
     fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {
         // One function of the normal in all iterations: counts of different gathering points are added.
         (self.kind, self.frame) = (kind, Frame::from_normal(ng));

@@ -35,6 +35,12 @@ impl LevelRadii {
         radii
     }
 
+    /// Of a single level.
+    #[inline]
+    pub fn one(radius2: f32) -> LevelRadii {
+        LevelRadii { radius2: [radius2, 0.0, 0.0, 0.0, 0.0], count: 1, later2: f32::INFINITY, order: [0, 1, 2, 3, 4] }
+    }
+
     /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
     /// its path may come to where they are dense, which nobody sees sharply.
     #[inline]

@@ -3,10 +3,10 @@
 use super::bandwidths::{Bandwidths, Found, MAX_LEVELS};
 use super::walk::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
-use crate::math::{Rgb, Vec3, Vec3A};
+use crate::math::{Rgb, Vec3};
 use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
 use bumpalo::Bump;
-use wide::{CmpEq, f32x8};
+use wide::{CmpEq, CmpLt, f32x8};
 
 /// What a worker keeps from eye path to eye path of one pass.
 #[derive(Default)]
@@ -19,11 +19,13 @@ pub struct Scratch {
     pub(super) near_volume: Near<VolumePhoton>,
 }
 
-/// One bin per level, and one for those beyond the largest bandwidth, which are only counted.
-const BINS: usize = MAX_LEVELS + 1;
+/// A photon that is waiting: the direction of its light, its cosine, its flux, and how far it is from the gathering point, squared.
+type Row = [f32; 8];
 
-/// Photons of one kind waiting for their BSDF, and the sums of those that have had it. With the box kernel a photon is in the bin of
-/// the smallest level that holds it, and levels are sums of bins; with others it has its weight in every level.
+/// In the place of a photon that is not there: it has no cosine, so it brings nothing.
+const ABSENT: Row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f32::INFINITY];
+
+/// Photons of one kind waiting for their BSDF, and the sums of those that have had it.
 pub(super) struct Batch<'a, K> {
     kernel: std::marker::PhantomData<K>,
     radii: &'a [f32],
@@ -33,15 +35,11 @@ pub(super) struct Batch<'a, K> {
     /// For photons that no eye path that goes on could find; `None` where it is the same.
     unreachable: Option<Gathering<'a>>,
     count: usize,
-    wi: [[f32; 8]; 3],
-    cosine: [f32; 8],
-    flux: [[f32; 8]; 3],
-    bin: [u8; 8],
+    rows: [Row; 8],
     /// For those who count: where they are from the gathering point.
     offset: [[f32; 8]; 3],
-    /// For those and for kernels: their distance squared.
-    distance2: [f32; 8],
-    bins: [Vec3A; BINS],
+    /// By level, of every eighth photon.
+    sums: [[f32x8; 3]; MAX_LEVELS],
 }
 
 impl<'a, K: Kernel> Batch<'a, K> {
@@ -57,41 +55,25 @@ impl<'a, K: Kernel> Batch<'a, K> {
             gathering: shading.gathering(set),
             unreachable: (set != all).then(|| shading.gathering(all)),
             count: 0,
-            wi: [[0.0; 8]; 3],
-            cosine: [0.0; 8],
-            flux: [[0.0; 8]; 3],
-            bin: [0; 8],
+            rows: [ABSENT; 8],
             offset: [[0.0; 8]; 3],
-            distance2: [f32::INFINITY; 8],
-            bins: [Vec3A::ZERO; BINS],
+            sums: [[f32x8::ZERO; 3]; MAX_LEVELS],
         }
     }
 
     /// Adds a photon at a distance squared within reach.
     #[inline(always)]
     pub fn push<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
-        let mut level = 0;
-        let last = self.radii.len() - usize::from(!B::BEYOND);
-        for &radius2 in &self.radii[..last] {
-            level += usize::from(distance2 >= radius2);
-        }
         if photon.flags.has(PhotonFlags::UNREACHABLE) && self.unreachable.is_some() {
-            return self.push_unreachable(photon, level, distance2, counter);
+            return self.push_unreachable(photon, distance2, counter);
         }
         let at = self.count;
-        for axis in 0..3 {
-            self.wi[axis][at] = photon.wi[axis];
-            self.flux[axis][at] = photon.flux[axis];
-        }
-        self.cosine[at] = photon.cosine();
-        self.bin[at] = level as u8;
+        let Photon { wi, flux, .. } = photon;
+        self.rows[at] = [wi.x, wi.y, wi.z, photon.cosine(), flux.x, flux.y, flux.z, distance2];
         if B::COUNTS {
             for axis in 0..3 {
                 self.offset[axis][at] = photon.p[axis] - self.p[axis];
             }
-        }
-        if B::COUNTS || !K::BOX {
-            self.distance2[at] = distance2;
         }
         self.count += 1;
         if self.count == 8 {
@@ -101,62 +83,60 @@ impl<'a, K: Kernel> Batch<'a, K> {
 
     /// Adds a photon that no eye path could find: few, and out of the way of the others.
     #[inline(never)]
-    fn push_unreachable<B: Bandwidths>(&mut self, photon: &Photon, level: usize, distance2: f32, counter: &mut B) {
+    fn push_unreachable<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
         let Some(gathering) = &self.unreachable else { return };
         let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
-        self.add(level, light.into(), distance2);
+        let found = Found::one(photon.p - self.p, distance2, (light * self.throughput).element_sum() / 3.0);
+        self.add::<B>(&light.to_array().map(|light| f32x8::from([light, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), found.distance2);
         if B::COUNTS && light != Rgb::ZERO {
-            let light = (light * self.throughput).element_sum() / 3.0;
-            counter.count(&Found::one(photon.p - self.p, distance2, light));
+            counter.count(&found);
         }
     }
 
     #[inline(never)]
     fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
-        let f = self.gathering.eight(self.wi.map(f32x8::from), f32x8::from(self.cosine));
-        let found: [f32x8; 3] = std::array::from_fn(|c| f[c] * f32x8::from(self.flux[c]));
-        let [r, g, b] = found.map(f32x8::to_array);
-        for k in 0..self.count {
-            self.add(usize::from(self.bin[k]), Vec3A::new(r[k], g[k], b[k]), self.distance2[k]);
-        }
+        let [x, y, z, cosine, red, green, blue, distance2] = f32x8::transpose(self.rows.map(f32x8::from));
+        let f = self.gathering.eight([x, y, z], cosine);
+        let found = [f[0] * red, f[1] * green, f[2] * blue];
+        self.add::<B>(&found, distance2);
         if B::COUNTS {
-            // What is left of the last eight is not there, nor are photons that bring nothing [CPPM 2020, 7.2].
-            self.distance2[self.count..].fill(f32::INFINITY);
             let light = found[0] * self.throughput.x + found[1] * self.throughput.y + found[2] * self.throughput.z;
+            // Photons that bring nothing do not count [CPPM 2020, 7.2].
             let dark = light.cmp_eq(f32x8::ZERO);
             counter.count(&Found {
                 offset: self.offset.map(f32x8::from),
-                distance2: dark.blend(f32x8::splat(f32::INFINITY), f32x8::from(self.distance2)),
+                distance2: dark.blend(f32x8::splat(f32::INFINITY), distance2),
                 light: light * (1.0 / 3.0),
             });
         }
         self.count = 0;
     }
 
-    /// Adds what a photon brings to the levels that hold it.
+    /// Adds what photons bring to the levels that hold them.
     #[inline(always)]
-    fn add(&mut self, level: usize, light: Vec3A, distance2: f32) {
-        if K::BOX {
-            self.bins[level] += light;
-        } else {
-            for (bin, radius2) in self.bins.iter_mut().zip(self.radii).skip(level) {
-                *bin += light * K::weight(distance2 / radius2);
+    fn add<B: Bandwidths>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
+        // What is within reach is within the largest.
+        if K::BOX && !B::BEYOND && self.radii.len() == 1 {
+            self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
+            return;
+        }
+        for (sums, &radius2) in self.sums.iter_mut().zip(self.radii) {
+            let within = distance2.cmp_lt(f32x8::splat(radius2));
+            let weight = if K::BOX { f32x8::ONE } else { f32x8::from((distance2 / radius2).to_array().map(K::weight)) };
+            for (sum, light) in sums.iter_mut().zip(light) {
+                // What is not there is infinitely far away, and its product not a number: masked last.
+                *sum += within & if K::BOX { *light } else { *light * weight };
             }
         }
     }
 
     /// The sums by level.
     #[inline]
-    pub fn finish<B: Bandwidths>(&mut self, counter: &mut B) -> [Rgb; BINS] {
+    pub fn finish<B: Bandwidths>(&mut self, counter: &mut B) -> [Rgb; MAX_LEVELS] {
         if self.count > 0 {
+            self.rows[self.count..].fill(ABSENT);
             self.flush(counter);
         }
-        if K::BOX {
-            for level in 1..self.radii.len() {
-                let within = self.bins[level - 1];
-                self.bins[level] += within;
-            }
-        }
-        self.bins.map(Rgb::from)
+        self.sums.map(|sums| Rgb::from(sums.map(f32x8::reduce_add)))
     }
 }

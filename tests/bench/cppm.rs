@@ -1,12 +1,13 @@
 //! The chi-squared rule on its own: how often it rejects uniform photons, at how many of them and over how many looks, and what it costs.
 //!
-//! `cargo bench --bench cppm -- [SCENE.glb] [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/figures`. With a scene named, only what the rule costs there.
+//! `cargo bench --bench cppm -- [SCENE.glb] [WIDTH] [ITERATIONS]`; the last line is JSON for `scripts/figures`. With a scene named, only what the rule costs there.
 
+use caustique::camera::Camera;
 use caustique::estimator::rule::CountingRule;
 use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings};
 use caustique::math::{Frame, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::render::{Control, Levels, Method, Settings, cpu_seconds, render};
+use caustique::render::{Levels, Method, Session, Settings, Stage};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
 use caustique::transport::Found;
@@ -17,8 +18,6 @@ const TRIALS: u64 = 100_000;
 /// Pixels and iterations of the look after look at uniform light.
 const PIXELS: u64 = 4000;
 const LOOKS: u64 = 1000;
-/// Iterations of renders whose cost is measured.
-const ITERATIONS: usize = 8;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -109,7 +108,7 @@ fn looks() -> Value {
 fn cost(arguments: &[String]) -> Value {
     let path = arguments.first().map_or("scenes/interior.glb", String::as_str);
     let number = |i: usize, default: u32| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
-    let (width, rounds) = (number(1, 640), number(2, 12));
+    let (width, iterations) = (number(1, 640), number(2, 60) as usize);
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
     let view = View { camera: None, width: Some(width), height: None };
@@ -117,55 +116,75 @@ fn cost(arguments: &[String]) -> Value {
     let mut rows = Vec::new();
     for levels in [1, 5] {
         let never = ChiSquaredSettings { significance: 1e-300, ..ChiSquaredSettings::default() };
-        let base = Settings { levels: Levels::new(levels), iterations: Some(ITERATIONS as u64), ..Settings::default() };
-        let variants = [
-            ("sppm, bandwidths stay", Settings { alpha: 1.0, ..base.clone() }),
-            ("cppm, bandwidths stay", Settings { method: Method::Cppm, chi_squared: never, ..base.clone() }),
-            ("sppm", base.clone()),
-            ("cppm", Settings { method: Method::Cppm, ..base }),
-        ];
-        // Of every iteration the least of all rounds, the variants one after the other: what a noisy machine adds is not theirs.
-        let mut least = [[f64::INFINITY; ITERATIONS]; 4];
-        // With the rule over without it, iterations of renders that followed one another, in either order.
-        let mut ratios = Vec::new();
-        for round in 0..rounds {
-            let mut taken = [[f64::NAN; ITERATIONS]; 4];
-            for at in 0..variants.len() {
-                // Pairs change places from round to round.
-                let variant = at ^ (round & 1) as usize;
-                let mut last = None;
-                render(&scene, &camera, &variants[variant].1, |progress, _| {
-                    let now = cpu_seconds();
-                    if let Some(last) = last.replace(now) {
-                        taken[variant][progress.iteration as usize - 1] = now - last;
-                    }
-                    Control::Continue
-                });
-            }
-            // The first iteration has the pilot and whatever is made once.
-            ratios.extend((1..ITERATIONS).map(|i| taken[1][i] / taken[0][i]));
-            for (least, taken) in least.as_flattened_mut().iter_mut().zip(taken.as_flattened()) {
-                *least = least.min(*taken);
-            }
-        }
-        let best = least.map(|least| least[1..].iter().sum::<f64>() / (ITERATIONS - 1) as f64);
-        println!("{path}, {:?}, {levels} level(s), core-seconds per iteration (least of {rounds})", camera.size());
-        for (seconds, (name, _)) in best.iter().zip(&variants) {
+        let base = Settings { levels: Levels::new(levels), ..Settings::default() };
+        let stay = Settings { alpha: 1.0, ..base.clone() };
+        let rule = Settings { method: Method::Cppm, chi_squared: never, ..base.clone() };
+        let kept = Steps::of(&scene, &camera, [&stay, &rule], iterations);
+        let own = Steps::of(&scene, &camera, [&base, &Settings { method: Method::Cppm, ..base.clone() }], iterations);
+        println!("{path}, {:?}, {levels} level(s), core-seconds per iteration (median of {iterations})", camera.size());
+        let seconds = [kept.seconds(0), kept.seconds(1), own.seconds(0), own.seconds(1)];
+        for (seconds, name) in seconds.iter().zip(["sppm, bandwidths stay", "cppm, bandwidths stay", "sppm", "cppm"]) {
             println!("{name:<24}{seconds:>8.3}");
         }
-        ratios.sort_by(f64::total_cmp);
-        let [low, rule, high] =
-            [0.25, 0.5, 0.75].map(|q| (ratios[(q * (ratios.len() - 1) as f64).round() as usize] - 1.0) * 100.0);
-        println!(
-            "the rule: {rule:+.1} % (median of {} pairs; quartiles {low:+.1} and {high:+.1}; by the least {:+.1})",
-            ratios.len(),
-            (best[1] / best[0] - 1.0) * 100.0
-        );
+        let [rule, low, high] = kept.difference_percent();
+        println!("the rule: {rule:+.1} % (median of the differences of {iterations} pairs; 95 % interval {low:+.1} to {high:+.1})");
         let state = levels * (12 * 4 + 8);
         let pixel = size_of::<caustique::estimator::Pixel>();
         let share = state as f64 / pixel as f64 * 100.0;
         println!("memory: {state} bytes a pixel and kind of photons on top of {pixel}, {share:+.1} %");
-        rows.push(json!({"levels": levels, "seconds": best, "rule_percent": rule, "state_bytes": state, "pixel_bytes": pixel}));
+        rows.push(json!({"levels": levels, "seconds": seconds, "rule_percent": rule, "rule_percent_95": [low, high], "state_bytes": state, "pixel_bytes": pixel}));
     }
     json!(rows)
+}
+
+/// Core-seconds of every iteration of two renders that take turns, with the same photons and eye paths.
+struct Steps {
+    /// Whole iterations.
+    all: [Vec<f64>; 2],
+    /// Their eye passes.
+    eye: [Vec<f64>; 2],
+}
+
+impl Steps {
+    /// Their iterations, each after or before that of the other, by turns.
+    fn of(scene: &Scene, camera: &Camera, settings: [&Settings; 2], iterations: usize) -> Steps {
+        let stages = settings.map(|settings| Stage::new(scene, camera, settings));
+        let mut sessions = stages.each_ref().map(Session::new);
+        let mut steps = Steps { all: [vec![], vec![]], eye: [vec![], vec![]] };
+        // The first has what is made once.
+        for i in 0..=iterations {
+            for turn in 0..2 {
+                let which = (i + turn) % 2;
+                let session = &mut sessions[which];
+                let (spent, phases) = (session.spent(), session.phases());
+                session.step();
+                if i > 0 {
+                    steps.all[which].push(session.spent().cpu_seconds - spent.cpu_seconds);
+                    steps.eye[which].push(session.phases().eye - phases.eye);
+                }
+            }
+        }
+        steps
+    }
+
+    /// Of an iteration.
+    fn seconds(&self, which: usize) -> f64 {
+        sorted(self.all[which].iter().copied())[self.all[which].len() / 2]
+    }
+
+    /// What the second adds to an iteration of the first, in percent, with its interval of 95 %: the median of paired differences of eye passes, for the
+    /// rest is the same work, and by order statistics where it may be.
+    fn difference_percent(&self) -> [f64; 3] {
+        let differences = sorted(self.eye[0].iter().zip(&self.eye[1]).map(|(first, second)| second - first));
+        let middle = differences.len() as f64 / 2.0;
+        let away = 0.98 * (differences.len() as f64).sqrt();
+        [middle, middle - away, middle + away]
+            .map(|at| differences[(at as usize).min(differences.len() - 1)] / self.seconds(0) * 100.0)
+    }
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
 }

@@ -5,9 +5,9 @@
 
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
-use crate::transport::{Found, MAX_LEVELS};
+use crate::transport::Found;
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
-use wide::{CmpGt, CmpLt, f32x8};
+use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, u32x4};
 
 /// Parameters, with the paper's defaults (section 9.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,14 +40,16 @@ pub const LEAST_BOUND: f32 = 10.0;
 pub struct ChiSquared {
     annuli: usize,
     sectors: usize,
-    /// Both as numbers of the kind that photons are counted with.
-    cells: [f32; 2],
     k: f32,
     beta: f32,
     /// Quantile for the disc of the `j + 1` innermost annuli; infinite where there is but one cell.
     critical: Vec<f64>,
+    /// The number of all cells and the quantile for them.
+    all: (f64, f64),
+    /// Borders between annuli: squared radii over that of the disc.
+    rings: Vec<f32>,
     /// Directions of the borders between sectors, from the first axis, on one half of the disc if their number is even.
-    borders: Vec<(f32, f32)>,
+    rays: Vec<(f32, f32)>,
 }
 
 /// The bandwidth of one level of one pixel.
@@ -68,28 +70,27 @@ impl ChiSquared {
             Err(_) => f64::INFINITY,
         };
         let half = if sectors.is_multiple_of(2) { sectors / 2 } else { sectors };
-        let borders = (1..half)
+        let rays = (1..half)
             .map(|s| (std::f64::consts::TAU * s as f64 / sectors as f64).sin_cos())
             .map(|(sin, cos)| (cos as f32, sin as f32))
             .collect();
         ChiSquared {
             annuli,
             sectors,
-            cells: [annuli as f32, sectors as f32],
             k: k as f32,
             beta: beta as f32,
             critical: (1..=annuli).map(|annuli| quantile(annuli * sectors)).collect(),
-            borders,
+            all: ((annuli * sectors) as f64, quantile(annuli * sectors)),
+            rings: (1..annuli).map(|ring| ring as f32 / annuli as f32).collect(),
+            rays,
         }
     }
 
     /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
     /// the normal through the point has none and counts in the first sector.
-    #[inline]
-    fn sectors(&self, frame: &Frame, [x, y, z]: &[f32x8; 3]) -> f32x8 {
+    fn sectors(&self, frame: &Frame, offset: &[f32x8; 3]) -> f32x8 {
         let by = f32x8::splat;
-        let along = |axis: Vec3| x.mul_add(by(axis.x), y.mul_add(by(axis.y), *z * axis.z));
-        let (u, v) = (along(frame.t), along(frame.b));
+        let (u, v) = (along(frame.t, offset), along(frame.b, offset));
         if !self.sectors.is_multiple_of(2) {
             let turn = |u: f32, v: f32| (v.atan2(u) / std::f32::consts::TAU).rem_euclid(1.0);
             let (u, v) = (u.to_array(), v.to_array());
@@ -101,62 +102,117 @@ impl ChiSquared {
         let lower = v.cmp_lt(f32x8::ZERO);
         let sign = lower & by(-0.0);
         let (u, v) = (u ^ sign, v ^ sign);
-        let mut passed = lower & by(0.5 * self.cells[1]);
-        for &(c, s) in &self.borders {
+        let mut passed = lower & by(0.5 * self.sectors as f32);
+        for &(c, s) in &self.rays {
             passed += (v * c).cmp_gt(u * s) & f32x8::ONE;
         }
         passed
     }
 
-    /// Sum of counts, and of their squares.
-    #[inline]
-    fn sums(counts: &[u32]) -> (u64, u64) {
-        // Four at a time, which the compiler keeps in a register.
-        let (mut totals, mut squares) = ([0u64; 4], [0u64; 4]);
-        let (fours, rest) = counts.as_chunks::<4>();
-        for four in fours {
-            for k in 0..4 {
-                let count = u64::from(four[k]);
-                totals[k] += count;
-                squares[k] += count * count;
+    /// [`CountingRule::count`] for any cells.
+    #[inline(never)]
+    fn count_any(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
+        let sectors = self.sectors(frame, &photons.offset);
+        let mut counted = 0;
+        for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts.chunks_exact_mut(self.tallies())).enumerate() {
+            // A border belongs to the annulus outside.
+            let mut cell = sectors;
+            for ring in &self.rings {
+                let outside = photons.distance2.cmp_ge(f32x8::splat(bandwidth.radius2 * ring));
+                cell += outside & f32x8::splat(self.sectors as f32);
+            }
+            let cell = cell.fast_trunc_int().to_array();
+            let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
+            counted |= u32::from(within != 0) << level;
+            while within != 0 {
+                counts[cell[within.trailing_zeros() as usize] as usize] += 1;
+                within &= within - 1;
             }
         }
-        for &count in rest {
-            let count = u64::from(count);
-            totals[0] += count;
-            squares[0] += count * count;
+        counted
+    }
+
+    /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: eight of them are counted by four bits a cell.
+    #[inline(always)]
+    fn count_usual(bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
+        let by = f32x8::splat;
+        let (u, v) = (along(frame.t, &photons.offset), along(frame.b, &photons.offset));
+        let lower = v.cmp_lt(f32x8::ZERO);
+        let sign = lower & by(-0.0);
+        // Of the upper half, the borders at 60 and 120 degrees.
+        let (u, v) = ((u ^ sign) * (0.75f32.sqrt()), (v ^ sign) * 0.5);
+        let sector = (lower & by(3.0)) + (v.cmp_gt(u) & f32x8::ONE) + (v.cmp_lt(-u) & f32x8::ONE);
+        let mut counted = 0;
+        let (counts, _) = counts.as_chunks_mut::<12>();
+        for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts).enumerate() {
+            let outside = photons.distance2.cmp_ge(by(bandwidth.radius2 * 0.5));
+            let cell = sector + (outside & by(6.0));
+            // Those that are not within have bits beyond those of all cells.
+            let within = photons.distance2.cmp_lt(by(bandwidth.radius2));
+            let cell = within.blend(cell, by(15.0)).fast_trunc_int().to_array();
+            let packed: u64 = cell.into_iter().map(|cell| 1u64 << (4 * cell)).sum();
+            let (fours, _) = counts.as_chunks_mut::<4>();
+            for (k, four) in fours.iter_mut().enumerate() {
+                let added = u32x4::splat((packed >> (16 * k)) as u32) >> u32x4::from([0, 4, 8, 12]);
+                *four = (u32x4::from(*four) + (added & u32x4::splat(15))).to_array();
+            }
+            counted |= u32::from(packed & ((1 << 48) - 1) != 0) << level;
         }
-        (totals.iter().sum(), squares.iter().sum())
+        counted
+    }
+
+    /// Sum of counts, and of their squares; exact as long as those are below 2^53.
+    #[inline]
+    fn sums(counts: &[u32]) -> (f64, f64) {
+        let (mut totals, mut squares) = (f64x4::ZERO, f64x4::ZERO);
+        let mut add = |count: f64x4| {
+            totals += count;
+            squares += count * count;
+        };
+        let (fours, rest) = counts.as_chunks::<4>();
+        match fours {
+            // Those of the usual cells without a loop.
+            [a, b, c] => [a, b, c].into_iter().for_each(|four| add(f64x4::from(four.map(f64::from)))),
+            fours => fours.iter().for_each(|four| add(f64x4::from(four.map(f64::from)))),
+        }
+        rest.iter().for_each(|&count| add(f64x4::from([f64::from(count), 0.0, 0.0, 0.0])));
+        (totals.reduce_add(), squares.reduce_add())
     }
 
     /// Statistic of counts that should be equal \[(12)\]; 0 without any.
     pub fn statistic(counts: &[u32]) -> f64 {
         let (total, squares) = Self::sums(counts);
-        if total == 0 {
+        if total == 0.0 {
             return 0.0;
         }
-        squares as f64 * counts.len() as f64 / total as f64 - total as f64
+        squares * counts.len() as f64 / total - total
     }
 
     /// Whether counts in the innermost annuli pass the test, by [`ChiSquared::sums`]: the statistic, times the total, against the quantile, without a division.
-    #[inline]
-    fn looks_uniform(&self, annuli: usize, (total, squares): (u64, u64)) -> bool {
-        let (total, squares) = (total as f64, squares as f64);
+    fn looks_uniform(&self, annuli: usize, (total, squares): (f64, f64)) -> bool {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
     }
 
-    /// After an iteration: tests if there are photons enough, and shrinks the bandwidth to the largest inner disc that looks uniform, or by k
-    /// where none does \[6.1, (13), (14)\]; then all counts are dropped. Returns whether it shrank.
-    #[inline]
+    /// After an iteration: tests if there are photons enough, and shrinks the bandwidth where they do not look uniform. Returns whether it shrank.
+    #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
-        let all = Self::sums(counts);
-        if (all.0 as f64) < f64::from(bandwidth.bound) || self.looks_uniform(self.annuli, all) {
-            return false;
+        let (total, squares) = Self::sums(counts);
+        let enough = total >= f64::from(bandwidth.bound);
+        let rejected = enough && squares * self.all.0 > total * (total + self.all.1);
+        if rejected {
+            self.shrink(bandwidth, counts);
         }
+        rejected
+    }
+
+    /// Shrinks the bandwidth to the largest inner disc that looks uniform, or by k where none does \[6.1, (13), (14)\]; then all counts are dropped.
+    #[cold]
+    #[inline(never)]
+    fn shrink(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) {
         let passes = |annuli: usize| {
             let inner = Self::sums(&counts[..annuli * self.sectors]);
             // A disc without photons says nothing.
-            inner.0 > 0 && self.looks_uniform(annuli, inner)
+            inner.0 > 0.0 && self.looks_uniform(annuli, inner)
         };
         let factor = match (1..self.annuli).rev().find(|&annuli| passes(annuli)) {
             Some(annuli) => annuli as f32 / self.annuli as f32,
@@ -166,8 +222,13 @@ impl ChiSquared {
         bandwidth.radius2 = (bandwidth.radius2 * factor).max(f32::MIN_POSITIVE);
         bandwidth.bound *= self.beta;
         counts.fill(0);
-        true
     }
+}
+
+/// Along an axis.
+#[inline(always)]
+fn along(axis: Vec3, [x, y, z]: &[f32x8; 3]) -> f32x8 {
+    x.mul_add(f32x8::splat(axis.x), y.mul_add(f32x8::splat(axis.y), *z * axis.z))
 }
 
 impl CountingRule for ChiSquared {
@@ -190,26 +251,10 @@ impl CountingRule for ChiSquared {
 
     #[inline(always)]
     fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
-        let sectors = self.sectors(frame, &photons.offset);
-        let ([annuli, each], cells) = (self.cells, self.tallies());
-        let mut counted = 0;
-        // Photons within each level, eight bits a level, and their cells among all of them: one loop over all, the length of which is guessed once.
-        let (mut within, mut at) = (0u64, [[0i32; 8]; MAX_LEVELS]);
-        for (level, (bandwidth, at)) in bandwidths.iter().zip(&mut at).enumerate() {
-            let inside = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
-            let annulus =
-                (photons.distance2 * (annuli / bandwidth.radius2)).floor().fast_min(f32x8::splat(annuli - 1.0));
-            *at = annulus.mul_add(f32x8::splat(each), sectors).fast_trunc_int().to_array();
-            within |= (inside as u64) << (8 * level);
-            counted |= u32::from(inside != 0) << level;
+        match (self.annuli, self.sectors) {
+            (2, 6) => Self::count_usual(bandwidths, counts, frame, photons),
+            _ => self.count_any(bandwidths, counts, frame, photons),
         }
-        let at = at.as_flattened();
-        while within != 0 {
-            let photon = within.trailing_zeros() as usize;
-            counts[photon / 8 * cells + at[photon] as usize] += 1;
-            within &= within - 1;
-        }
-        counted
     }
 
     /// Tests that have been passed need not be taken again before more photons are there.
@@ -227,6 +272,7 @@ impl CountingRule for ChiSquared {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::MAX_LEVELS;
     use crate::random::{Domain, Purpose, Stream};
 
     fn rule() -> ChiSquared {
@@ -272,7 +318,7 @@ mod tests {
         let frame = Frame::from_normal(Vec3::Z);
         let levels: [Bandwidth; MAX_LEVELS] =
             std::array::from_fn(|level| rule.begin([0.3, 1.0, 0.05, 0.3, 0.7][level], 10.0, 0));
-        let (mut together, mut apart) = ([0u32; 12 * MAX_LEVELS], [0u32; 12 * MAX_LEVELS]);
+        let [mut together, mut apart, mut any] = [[0u32; 12 * MAX_LEVELS]; 3];
         for trial in 0..500 {
             let (mut offset, mut distance2) = ([[0.0f32; 8]; 3], [f32::INFINITY; 8]);
             for k in 0..trial as usize % 9 {
@@ -287,6 +333,8 @@ mod tests {
                 assert_eq!(bit == 1, distance2.iter().any(|d2| *d2 < levels[level].radius2));
             }
             assert_eq!(together, apart);
+            assert_eq!(rule.count_any(&levels, &mut any, &frame, &found), counted);
+            assert_eq!(together, any);
         }
         assert!(together.chunks(12).all(|counts| counts.iter().all(|&count| count > 0)));
     }
