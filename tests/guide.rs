@@ -97,7 +97,7 @@ fn guided_light_is_the_same_light() {
     let scenes = lit();
     let critical = t_critical(1e-3, 5 * scenes.len() * REGIONS.len(), (PASSES - 1) as f64);
     for (name, scene) in &scenes {
-        let mut guide = Guide::new(&scene.lights).expect("something to aim at");
+        let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
         // What it has learnt is nonsense, and must not matter.
         let error: Vec<f64> = (0..guide.cells()).map(|cell| ((cell * 7 + 3) % 11) as f64).collect();
         guide.learn(&error, &vec![1.0; error.len()]);
@@ -133,7 +133,7 @@ fn guided_light_is_the_same_light() {
 #[test]
 fn cells_follow_the_error_they_leave() {
     let scene = &lit()[2].1;
-    let mut guide = Guide::new(&scene.lights).expect("something to aim at");
+    let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
     assert_eq!(guide.cells(), 3);
     let share = |guide: &Guide, seed| {
         let pass = LightPass::new(seed, 0, Domain::Test, 20_000, u32::MAX).guided(Some(guide));
@@ -153,6 +153,44 @@ fn cells_follow_the_error_they_leave() {
     let before = share(&guide, 2);
     guide.learn(&[1.0, 0.0, 0.0], &[1.0; 3]);
     assert_eq!(before, share(&guide, 2));
+}
+
+/// Two lamps in rooms of their own, the camera in one: light paths are the more those of the lamp that is seen, and the picture is less noisy after as many.
+#[test]
+fn lamps_have_budgets_of_their_own() {
+    let scene = {
+        let mut d = Description::default();
+        for (name, x, power) in [("seen", 0.0, 2.0), ("next door", 6.0, 40.0)] {
+            let walls = cuboid(Vec3::new(x - 2.0, 0.0, -2.0), Vec3::new(x + 2.0, 3.0, 2.0), true);
+            add(&mut d, name, walls, matte(0.6, 0.0));
+            d.lights.push(point_light(DVec3::new(f64::from(x), 2.5, 0.0), power));
+        }
+        d.cameras.push(look_at(DVec3::new(0.0, 1.5, 1.9), DVec3::new(0.0, 0.5, -1.0), 60.0));
+        build(d)
+    };
+    let camera = scene.camera(&square(16)).expect("a camera");
+    let guide = Guide::new(&scene.lights, true).expect("two lamps");
+    assert_eq!(guide.cells(), 3);
+    assert!(Guide::new(&scene.lights, false).is_none(), "nothing makes caustics");
+    let picture = |guided: bool| {
+        let settings = Settings {
+            photons: 4000,
+            guided,
+            levels: Levels::new(1),
+            initial: caustique::estimator::InitialBandwidth::Fixed(0.2),
+            iterations: Some(12),
+            ..Settings::default()
+        };
+        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+        let light: f64 = rendered.pixels.iter().map(|p| p.parts.indirect.element_sum() / 12.0).sum();
+        let variance: f64 = rendered.pixels.iter().map(|p| p.levels[0].variance_of_mean(12.0).element_sum()).sum();
+        println!("guided {guided}: indirect light {light:.3}, variance {variance:.6}");
+        (light, variance)
+    };
+    let ((light, unguided), (same, guided)) = (picture(false), picture(true));
+    assert!((light / same - 1.0).abs() < 0.2, "{light} and {same}");
+    // By power one path in fifteen is the seen lamp's, guided ones are three in four.
+    assert!(unguided > 4.0 * guided, "{unguided} and {guided}");
 }
 
 /// A small ball far below a lamp: the noise of its caustic with and without the guide, after as many light paths.

@@ -1,6 +1,6 @@
 //! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
 
-use super::number::threads;
+use super::number::{positive, threads};
 use super::progress::percent;
 use super::render::Method;
 use super::render::plan::{Wishes, plan};
@@ -8,7 +8,7 @@ use super::scene::{self, SceneArgs};
 use super::{print, print_json};
 use caustique::error::Result;
 use caustique::plan::{EffectPlan, Plan};
-use caustique::render::Settings;
+use caustique::render::{DEFAULT_ITERATIONS, Settings};
 use caustique::render::auto::{Free, choose};
 use caustique::scene::{MAX_SIZE, View};
 use clap::value_parser;
@@ -41,6 +41,13 @@ pub struct PlanArgs {
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     camera: Option<String>,
 
+    /// Of a render of so many iterations [default: 64, if there is no time]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "When to stop")]
+    iterations: Option<u64>,
+    /// Of a render of so many seconds
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
+    time: Option<f64>,
+
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     threads: usize,
@@ -61,9 +68,10 @@ fn report(args: &PlanArgs) -> Result<()> {
     let free = Free { photons: false, neighbours: false };
     let max_depth = args.max_depth.unwrap_or(u32::MAX);
     let classes = args.scene.switches().classes();
+    let (time, iterations) = (args.time, args.iterations.or(args.time.is_none().then_some(DEFAULT_ITERATIONS)));
     // As a render does that combines levels.
     let make = |way| {
-        let settings = Settings { max_depth, classes, ..Settings::of(way) };
+        let settings = Settings { max_depth, classes, time, iterations, ..Settings::of(way) };
         (settings.levels.count > 1).then_some(settings)
     };
     let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();

@@ -1,8 +1,8 @@
-//! Guided emission: most light paths start toward what makes caustics, from the lights that reach it.
+//! Guided emission: most light paths start toward what makes caustics, from the lights that reach it, and the rest from the lights that light the picture.
 //!
-//! A start is drawn from a mixture: with probability [`Guide::unguided`] as [`Lights::sample_emission`] draws it, else from a cell, a pair of a lamp
-//! and a target. The lamp gives the origin; the direction is uniform in the cone that the target's bounding sphere fills from there (for light from
-//! infinity, the line is uniform over the sphere's disc). Whatever component made it, a start carries its native flux times the ratio of its native
+//! A start is drawn from a mixture: with probability [`Guide::unguided`] as [`Lights::sample_emission`] draws it, else from a cell, a lamp alone or a pair of
+//! a lamp and a target. The lamp gives the origin; toward a target the direction is uniform in the cone that its bounding sphere fills from there (for light
+//! from infinity, the line is uniform over the sphere's disc), else it is the lamp's own. Whatever component made it, a start carries its native flux times the ratio of its native
 //! density to its density in the mixture \[Veach 1997, (9.15), the balance heuristic\], at most 1 / unguided (half as much again where part of
 //! the unguided ones go to a region of interest): the mean is that of unguided emission.
 //!
@@ -32,6 +32,8 @@ struct Lamp {
     /// Probability of choosing one of them by power, and where in the choice they begin.
     probability: f32,
     below: f32,
+    /// Probability of the lamp's own cell, of paths to anywhere, over `probability`.
+    own: f32,
     /// Targets and the probability of their cells over `probability`.
     targets: Vec<(usize, f32)>,
 }
@@ -41,8 +43,8 @@ pub struct Guide {
     lamps: Vec<Lamp>,
     /// Lamp of an emitter; `u32::MAX` for those unguided.
     lamp_of: Vec<u32>,
-    /// Lamp and target of a cell; that of [`UNGUIDED`] means nothing.
-    cells: Vec<(usize, usize)>,
+    /// Lamp of a cell, and its target if it has one; that of [`UNGUIDED`] means nothing.
+    cells: Vec<(usize, Option<usize>)>,
     /// Of the cells by power alone.
     prior: Vec<f64>,
     choice: Cdf,
@@ -61,15 +63,16 @@ pub struct Guided {
 }
 
 impl Guide {
-    /// Every pair of a lamp and a target, lamps by power. `None` where nothing can make caustics, or nothing shines.
-    pub fn new(lights: &Lights) -> Option<Guide> {
+    /// Every pair of a lamp and a target, lamps by power; `all`: light paths are for more than caustics, and each of several lamps has a cell of its own for
+    /// that. `None` where there would be nothing to choose, or nothing shines.
+    pub fn new(lights: &Lights, all: bool) -> Option<Guide> {
         let choice = lights.choice()?;
         let targets = lights.targets().spheres().len();
         let mut lamps: Vec<Lamp> = Vec::new();
         let mut below = 0.0;
         for (range, probability) in lights.lamps() {
             if probability > 0.0 {
-                lamps.push(Lamp { emitters: range, probability, below, targets: Vec::new() });
+                lamps.push(Lamp { emitters: range, probability, below, own: 0.0, targets: Vec::new() });
             }
             below += probability;
         }
@@ -83,13 +86,20 @@ impl Guide {
         for (index, lamp) in lamps.iter().enumerate() {
             lamp_of[lamp.emitters.clone()].fill(index as u32);
         }
-        let mut cells = vec![(usize::MAX, usize::MAX)];
-        cells.extend((0..lamps.len()).flat_map(|lamp| (0..targets).map(move |target| (lamp, target))));
+        let own = all && lamps.len() > 1;
+        let of_lamp = || (0..targets).map(Some).chain(own.then_some(None));
+        let mut cells = vec![(usize::MAX, None)];
+        cells.extend((0..lamps.len()).flat_map(|lamp| of_lamp().map(move |target| (lamp, target))));
         if cells.len() == 1 {
             return None;
         }
         let power: f32 = lamps.iter().map(|lamp| lamp.probability).sum();
-        let each = |&(lamp, _): &(usize, usize)| f64::from(lamps[lamp].probability / (power * targets as f32));
+        // Half of it for caustics, where there is both.
+        let half = if own && targets > 0 { 0.5 } else { 1.0 };
+        let each = |&(lamp, target): &(usize, Option<usize>)| {
+            let alike = if target.is_some() { targets as f32 } else { 1.0 };
+            f64::from(half * lamps[lamp].probability / (power * alike))
+        };
         let prior: Vec<f64> = std::iter::once(0.0).chain(cells[1..].iter().map(each)).collect();
         let weights = prior.iter().enumerate().map(|(cell, p)| if cell == UNGUIDED { 0.5 } else { 0.5 * p });
         let choice = Cdf::new(weights)?;
@@ -135,12 +145,16 @@ impl Guide {
     fn spread(&mut self) {
         for lamp in &mut self.lamps {
             lamp.targets.clear();
+            lamp.own = 0.0;
         }
         for (cell, &(lamp, target)) in self.cells.iter().enumerate().skip(1) {
             let probability = self.choice.pdf(cell);
             if probability > 0.0 {
                 let lamp = &mut self.lamps[lamp];
-                lamp.targets.push((target, probability / lamp.probability));
+                match target {
+                    Some(target) => lamp.targets.push((target, probability / lamp.probability)),
+                    None => lamp.own = probability / lamp.probability,
+                }
             }
         }
     }
@@ -156,28 +170,27 @@ impl Guide {
         (choice, point, direction): (Vec2, Vec2, Vec2),
     ) -> Option<Guided> {
         let (cell, _, rest) = self.choice.sample(choice.y);
-        let (emission, made) = if cell == UNGUIDED {
-            let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
-            lights.aim_or_light(&mut emission, region, rest, point);
-            (emission, None)
-        } else {
-            let (lamp, target) = self.cells[cell];
-            let lamp = &self.lamps[lamp];
+        let (lamp, target) = self.cells[cell];
+        let u = match self.lamps.get(lamp) {
             // The part of the choice that falls on this lamp, and a hair less, for the sum may have been rounded up.
-            let u = (lamp.below + choice.x * lamp.probability).min((lamp.below + lamp.probability).next_down());
-            let emission = lights.sample_emission(shapes, materials, u, point, direction)?;
-            (self.turn(lights, emission, target, point, direction)?, Some(target))
+            Some(lamp) => (lamp.below + choice.x * lamp.probability).min((lamp.below + lamp.probability).next_down()),
+            None => choice.x,
         };
-        let lamp = self.lamp_of[emission.light as usize];
-        let (unguided, unaimed) = lights.lit(&emission, region);
-        let mut mixed = self.unguided() * unguided;
-        if let Some(lamp) = self.lamps.get(lamp as usize) {
-            for &(target, weight) in &lamp.targets {
-                mixed += weight * Self::density(lights, &emission, target, made == Some(target));
-            }
+        let mut emission = lights.sample_emission(shapes, materials, u, point, direction)?;
+        match target {
+            Some(target) => emission = self.turn(lights, emission, target, point, direction)?,
+            None => lights.aim_or_light(&mut emission, region, rest, point),
+        }
+        let lamp = self.lamps.get(self.lamp_of[emission.light as usize] as usize);
+        let (anywhere, unaimed) = lights.lit(&emission, region);
+        // By components that do not look at targets.
+        let untargeted = self.unguided() + lamp.map_or(0.0, |lamp| lamp.own);
+        let mut mixed = untargeted * anywhere;
+        for &(other, weight) in lamp.iter().flat_map(|lamp| &lamp.targets) {
+            mixed += weight * Self::density(lights, &emission, other, target == Some(other));
         }
         let (emission, ratio) = emission.drawn_with(mixed)?;
-        Some(Guided { emission, cell, ratio, unaimed: self.unguided() * unaimed / mixed })
+        Some(Guided { emission, cell, ratio, unaimed: untargeted * unaimed / mixed })
     }
 
     /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give it there.

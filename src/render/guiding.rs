@@ -12,7 +12,7 @@ use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
-use crate::transport::{Eye, LightPass, Photons, Probe, Surroundings, light_path};
+use crate::transport::{Eye, Indirect, LightPass, Photons, Probe, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -53,7 +53,7 @@ impl Located for Marked {
     }
 }
 
-/// The guide of a view, learnt; `None` where nothing can make caustics.
+/// The guide of a view, learnt; `None` where there is nothing to choose.
 pub(super) fn learnt(
     eye: &Eye<'_>,
     surroundings: &Surroundings,
@@ -62,7 +62,7 @@ pub(super) fn learnt(
 ) -> Option<Guide> {
     let seed = settings.seed;
     let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
-    let mut guide = Guide::new(&eye.scene.lights)?;
+    let mut guide = Guide::new(&eye.scene.lights, eye.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
         let (maps, paths) = photons(eye, surroundings, (light_paths, region), seed, round, &guide);
         let error = error(eye, seed, round, &maps, guide.cells());
