@@ -195,7 +195,9 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             let waiting = places.iter().flatten().map(|place| {
                 let first = place.at * states;
                 // Those of the first kind, which most pixels see.
-                for tally in tallies[first * each..][..count * each].iter().step_by(line) {
+                let tallies = &tallies[first * each..][..count * each];
+                // The last may be in a line of its own.
+                for tally in tallies.iter().step_by(line).chain(tallies.last()) {
                     std::hint::black_box(*tally);
                 }
                 pixels[place.at].touch() + f64::from(R::radius2(&bandwidths[first]))

@@ -1,6 +1,6 @@
 //! The chi-squared rule on its own: how often it rejects uniform photons, at how many of them and over how many looks, and what it costs.
 //!
-//! `cargo bench --bench cppm -- [SCENE.glb] [WIDTH] [ITERATIONS]`; the last line is JSON for `scripts/figures`. With a scene named, only what the rule costs there.
+//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`; the last line is JSON for `scripts/figures`. With scenes named, only what the rule costs there.
 
 use caustique::camera::Camera;
 use caustique::estimator::rule::CountingRule;
@@ -15,6 +15,15 @@ use serde_json::{Value, json};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 
 const TRIALS: u64 = 100_000;
+/// Where its cost is measured.
+const SCENES: [&str; 6] = [
+    "scenes/interior.glb",
+    "scenes/blocks.glb",
+    "scenes/cornell.glb",
+    "scenes/gems.glb",
+    "scenes/pool.glb",
+    "scenes/torus.glb",
+];
 /// Pixels and iterations of the look after look at uniform light.
 const PIXELS: u64 = 4000;
 const LOOKS: u64 = 1000;
@@ -22,11 +31,15 @@ const LOOKS: u64 = 1000;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let mut found = json!({});
-    if arguments.is_empty() {
+    let mut scenes: Vec<&str> = arguments.iter().map(String::as_str).filter(|a| !a.contains('=')).collect();
+    if scenes.is_empty() {
         found["size"] = json!(sizes());
         found["looks"] = looks();
+        scenes = SCENES.into();
     }
-    found["cost"] = cost(&arguments);
+    let number = |name: &str| arguments.iter().find_map(|a| a.strip_prefix(name)?.parse().ok());
+    let (width, iterations) = (number("width=").unwrap_or(640), number("iterations=").unwrap_or(40));
+    found["cost"] = scenes.into_iter().flat_map(|path| cost(path, width, iterations as usize)).collect();
     println!("{found}");
 }
 
@@ -105,10 +118,7 @@ fn looks() -> Value {
 }
 
 /// Core-seconds of an iteration with bandwidths that stay, with the rule and without; and with the rule's own.
-fn cost(arguments: &[String]) -> Value {
-    let path = arguments.first().map_or("scenes/interior.glb", String::as_str);
-    let number = |i: usize, default: u32| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
-    let (width, iterations) = (number(1, 640), number(2, 60) as usize);
+fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
     let view = View { camera: None, width: Some(width), height: None };
@@ -120,7 +130,7 @@ fn cost(arguments: &[String]) -> Value {
         let stay = Settings { alpha: 1.0, ..base.clone() };
         let rule = Settings { method: Method::Cppm, chi_squared: never, ..base.clone() };
         let kept = Steps::of(&scene, &camera, [&stay, &rule], iterations);
-        let own = Steps::of(&scene, &camera, [&base, &Settings { method: Method::Cppm, ..base.clone() }], iterations);
+        let own = Steps::of(&scene, &camera, [&base, &Settings { method: Method::Cppm, ..base.clone() }], iterations / 4);
         println!("{path}, {:?}, {levels} level(s), core-seconds per iteration (median of {iterations})", camera.size());
         let seconds = [kept.seconds(0), kept.seconds(1), own.seconds(0), own.seconds(1)];
         for (seconds, name) in seconds.iter().zip(["sppm, bandwidths stay", "cppm, bandwidths stay", "sppm", "cppm"]) {
@@ -132,9 +142,9 @@ fn cost(arguments: &[String]) -> Value {
         let pixel = size_of::<caustique::estimator::Pixel>();
         let share = state as f64 / pixel as f64 * 100.0;
         println!("memory: {state} bytes a pixel and kind of photons on top of {pixel}, {share:+.1} %");
-        rows.push(json!({"levels": levels, "seconds": seconds, "rule_percent": rule, "rule_percent_95": [low, high], "state_bytes": state, "pixel_bytes": pixel}));
+        rows.push(json!({"scene": path, "levels": levels, "seconds": seconds, "rule_percent": rule, "rule_percent_95": [low, high], "state_bytes": state, "pixel_bytes": pixel}));
     }
-    json!(rows)
+    rows
 }
 
 /// Core-seconds of every iteration of two renders that take turns, with the same photons and eye paths.
