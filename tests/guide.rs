@@ -100,7 +100,8 @@ fn guided_light_is_the_same_light() {
         let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
         // What it has learnt is nonsense, and must not matter.
         let error: Vec<f64> = (0..guide.cells()).map(|cell| ((cell * 7 + 3) % 11) as f64).collect();
-        guide.learn(&error, &vec![1.0; error.len()]);
+        let ones = vec![1.0; error.len()];
+        guide.learn(&error, &ones, &ones);
         assert!((0.199..=0.901).contains(&guide.unguided()), "{name}: {}", guide.unguided());
         let whole = scene.lights.sky().radius;
         let [wide, narrow] = [0.4, 0.1].map(|share| Some(Region::new(Vec3::new(0.3, 0.2, -0.1), share * whole, whole)));
@@ -129,7 +130,7 @@ fn guided_light_is_the_same_light() {
     }
 }
 
-/// Of cells whose photons leave errors, those of nine times the error get three times the paths; a fifth stays unguided.
+/// Of cells whose photons leave errors, those of nine times the error get three times the paths, those of nine times the cost a third; a fifth stays unguided.
 #[test]
 fn cells_follow_the_error_they_leave() {
     let scene = &lit()[2].1;
@@ -144,15 +145,19 @@ fn cells_follow_the_error_they_leave() {
         }
         counts
     };
-    guide.learn(&[0.0, 9.0, 1.0], &[1.0; 3]);
+    guide.learn(&[0.0, 9.0, 1.0], &[1.0; 3], &[1.0; 3]);
     let [unguided, first, second] = share(&guide, 1);
     assert!((unguided - 0.2).abs() < 0.01, "{unguided}");
     // A tenth of the guided paths keeps to the lamps' power.
     assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
     // Nothing seen: nothing learnt.
     let before = share(&guide, 2);
-    guide.learn(&[1.0, 0.0, 0.0], &[1.0; 3]);
+    guide.learn(&[1.0, 0.0, 0.0], &[1.0; 3], &[1.0; 3]);
     assert_eq!(before, share(&guide, 2));
+    // The same error by paths of nine times the cost: a third of the paths.
+    guide.learn(&[0.0, 1.0, 1.0], &[1.0; 3], &[1.0, 1.0, 9.0]);
+    let [_, first, second] = share(&guide, 3);
+    assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
 }
 
 /// Two lamps in rooms of their own, the camera in one: light paths are the more those of the lamp that is seen, and the picture is less noisy after as many.

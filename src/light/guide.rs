@@ -118,11 +118,14 @@ impl Guide {
         self.choice.pdf(UNGUIDED)
     }
 
-    /// Makes a cell as probable as leaves the least error: `error[c]` is the sum of the squared relative errors that its photons left in the
-    /// picture, made by `paths[c]` light paths. Of strata with n paths each the sum of `error * paths / n` is least for n in proportion to
-    /// `sqrt(error * paths)`.
-    pub fn learn(&mut self, error: &[f64], paths: &[f64]) {
-        let best: Vec<f64> = error.iter().zip(paths).map(|(error, paths)| (error * paths).sqrt()).collect();
+    /// Makes a cell as probable as leaves the least error after as much work: `error[c]` is the sum of the squared relative errors that its photons left in
+    /// the picture, made by `paths[c]` light paths at the cost of `work[c]` in all. Of strata with n paths each the sum of `error * paths / n` is least,
+    /// where the sum of `n * work / paths` is given, for n in proportion to `sqrt(error * paths / (work / paths))`.
+    pub fn learn(&mut self, error: &[f64], paths: &[f64], work: &[f64]) {
+        let best = |(&error, (&paths, &work)): (&f64, (&f64, &f64))| {
+            if work > 0.0 { (error * paths * paths / work).sqrt() } else { 0.0 }
+        };
+        let best: Vec<f64> = error.iter().zip(paths.iter().zip(work)).map(best).collect();
         let guided: f64 = best[1..].iter().sum();
         if !(guided.is_finite() && guided > 0.0) {
             return;

@@ -64,14 +64,27 @@ pub(super) fn learnt(
     let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
     let mut guide = Guide::new(&eye.scene.lights, eye.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
-        let (maps, paths) = photons(eye, surroundings, (light_paths, region), seed, round, &guide);
+        let (maps, walked) = photons(eye, surroundings, (light_paths, region), seed, round, &guide);
         let error = error(eye, seed, round, &maps, guide.cells());
-        guide.learn(&error, &paths);
+        let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
+        let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
+        guide.learn(&error, &paths, &work);
     }
     Some(guide)
 }
 
-/// Photons of a round, and the number of light paths by cell.
+/// What the start of a guided light path costs, in vertices of one: as `auto` counts them.
+const START: f64 = 2.2;
+
+/// Light paths of a cell.
+#[derive(Clone, Copy, Default)]
+struct Walked {
+    paths: f64,
+    /// What they cost, in vertices.
+    work: f64,
+}
+
+/// Photons of a round, and the light paths by cell.
 fn photons(
     eye: &Eye<'_>,
     surroundings: &Surroundings,
@@ -79,36 +92,38 @@ fn photons(
     seed: u64,
     round: u64,
     guide: &Guide,
-) -> (ByKind<PhotonMap<Marked>>, Vec<f64>) {
+) -> (ByKind<PhotonMap<Marked>>, Vec<Walked>) {
     let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
         .guided(Some(guide))
         .lighting(region)
         .wanting(ClassSet::ALL, eye.indirect);
     let trace = |paths: std::ops::Range<u32>| {
         let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());
-        let mut cells = Vec::with_capacity(paths.len());
+        let mut walked = vec![Walked::default(); guide.cells()];
         for index in paths {
-            let Some(cell) = light_path(eye.scene, &arena, surroundings, &pass, index, &mut photons) else { continue };
+            let path = light_path(eye.scene, &arena, surroundings, &pass, index, &mut photons);
+            let Some((cell, vertices)) = path else { continue };
             arena.reset();
             photons.volume.clear();
-            let cell = cell as u32;
             for (marked, photons) in marked.iter_mut().zip(&mut photons.surface) {
-                marked.extend(photons.drain(..).map(|photon| Marked { photon, cell }));
+                marked.extend(photons.drain(..).map(|photon| Marked { photon, cell: cell as u32 }));
             }
-            cells.push(cell);
+            walked[cell].paths += 1.0;
+            walked[cell].work += START + f64::from(vertices);
         }
-        (marked, cells)
+        (marked, walked)
     };
-    let parts: Vec<(ByKind<Vec<Marked>>, Vec<u32>)> = chunks(light_paths).map(trace).collect();
-    let mut paths = vec![0.0; guide.cells()];
-    for &cell in parts.iter().flat_map(|(_, cells)| cells) {
-        paths[cell as usize] += 1.0;
-    }
+    let parts: Vec<(ByKind<Vec<Marked>>, Vec<Walked>)> = chunks(light_paths).map(trace).collect();
+    let mut walked = vec![Walked::default(); guide.cells()];
     let mut all = ByKind::<Vec<Marked>>::default();
-    for (marked, _) in parts {
+    for (marked, part) in parts {
         kind::append(&mut all, marked);
+        for (sum, part) in walked.iter_mut().zip(part) {
+            sum.paths += part.paths;
+            sum.work += part.work;
+        }
     }
-    (all.map(PhotonMap::build), paths)
+    (all.map(PhotonMap::build), walked)
 }
 
 /// Sum over a round's eye paths of the squared relative errors that photons leave, by cell.

@@ -197,6 +197,8 @@ struct Deposit<'a> {
     gain: f32,
     /// What flux is multiplied by here.
     scale: f32,
+    /// Vertices so far.
+    vertices: u32,
 }
 
 impl<'a> Deposit<'a> {
@@ -219,12 +221,14 @@ impl<'a> Deposit<'a> {
             goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
             gain: 1.0 / probability,
             scale: 1.0,
+            vertices: 0,
         }
     }
 
     /// At a vertex that a bounce has sent the path to: whether it goes on there.
     #[inline]
     fn arrives(&mut self, scattered: Option<Scattered>) -> bool {
+        self.vertices += 1;
         let Some(scattered) = scattered else { return true };
         self.unreachable &= scattered.lobe == LobeSet::DELTA;
         // A medium, which focuses nothing, is as broad as can be.
@@ -281,7 +285,8 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 }
 
-/// Traces light path `index` of the pass and appends its photons. Returns the component of the guide that made it, if it began at all.
+/// Traces light path `index` of the pass and appends its photons. Returns the component of the guide that made it, if it began at all, and how many vertices
+/// it had.
 #[inline]
 pub fn light_path(
     scene: &Scene,
@@ -290,11 +295,12 @@ pub fn light_path(
     pass: &LightPass,
     index: u32,
     photons: &mut Photons,
-) -> Option<usize> {
+) -> Option<(usize, u32)> {
     let emitted = pass.emit(scene, surroundings, index)?;
     let mut deposit = Deposit::new(scene, photons, pass, &emitted, emitted.unaimed);
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
-    Some(emitted.cell)
+    let vertices = deposit.vertices;
+    Some((emitted.cell, vertices))
 }
 
 /// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path would lose is the probability that

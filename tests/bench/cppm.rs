@@ -130,14 +130,17 @@ fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
         let stay = Settings { alpha: 1.0, ..base.clone() };
         let rule = Settings { method: Method::Cppm, chi_squared: never, ..base.clone() };
         let kept = Steps::of(&scene, &camera, [&stay, &rule], iterations);
-        let own = Steps::of(&scene, &camera, [&base, &Settings { method: Method::Cppm, ..base.clone() }], iterations / 4);
+        let own =
+            Steps::of(&scene, &camera, [&base, &Settings { method: Method::Cppm, ..base.clone() }], iterations / 4);
         println!("{path}, {:?}, {levels} level(s), core-seconds per iteration (median of {iterations})", camera.size());
         let seconds = [kept.seconds(0), kept.seconds(1), own.seconds(0), own.seconds(1)];
         for (seconds, name) in seconds.iter().zip(["sppm, bandwidths stay", "cppm, bandwidths stay", "sppm", "cppm"]) {
             println!("{name:<24}{seconds:>8.3}");
         }
         let [rule, low, high] = kept.difference_percent();
-        println!("the rule: {rule:+.1} % (median of the differences of {iterations} pairs; 95 % interval {low:+.1} to {high:+.1})");
+        println!(
+            "the rule: {rule:+.1} % (median of the differences of {iterations} pairs; 95 % interval {low:+.1} to {high:+.1})"
+        );
         let state = levels * (12 * 4 + 8);
         let pixel = size_of::<caustique::estimator::Pixel>();
         let share = state as f64 / pixel as f64 * 100.0;

@@ -272,8 +272,8 @@ impl CountingRule for ChiSquared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transport::MAX_LEVELS;
     use crate::random::{Domain, Purpose, Stream};
+    use crate::transport::MAX_LEVELS;
 
     fn rule() -> ChiSquared {
         ChiSquared::new(&ChiSquaredSettings::default())
