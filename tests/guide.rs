@@ -4,6 +4,7 @@
 
 mod support;
 
+use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::light::{Guide, Region};
 use caustique::math::{DVec3, Vec3};
 use caustique::plan::{Effect, PathClass};
@@ -160,6 +161,17 @@ fn cells_follow_the_error_they_leave() {
     assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
 }
 
+/// Light of a part of the picture and the variance of all of it, summed over pixels, after twelve iterations of one level.
+fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&Pixel) -> DVec3) -> (f64, f64) {
+    let camera = scene.camera(&square(16)).expect("a camera");
+    let settings = Settings { levels: Levels::new(1), iterations: Some(12), ..settings };
+    let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
+    let light: f64 = rendered.pixels.iter().map(|p| part(p).element_sum() / 12.0).sum();
+    let variance: f64 = rendered.pixels.iter().map(|p| p.levels[0].variance_of_mean(12.0).element_sum()).sum();
+    println!("guided {}, {:?}: light {light:.3}, variance {variance:.6}", settings.guided, settings.indirect);
+    (light, variance)
+}
+
 /// Two lamps in rooms of their own, the camera in one: light paths are the more those of the lamp that is seen, and the picture is less noisy after as many.
 #[test]
 fn lamps_have_budgets_of_their_own() {
@@ -173,24 +185,14 @@ fn lamps_have_budgets_of_their_own() {
         d.cameras.push(look_at(DVec3::new(0.0, 1.5, 1.9), DVec3::new(0.0, 0.5, -1.0), 60.0));
         build(d)
     };
-    let camera = scene.camera(&square(16)).expect("a camera");
     let guide = Guide::new(&scene.lights, true).expect("two lamps");
     assert_eq!(guide.cells(), 3);
     assert!(Guide::new(&scene.lights, false).is_none(), "nothing makes caustics");
-    let picture = |guided: bool| {
-        let settings = Settings {
-            photons: 4000,
-            guided,
-            levels: Levels::new(1),
-            initial: caustique::estimator::InitialBandwidth::Fixed(0.2),
-            iterations: Some(12),
-            ..Settings::default()
-        };
-        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-        let light: f64 = rendered.pixels.iter().map(|p| p.parts.indirect.element_sum() / 12.0).sum();
-        let variance: f64 = rendered.pixels.iter().map(|p| p.levels[0].variance_of_mean(12.0).element_sum()).sum();
-        println!("guided {guided}: indirect light {light:.3}, variance {variance:.6}");
-        (light, variance)
+    let picture = |guided| {
+        let wide = InitialBandwidth::Fixed(0.2);
+        light_and_variance(&scene, Settings { photons: 4000, guided, initial: wide, ..Settings::default() }, |p| {
+            p.parts.indirect
+        })
     };
     let ((light, unguided), (same, guided)) = (picture(false), picture(true));
     assert!((light / same - 1.0).abs() < 0.2, "{light} and {same}");
@@ -207,22 +209,10 @@ fn the_caustic_of_a_small_ball_is_found() {
     description.lights.push(point_light(DVec3::new(3.0, 10.0, 2.0), 100.0));
     description.cameras.push(look_at(DVec3::new(0.0, 0.5, 0.7), DVec3::new(0.0, 0.03, 0.0), 30.0));
     let scene = build(description);
-    let camera = scene.camera(&square(16)).expect("a camera");
     let variance = |guided, indirect| {
-        let settings = Settings {
-            photons: 20_000,
-            guided,
-            indirect,
-            levels: Levels::new(1),
-            initial: caustique::estimator::InitialBandwidth::Fixed(0.02),
-            iterations: Some(12),
-            ..Settings::default()
-        };
-        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-        let caustic: f64 = rendered.pixels.iter().map(|p| p.parts.caustic.element_sum() / 12.0).sum();
-        let variance: f64 = rendered.pixels.iter().map(|p| p.levels[0].variance_of_mean(12.0).element_sum()).sum();
-        println!("guided {guided}, {indirect:?}: caustic {caustic:.3}, variance {variance:.4}");
-        (caustic, variance)
+        let narrow = InitialBandwidth::Fixed(0.02);
+        let settings = Settings { photons: 20_000, guided, indirect, initial: narrow, ..Settings::default() };
+        light_and_variance(&scene, settings, |p| p.parts.caustic)
     };
     let (_, unguided) = variance(false, Indirect::Photons);
     for indirect in [Indirect::Photons, Indirect::Paths] {

@@ -35,7 +35,7 @@ impl<R: CountingRule> States<'_, R> {
     #[inline(always)]
     fn radii(&self) -> LevelRadii {
         if let [only] = &self.bandwidths {
-            return LevelRadii::one(R::radius2(only));
+            return LevelRadii::new(std::iter::once(R::radius2(only)));
         }
         if self.bandwidths.is_sorted_by_key(R::radius2) {
             return LevelRadii::new(self.bandwidths.iter().map(R::radius2));

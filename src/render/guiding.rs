@@ -32,6 +32,9 @@ const NEIGHBOURS: usize = 16;
 /// Added to a pixel's squared value: the relative error of [`super::Rendered::relative_error`].
 const DARK: f32 = 0.01;
 
+/// What the start of a guided light path costs, in vertices of one: as `auto` counts them.
+const START: f64 = 2.2;
+
 /// A photon and the component of the guide that has made it.
 #[derive(Clone, Copy)]
 struct Marked {
@@ -72,9 +75,6 @@ pub(super) fn learnt(
     }
     Some(guide)
 }
-
-/// What the start of a guided light path costs, in vertices of one: as `auto` counts them.
-const START: f64 = 2.2;
 
 /// Light paths of a cell.
 #[derive(Clone, Copy, Default)]

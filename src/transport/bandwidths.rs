@@ -35,12 +35,6 @@ impl LevelRadii {
         radii
     }
 
-    /// Of a single level.
-    #[inline]
-    pub fn one(radius2: f32) -> LevelRadii {
-        LevelRadii { radius2: [radius2, 0.0, 0.0, 0.0, 0.0], count: 1, later2: f32::INFINITY, order: [0, 1, 2, 3, 4] }
-    }
-
     /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
     /// its path may come to where they are dense, which nobody sees sharply.
     #[inline]
@@ -71,13 +65,17 @@ pub struct Found {
 impl Found {
     /// One photon.
     pub fn one(offset: Vec3, distance2: f32, light: f32) -> Found {
-        let lane = |x: f32, others: f32| f32x8::from([x, others, others, others, others, others, others, others]);
         Found {
             offset: offset.to_array().map(|x| lane(x, 0.0)),
             distance2: lane(distance2, f32::INFINITY),
             light: lane(light, 0.0),
         }
     }
+}
+
+/// A number in the first of eight places, and another in the others.
+pub(super) fn lane(x: f32, others: f32) -> f32x8 {
+    f32x8::from([x, others, others, others, others, others, others, others])
 }
 
 /// Bandwidths where an eye path gathers.

@@ -1,6 +1,6 @@
 //! Photons gathered at a vertex, eight at a time.
 
-use super::bandwidths::{Bandwidths, Found, MAX_LEVELS};
+use super::bandwidths::{Bandwidths, Found, MAX_LEVELS, lane};
 use super::walk::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
@@ -87,10 +87,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
         let Some(gathering) = &self.unreachable else { return };
         let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
         let found = Found::one(photon.p - self.p, distance2, (light * self.throughput).element_sum() / 3.0);
-        self.add::<B>(
-            &light.to_array().map(|light| f32x8::from([light, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])),
-            found.distance2,
-        );
+        self.add::<B>(&light.to_array().map(|light| lane(light, 0.0)), found.distance2);
         if B::COUNTS && light != Rgb::ZERO {
             counter.count(&found);
         }

@@ -44,8 +44,6 @@ pub struct ChiSquared {
     beta: f32,
     /// Quantile for the disc of the `j + 1` innermost annuli; infinite where there is but one cell.
     critical: Vec<f64>,
-    /// The number of all cells and the quantile for them.
-    all: (f64, f64),
     /// Borders between annuli: squared radii over that of the disc.
     rings: Vec<f32>,
     /// Directions of the borders between sectors, from the first axis, on one half of the disc if their number is even.
@@ -80,7 +78,6 @@ impl ChiSquared {
             k: k as f32,
             beta: beta as f32,
             critical: (1..=annuli).map(|annuli| quantile(annuli * sectors)).collect(),
-            all: ((annuli * sectors) as f64, quantile(annuli * sectors)),
             rings: (1..annuli).map(|ring| ring as f32 / annuli as f32).collect(),
             rays,
         }
@@ -89,7 +86,6 @@ impl ChiSquared {
     /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
     /// the normal through the point has none and counts in the first sector.
     fn sectors(&self, frame: &Frame, offset: &[f32x8; 3]) -> f32x8 {
-        let by = f32x8::splat;
         let (u, v) = (along(frame.t, offset), along(frame.b, offset));
         if !self.sectors.is_multiple_of(2) {
             let turn = |u: f32, v: f32| (v.atan2(u) / std::f32::consts::TAU).rem_euclid(1.0);
@@ -98,11 +94,9 @@ impl ChiSquared {
             let sector = |k: usize| (turn(u[k], v[k]) * self.sectors as f32).floor().min(last);
             return f32x8::from(std::array::from_fn(sector));
         }
-        // The lower half is the upper, turned by half the sectors. A border belongs to the sector before it.
-        let lower = v.cmp_lt(f32x8::ZERO);
-        let sign = lower & by(-0.0);
-        let (u, v) = (u ^ sign, v ^ sign);
-        let mut passed = lower & by(0.5 * self.sectors as f32);
+        // A border belongs to the sector before it.
+        let (lower, u, v) = upper(u, v);
+        let mut passed = lower & f32x8::splat(0.5 * self.sectors as f32);
         for &(c, s) in &self.rays {
             passed += (v * c).cmp_gt(u * s) & f32x8::ONE;
         }
@@ -136,11 +130,9 @@ impl ChiSquared {
     #[inline(always)]
     fn count_usual(bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
         let by = f32x8::splat;
-        let (u, v) = (along(frame.t, &photons.offset), along(frame.b, &photons.offset));
-        let lower = v.cmp_lt(f32x8::ZERO);
-        let sign = lower & by(-0.0);
+        let (lower, u, v) = upper(along(frame.t, &photons.offset), along(frame.b, &photons.offset));
         // Of the upper half, the borders at 60 and 120 degrees.
-        let (u, v) = ((u ^ sign) * (0.75f32.sqrt()), (v ^ sign) * 0.5);
+        let (u, v) = (u * 0.75f32.sqrt(), v * 0.5);
         let sector = (lower & by(3.0)) + (v.cmp_gt(u) & f32x8::ONE) + (v.cmp_lt(-u) & f32x8::ONE);
         let mut counted = 0;
         let (counts, _) = counts.as_chunks_mut::<12>();
@@ -189,6 +181,7 @@ impl ChiSquared {
     }
 
     /// Whether counts in the innermost annuli pass the test, by [`ChiSquared::sums`]: the statistic, times the total, against the quantile, without a division.
+    #[inline]
     fn looks_uniform(&self, annuli: usize, (total, squares): (f64, f64)) -> bool {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
     }
@@ -196,9 +189,8 @@ impl ChiSquared {
     /// After an iteration: tests if there are photons enough, and shrinks the bandwidth where they do not look uniform. Returns whether it shrank.
     #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
-        let (total, squares) = Self::sums(counts);
-        let enough = total >= f64::from(bandwidth.bound);
-        let rejected = enough && squares * self.all.0 > total * (total + self.all.1);
+        let all = Self::sums(counts);
+        let rejected = all.0 >= f64::from(bandwidth.bound) && !self.looks_uniform(self.annuli, all);
         if rejected {
             self.shrink(bandwidth, counts);
         }
@@ -229,6 +221,14 @@ impl ChiSquared {
 #[inline(always)]
 fn along(axis: Vec3, [x, y, z]: &[f32x8; 3]) -> f32x8 {
     x.mul_add(f32x8::splat(axis.x), y.mul_add(f32x8::splat(axis.y), *z * axis.z))
+}
+
+/// Whether directions are in the lower half of the disc, and those in the upper half that they are then turned to by half of all.
+#[inline(always)]
+fn upper(u: f32x8, v: f32x8) -> (f32x8, f32x8, f32x8) {
+    let lower = v.cmp_lt(f32x8::ZERO);
+    let sign = lower & f32x8::splat(-0.0);
+    (lower, u ^ sign, v ^ sign)
 }
 
 impl CountingRule for ChiSquared {
