@@ -25,9 +25,9 @@ use std::ops::Range;
 /// The bandwidths of some levels for one kind of photons, and what is counted within them.
 struct States<'a, R: CountingRule> {
     bandwidths: &'a mut [R::Bandwidth],
-    tallies: &'a mut [R::Tally],
-    /// Levels in which something has been counted, one bit each.
-    counted: u32,
+    counts: &'a mut [R::Count],
+    /// Of the eye path.
+    tally: R::Tally,
 }
 
 impl<R: CountingRule> States<'_, R> {
@@ -54,8 +54,8 @@ struct Layout {
     /// Kinds of photons that there are.
     kinds: ByKind<bool>,
     levels: usize,
-    /// Tallies per bandwidth.
-    tallies: usize,
+    /// Counts per bandwidth.
+    counts: usize,
 }
 
 impl Layout {
@@ -78,17 +78,17 @@ impl Layout {
         channel: usize,
         levels: Range<usize>,
         bandwidths: &'a mut [R::Bandwidth],
-        tallies: &'a mut [R::Tally],
+        counts: &'a mut [R::Count],
     ) -> ByKind<States<'a, R>> {
         let own = channel * self.count()..(channel + 1) * self.count();
         let first = self.of_kind(Kind::Indirect);
         let (indirect, caustic) = bandwidths[own.clone()].split_at_mut(first);
-        let tallies = &mut tallies[own.start * self.tallies..own.end * self.tallies];
-        let (indirect_tallies, caustic_tallies) = tallies.split_at_mut(first * self.tallies);
-        [(indirect, indirect_tallies), (caustic, caustic_tallies)].map(|(bandwidths, tallies)| {
+        let counts = &mut counts[own.start * self.counts..own.end * self.counts];
+        let (indirect_counts, caustic_counts) = counts.split_at_mut(first * self.counts);
+        [(indirect, indirect_counts), (caustic, caustic_counts)].map(|(bandwidths, counts)| {
             let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
-            let tallies = &mut tallies[levels.start * self.tallies..levels.end * self.tallies];
-            States { bandwidths: &mut bandwidths[levels], tallies, counted: 0 }
+            let counts = &mut counts[levels.start * self.counts..levels.end * self.counts];
+            States { bandwidths: &mut bandwidths[levels], counts, tally: R::Tally::default() }
         })
     }
 }
@@ -110,9 +110,9 @@ impl<'a, R: CountingRule> Counter<'a, R> {
 
     /// After the eye path of iteration `i`.
     #[inline(always)]
-    fn finish(self, i: u64) {
-        for States { bandwidths, tallies, counted } in self.states {
-            self.rule.update(i, bandwidths, tallies, counted);
+    fn finish(&mut self, i: u64) {
+        for States { bandwidths, counts, tally } in &mut self.states {
+            self.rule.update(i, bandwidths, counts, tally);
         }
     }
 }
@@ -135,8 +135,8 @@ impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
 
     #[inline(always)]
     fn count(&mut self, photons: &Found) {
-        let States { bandwidths, tallies, counted } = &mut self.states[self.kind as usize];
-        *counted |= self.rule.count(bandwidths, tallies, &self.frame, photons);
+        let States { bandwidths, counts, tally } = &mut self.states[self.kind as usize];
+        self.rule.count(bandwidths, counts, tally, &self.frame, photons);
     }
 }
 
@@ -153,7 +153,7 @@ pub(super) struct Counting<'a, R: CountingRule, K> {
     /// Of every pixel, channel, kind and level.
     bandwidths: Vec<R::Bandwidth>,
     /// Of every pixel, channel, kind and level.
-    tallies: Vec<R::Tally>,
+    counts: Vec<R::Count>,
 }
 
 impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
@@ -166,8 +166,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             [false, false] => [true, false],
             kinds => kinds,
         };
-        let layout = Layout { kinds, levels: settings.levels.count, tallies: rule.tallies() };
-        Counting { sppm, settings, rule, kernel, channels, layout, bandwidths: Vec::new(), tallies: Vec::new() }
+        let layout = Layout { kinds, levels: settings.levels.count, counts: rule.counts() };
+        Counting { sppm, settings, rule, kernel, channels, layout, bandwidths: Vec::new(), counts: Vec::new() }
     }
 
     /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all else.
@@ -181,24 +181,24 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &mut [Pixel]) {
         let [independent, correlated] =
             [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
-        let Counting { sppm, settings, rule, kernel, layout, bandwidths, tallies, .. } = self;
+        let Counting { sppm, settings, rule, kernel, layout, bandwidths, counts, .. } = self;
         let (eye, rule, kernel, layout, levels) = (sppm.eye(), &*rule, *kernel, *layout, settings.levels);
-        let (size, count, each) = (eye.camera.size(), levels.count, layout.tallies);
+        let (size, count, each) = (eye.camera.size(), levels.count, layout.counts);
         let states = layout.count() * maps.len();
-        let line = (64 / size_of::<R::Tally>()).max(1);
+        let line = (64 / size_of::<R::Count>().max(1)).max(1);
         let bands = pixels
             .par_chunks_mut(band(size.0))
             .zip(bandwidths.par_chunks_mut(band(size.0) * states))
-            .zip(tallies.par_chunks_mut(band(size.0) * states * each));
+            .zip(counts.par_chunks_mut(band(size.0) * states * each));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
-        par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), tallies), places| {
+        par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), counts), places| {
             let waiting = places.iter().flatten().map(|place| {
                 let first = place.at * states;
                 // Those of the first kind, which most pixels see.
-                let tallies = &tallies[first * each..][..count * each];
+                let counts = &counts[first * each..][..count * each];
                 // The last may be in a line of its own.
-                for tally in tallies.iter().step_by(line).chain(tallies.last()) {
-                    std::hint::black_box(*tally);
+                for count in counts.iter().step_by(line).chain(counts.last()) {
+                    std::hint::black_box(*count);
                 }
                 pixels[place.at].touch() + f64::from(R::radius2(&bandwidths[first]))
             });
@@ -210,12 +210,12 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
                 let pixel = &mut pixels[place.at];
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
-                let tallies = &mut tallies[place.at * states * each..][..states * each];
+                let counts = &mut counts[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, with the photons of a channel, and updates them.
                 let mut measure = |pixel: &Pixel, start: &(PathStart, _), channel: usize, levels: Range<usize>| {
                     let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
                     let volume = maps.volume(pixel, levels.clone());
-                    let states = layout.states(channel, levels, bandwidths, tallies);
+                    let states = layout.states(channel, levels, bandwidths, counts);
                     let mut counter = Counter::new(rule, states);
                     let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter, kernel);
                     counter.finish(i);
@@ -272,7 +272,7 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
                 }
             }
         }
-        self.tallies = vec![R::Tally::default(); self.bandwidths.len() * self.rule.tallies()];
+        self.counts = vec![R::Count::default(); self.bandwidths.len() * self.rule.counts()];
         pixels
     }
 

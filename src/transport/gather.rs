@@ -100,7 +100,8 @@ impl<'a, K: Kernel> Batch<'a, K> {
         let found = [f[0] * red, f[1] * green, f[2] * blue];
         self.add::<B>(&found, distance2);
         if B::COUNTS {
-            let light = found[0] * self.throughput.x + found[1] * self.throughput.y + found[2] * self.throughput.z;
+            let weight = self.throughput.to_array().map(f32x8::splat);
+            let light = found[0].mul_add(weight[0], found[1].mul_add(weight[1], found[2] * weight[2]));
             // Photons that bring nothing do not count [CPPM 2020, 7.2].
             let dark = light.cmp_eq(f32x8::ZERO);
             counter.count(&Found {

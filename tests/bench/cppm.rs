@@ -4,7 +4,7 @@
 
 use caustique::camera::Camera;
 use caustique::estimator::rule::CountingRule;
-use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings};
+use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings, Tally};
 use caustique::math::{Frame, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Levels, Method, Session, Settings, Stage};
@@ -54,20 +54,22 @@ fn uniform(frame: &Frame, stream: Stream) -> Found {
 /// Share of uniform samples that are rejected, by their number.
 fn sizes() -> Vec<Value> {
     println!("uniform photons that are rejected, of {TRIALS} trials (the significance is 0.05)");
-    let rule = ChiSquared::new(&ChiSquaredSettings::default());
+    // Of a disc that never shrinks.
+    let rule = ChiSquared::new(&ChiSquaredSettings { significance: 1e-300, ..ChiSquaredSettings::default() });
     let frame = Frame::from_normal(Vec3::Z);
     let critical = Distribution::new(11.0).map_or(f64::NAN, |d| d.inverse_cdf(0.95));
-    let bandwidth = [rule.begin(1.0, 10.0, 0)];
+    let mut bandwidth = [rule.begin(1.0, 10.0, 0)];
     let mut all = Vec::new();
     for photons in [3u64, 4, 5, 6, 8, 10, 12, 15, 20, 30, 60, 120, 1000] {
         let trials = if photons > 120 { TRIALS / 5 } else { TRIALS };
         let mut rejected = 0u64;
         for trial in 0..trials {
-            let mut counts = [0u32; 12];
+            let (mut counts, mut tally) = ([0u32; 12], Tally::default());
             for i in 0..photons {
                 let found = uniform(&frame, Stream::new(11, trial, Domain::Test, i));
-                rule.count(&bandwidth, &mut counts, &frame, &found);
+                rule.count(&bandwidth, &mut counts, &mut tally, &frame, &found);
             }
+            rule.update(1, &mut bandwidth, &mut counts, &mut tally);
             rejected += u64::from(ChiSquared::statistic(&counts) > critical);
         }
         let size = rejected as f64 / trials as f64;
@@ -90,13 +92,13 @@ fn looks() -> Value {
         let mut counts = [0u32; 12];
         let mut rejected = None;
         for i in 1..=LOOKS {
-            let mut counted = 0;
+            let mut tally = Tally::default();
             // Ten photons an iteration in the first disc; those in the bandwidth are counted.
             for k in 0..10 {
                 let found = uniform(&frame, Stream::new(12, i * 16 + k, Domain::Test, pixel));
-                counted |= rule.count(&bandwidth, &mut counts, &frame, &found);
+                rule.count(&bandwidth, &mut counts, &mut tally, &frame, &found);
             }
-            rule.update(i, &mut bandwidth, &mut counts, counted);
+            rule.update(i, &mut bandwidth, &mut counts, &mut tally);
             if rejected.is_none() && bandwidth[0].radius2 < 1.0 {
                 rejected = Some(i);
             }

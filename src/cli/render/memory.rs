@@ -29,12 +29,12 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
     };
     // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
     let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
-    // Bandwidths of their own, and what is counted for them.
+    // Bandwidths of their own, and counts.
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
     let state = match method {
         Method::Cppm => size_of::<chi_squared::Bandwidth>() + cells * size_of::<u32>(),
-        Method::Appm => size_of::<adaptive::Bandwidth>() + size_of::<adaptive::Tally>(),
-        _ if method.gathers() && !settings.is_memoryless() => size_of::<local::Bandwidth>() + size_of::<u32>(),
+        Method::Appm => size_of::<adaptive::Bandwidth>(),
+        _ if method.gathers() && !settings.is_memoryless() => size_of::<local::Bandwidth>(),
         _ => 0,
     };
     let apart = if method == Method::Cppm && settings.chi_squared.plus { 3 } else { 1 };

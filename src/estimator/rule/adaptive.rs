@@ -55,8 +55,8 @@ pub struct Bandwidth {
     noise: f64,
 }
 
-/// What an iteration finds.
-#[derive(Clone, Copy, Debug, Default)]
+/// What an eye path finds.
+#[derive(Debug, Default)]
 pub struct Tally {
     /// Photons within the bandwidth.
     photons: u32,
@@ -70,6 +70,7 @@ pub struct Tally {
 
 impl<K: Kernel> CountingRule for Adaptive<K> {
     type Bandwidth = Bandwidth;
+    type Count = ();
     type Tally = Tally;
 
     const BEYOND: bool = true;
@@ -91,8 +92,8 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [Tally], _: &Frame, photons: &Found) -> u32 {
-        let (Some(bandwidth), Some(tally)) = (bandwidths.last(), tallies.last_mut()) else { return 0 };
+    fn count(&self, bandwidths: &[Bandwidth], _: &mut [()], tally: &mut Tally, _: &Frame, photons: &Found) {
+        let Some(bandwidth) = bandwidths.last() else { return };
         let within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2));
         tally.photons += within.move_mask().count_ones();
         tally.squares += f64::from((within & (photons.light * photons.light)).reduce_add());
@@ -103,12 +104,10 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         let scale = f64::from(bandwidth.pilot2).powi(-2);
         tally.laplacian += f64::from(parts.reduce_add()) * scale;
         tally.noise += f64::from((parts * parts).reduce_add()) * scale * scale;
-        0
     }
 
-    fn update(&self, i: u64, bandwidths: &mut [Bandwidth], tallies: &mut [Tally], _: u32) {
-        let (Some(last), Some(tally)) = (bandwidths.last_mut(), tallies.last_mut()) else { return };
-        let found = std::mem::take(tally);
+    fn update(&self, i: u64, bandwidths: &mut [Bandwidth], _: &mut [()], found: &mut Tally) {
+        let Some(last) = bandwidths.last_mut() else { return };
         last.photons = last.photons.saturating_add(found.photons);
         last.shot += found.squares / (PI * f64::from(last.radius2));
         last.laplacian += found.laplacian;
@@ -178,11 +177,11 @@ mod tests {
                     let keep = (1.0 + d / 4.0 * f64::from(p.length_squared())) / 1.8;
                     let photon = Found::one(Vec3::ZERO, p.length_squared(), 1.0);
                     if p.length_squared() < 0.04 && f64::from(u.one(Purpose::Lobe)) < keep {
-                        let (b, t) = (std::slice::from_ref(&bandwidth), std::slice::from_mut(&mut tally));
-                        rule.count(b, t, &Frame::from_normal(Vec3::Z), &photon);
+                        let bandwidths = std::slice::from_ref(&bandwidth);
+                        rule.count(bandwidths, &mut [], &mut tally, &Frame::from_normal(Vec3::Z), &photon);
                     }
                 }
-                rule.update(i, std::slice::from_mut(&mut bandwidth), std::slice::from_mut(&mut tally), 0);
+                rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [], &mut tally);
                 assert!(bandwidth.radius2 > 0.0 && bandwidth.radius2.is_finite());
             }
             bandwidth

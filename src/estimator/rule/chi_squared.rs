@@ -5,7 +5,7 @@
 
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
-use crate::transport::Found;
+use crate::transport::{Found, MAX_LEVELS};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, u32x4};
 
@@ -50,6 +50,53 @@ pub struct ChiSquared {
     rays: Vec<(f32, f32)>,
 }
 
+/// Cells of two annuli of six sectors.
+const USUAL: usize = 12;
+/// Bits of a cell in [`Tally::packed`], and how many times eight photons they count at most.
+const BITS: u32 = 5;
+const MOST_EIGHTS: u32 = 3;
+const _: () = assert!(8 * MOST_EIGHTS < 1 << BITS && USUAL as u32 * BITS < u64::BITS);
+
+/// What the photons of one eye path add to counts.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within.
+    packed: [u64; MAX_LEVELS],
+    /// How many times eight photons these may be.
+    eights: u32,
+    /// By level, whether something has been counted beside those.
+    counted: [bool; MAX_LEVELS],
+}
+
+impl Tally {
+    /// Adds the photons of a level to its counts, and says whether any were there.
+    #[inline(always)]
+    fn unpack(&mut self, level: usize, counts: &mut [u32]) -> bool {
+        let packed = std::mem::take(&mut self.packed[level]);
+        if packed << (u64::BITS - USUAL as u32 * BITS) == 0 {
+            return self.counted[level];
+        }
+        let Some(counts) = counts.first_chunk_mut::<USUAL>() else { return false };
+        let (fours, _) = counts.as_chunks_mut::<4>();
+        for (k, four) in fours.iter_mut().enumerate() {
+            let shifts = u32x4::from(std::array::from_fn(|cell| cell as u32 * BITS));
+            let added = u32x4::splat((packed >> (4 * BITS * k as u32)) as u32) >> shifts;
+            *four = (u32x4::from(*four) + (added & u32x4::splat((1 << BITS) - 1))).to_array();
+        }
+        true
+    }
+
+    /// Makes room.
+    #[cold]
+    #[inline(never)]
+    fn unpack_all(&mut self, counts: &mut [u32]) {
+        for (level, counts) in counts.chunks_exact_mut(USUAL).enumerate() {
+            self.counted[level] = self.unpack(level, counts);
+        }
+        self.eights = 0;
+    }
+}
+
 /// The bandwidth of one level of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bandwidth {
@@ -84,7 +131,8 @@ impl ChiSquared {
     }
 
     /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
-    /// the normal through the point has none and counts in the first sector.
+    /// the normal through the point has none and counts in the first sector. The borders are lines through the centre, if their number is even, so that
+    /// a sector is the half it is in and the lines that it is beyond: the lower half is numbered backwards.
     fn sectors(&self, frame: &Frame, offset: &[f32x8; 3]) -> f32x8 {
         let (u, v) = (along(frame.t, offset), along(frame.b, offset));
         if !self.sectors.is_multiple_of(2) {
@@ -94,21 +142,25 @@ impl ChiSquared {
             let sector = |k: usize| (turn(u[k], v[k]) * self.sectors as f32).floor().min(last);
             return f32x8::from(std::array::from_fn(sector));
         }
-        // A border belongs to the sector before it.
-        let (lower, u, v) = upper(u, v);
-        let mut passed = lower & f32x8::splat(0.5 * self.sectors as f32);
+        let mut sector = v.cmp_lt(f32x8::ZERO) & f32x8::splat(0.5 * self.sectors as f32);
         for &(c, s) in &self.rays {
-            passed += (v * c).cmp_gt(u * s) & f32x8::ONE;
+            sector += (v * c).cmp_gt(u * s) & f32x8::ONE;
         }
-        passed
+        sector
     }
 
     /// [`CountingRule::count`] for any cells.
     #[inline(never)]
-    fn count_any(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
+    fn count_any(
+        &self,
+        bandwidths: &[Bandwidth],
+        counts: &mut [u32],
+        tally: &mut Tally,
+        frame: &Frame,
+        photons: &Found,
+    ) {
         let sectors = self.sectors(frame, &photons.offset);
-        let mut counted = 0;
-        for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts.chunks_exact_mut(self.tallies())).enumerate() {
+        for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts.chunks_exact_mut(self.counts())).enumerate() {
             // A border belongs to the annulus outside.
             let mut cell = sectors;
             for ring in &self.rings {
@@ -117,40 +169,33 @@ impl ChiSquared {
             }
             let cell = cell.fast_trunc_int().to_array();
             let mut within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask();
-            counted |= u32::from(within != 0) << level;
+            tally.counted[level] |= within != 0;
             while within != 0 {
                 counts[cell[within.trailing_zeros() as usize] as usize] += 1;
                 within &= within - 1;
             }
         }
-        counted
     }
 
-    /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: eight of them are counted by four bits a cell.
+    /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: those of a path are first counted by five bits a cell.
     #[inline(always)]
-    fn count_usual(bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
+    fn count_usual(bandwidths: &[Bandwidth], counts: &mut [u32], tally: &mut Tally, frame: &Frame, photons: &Found) {
         let by = f32x8::splat;
-        let (lower, u, v) = upper(along(frame.t, &photons.offset), along(frame.b, &photons.offset));
-        // Of the upper half, the borders at 60 and 120 degrees.
-        let (u, v) = (u * 0.75f32.sqrt(), v * 0.5);
-        let sector = (lower & by(3.0)) + (v.cmp_gt(u) & f32x8::ONE) + (v.cmp_lt(-u) & f32x8::ONE);
-        let mut counted = 0;
-        let (counts, _) = counts.as_chunks_mut::<12>();
-        for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts).enumerate() {
+        // The borders at 60 and 120 degrees.
+        let (u, v) = (along(frame.t, &photons.offset) * 3f32.sqrt(), along(frame.b, &photons.offset));
+        let [half, sixth, outer] = [3.0, 1.0, 6.0].map(|cells| by(cells * BITS as f32));
+        let sector = (v.cmp_lt(by(0.0)) & half) + (v.cmp_gt(u) & sixth) + ((u + v).cmp_lt(by(0.0)) & sixth);
+        for (bandwidth, packed) in bandwidths.iter().zip(&mut tally.packed) {
             let outside = photons.distance2.cmp_ge(by(bandwidth.radius2 * 0.5));
-            let cell = sector + (outside & by(6.0));
-            // Those that are not within have bits beyond those of all cells.
             let within = photons.distance2.cmp_lt(by(bandwidth.radius2));
-            let cell = within.blend(cell, by(15.0)).fast_trunc_int().to_array();
-            let packed: u64 = cell.into_iter().map(|cell| 1u64 << (4 * cell)).sum();
-            let (fours, _) = counts.as_chunks_mut::<4>();
-            for (k, four) in fours.iter_mut().enumerate() {
-                let added = u32x4::splat((packed >> (16 * k)) as u32) >> u32x4::from([0, 4, 8, 12]);
-                *four = (u32x4::from(*four) + (added & u32x4::splat(15))).to_array();
-            }
-            counted |= u32::from(packed & ((1 << 48) - 1) != 0) << level;
+            let place = within.blend(sector + (outside & outer), by((USUAL as u32 * BITS) as f32));
+            let places = place.fast_trunc_int().to_array();
+            *packed = places.into_iter().fold(*packed, |sum, place| sum.wrapping_add(1 << place));
         }
-        counted
+        tally.eights += 1;
+        if tally.eights == MOST_EIGHTS {
+            tally.unpack_all(counts);
+        }
     }
 
     /// Sum of counts, and of their squares; exact as long as those are below 2^53.
@@ -223,20 +268,13 @@ fn along(axis: Vec3, [x, y, z]: &[f32x8; 3]) -> f32x8 {
     x.mul_add(f32x8::splat(axis.x), y.mul_add(f32x8::splat(axis.y), *z * axis.z))
 }
 
-/// Whether directions are in the lower half of the disc, and those in the upper half that they are then turned to by half of all.
-#[inline(always)]
-fn upper(u: f32x8, v: f32x8) -> (f32x8, f32x8, f32x8) {
-    let lower = v.cmp_lt(f32x8::ZERO);
-    let sign = lower & f32x8::splat(-0.0);
-    (lower, u ^ sign, v ^ sign)
-}
-
 impl CountingRule for ChiSquared {
     type Bandwidth = Bandwidth;
-    type Tally = u32;
+    type Count = u32;
+    type Tally = Tally;
 
     /// One per cell.
-    fn tallies(&self) -> usize {
+    fn counts(&self) -> usize {
         self.annuli * self.sectors
     }
 
@@ -250,21 +288,23 @@ impl CountingRule for ChiSquared {
     }
 
     #[inline(always)]
-    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], frame: &Frame, photons: &Found) -> u32 {
+    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], tally: &mut Tally, frame: &Frame, photons: &Found) {
         match (self.annuli, self.sectors) {
-            (2, 6) => Self::count_usual(bandwidths, counts, frame, photons),
-            _ => self.count_any(bandwidths, counts, frame, photons),
+            (2, 6) => Self::count_usual(bandwidths, counts, tally, frame, photons),
+            // A copy, so that photons need not be in memory for the others.
+            _ => self.count_any(bandwidths, counts, tally, frame, &photons.clone()),
         }
     }
 
     /// Tests that have been passed need not be taken again before more photons are there.
-    #[inline]
-    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32], mut counted: u32) {
-        let cells = self.tallies();
-        while counted != 0 {
-            let level = counted.trailing_zeros() as usize;
-            counted &= counted - 1;
-            self.test(&mut bandwidths[level], &mut counts[level * cells..][..cells]);
+    #[inline(always)]
+    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32], tally: &mut Tally) {
+        for (level, (bandwidth, counts)) in
+            bandwidths.iter_mut().zip(counts.chunks_exact_mut(self.counts())).enumerate()
+        {
+            if tally.unpack(level, counts) {
+                self.test(bandwidth, counts);
+            }
         }
     }
 }
@@ -273,7 +313,6 @@ impl CountingRule for ChiSquared {
 mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
-    use crate::transport::MAX_LEVELS;
 
     fn rule() -> ChiSquared {
         ChiSquared::new(&ChiSquaredSettings::default())
@@ -290,7 +329,9 @@ mod tests {
         let frame = Frame::from_normal(Vec3::Z);
         let offset = frame.t * x + frame.b * y;
         let bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
-        rule.count(&[bandwidth], counts, &frame, &Found::one(offset, x * x + y * y, 1.0));
+        let mut tally = Tally::default();
+        rule.count(&[bandwidth], counts, &mut tally, &frame, &Found::one(offset, x * x + y * y, 1.0));
+        tally.unpack(0, counts);
     }
 
     #[test]
@@ -304,7 +345,10 @@ mod tests {
                 let (x, y) = uniform(0, i);
                 let turn = y.atan2(x).rem_euclid(std::f32::consts::TAU) / std::f32::consts::TAU * sectors as f32;
                 if (turn - turn.round()).abs() > 1e-4 {
-                    assert_eq!(sector(frame.t * x + frame.b * y + frame.n * 0.3), turn as usize, "{x} {y}");
+                    let (turn, half) = (turn as usize, sectors / 2);
+                    let backwards = sectors.is_multiple_of(2) && turn >= half;
+                    let expected = if backwards { sectors + half - 1 - turn } else { turn };
+                    assert_eq!(sector(frame.t * x + frame.b * y + frame.n * 0.3), expected, "{x} {y}");
                 }
             }
             assert_eq!((sector(Vec3::ZERO), sector(frame.n)), (0, 0));
@@ -326,15 +370,21 @@ mod tests {
                 (offset[0][k], offset[1][k], distance2[k]) = (x, y, x * x + y * y);
             }
             let found = Found { offset: offset.map(f32x8::from), distance2: f32x8::from(distance2), light: f32x8::ONE };
-            let counted = rule.count(&levels, &mut together, &frame, &found);
-            for (level, counts) in apart.chunks_exact_mut(12).enumerate() {
-                let bit = rule.count(&levels[level..=level], counts, &frame, &found);
-                assert_eq!(bit, counted >> level & 1);
-                assert_eq!(bit == 1, distance2.iter().any(|d2| *d2 < levels[level].radius2));
+            // As often as a path may find photons at its vertices.
+            let (mut tally, mut tally_any) = (Tally::default(), Tally::default());
+            for _ in 0..trial % 9 {
+                rule.count(&levels, &mut together, &mut tally, &frame, &found);
+                rule.count_any(&levels, &mut any, &mut tally_any, &frame, &found);
             }
-            assert_eq!(together, apart);
-            assert_eq!(rule.count_any(&levels, &mut any, &frame, &found), counted);
-            assert_eq!(together, any);
+            for (level, counts) in apart.chunks_exact_mut(12).enumerate() {
+                let mut alone = Tally::default();
+                (0..trial % 9).for_each(|_| rule.count(&levels[level..=level], counts, &mut alone, &frame, &found));
+                let counted = alone.unpack(0, counts);
+                assert_eq!(counted, tally.unpack(level, &mut together[12 * level..][..12]));
+                assert_eq!(counted, tally_any.unpack(level, &mut any[12 * level..][..12]));
+                assert_eq!(counted, trial % 9 > 0 && distance2.iter().any(|d2| *d2 < levels[level].radius2));
+            }
+            assert_eq!((together, apart), (any, any));
         }
         assert!(together.chunks(12).all(|counts| counts.iter().all(|&count| count > 0)));
     }

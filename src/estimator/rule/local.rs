@@ -8,7 +8,7 @@
 
 use super::CountingRule;
 use crate::math::Frame;
-use crate::transport::Found;
+use crate::transport::{Found, MAX_LEVELS};
 use wide::{CmpLt, f32x8};
 
 /// The rule.
@@ -29,7 +29,8 @@ pub struct Bandwidth {
 
 impl CountingRule for LocalStatistics {
     type Bandwidth = Bandwidth;
-    type Tally = u32;
+    type Count = ();
+    type Tally = [u32; MAX_LEVELS];
 
     fn begin(&self, radius2: f32, _: f32, _: i32) -> Bandwidth {
         Bandwidth { radius2, photons: 0.0 }
@@ -41,16 +42,14 @@ impl CountingRule for LocalStatistics {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], tallies: &mut [u32], _: &Frame, photons: &Found) -> u32 {
-        for (bandwidth, tally) in bandwidths.iter().zip(tallies) {
-            *tally += photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask().count_ones();
+    fn count(&self, bandwidths: &[Bandwidth], _: &mut [()], tally: &mut Self::Tally, _: &Frame, photons: &Found) {
+        for (bandwidth, photons_within) in bandwidths.iter().zip(tally) {
+            *photons_within += photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2)).move_mask().count_ones();
         }
-        0
     }
 
-    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], tallies: &mut [u32], _: u32) {
-        for (bandwidth, tally) in bandwidths.iter_mut().zip(tallies) {
-            let new = f64::from(std::mem::take(tally));
+    fn update(&self, _: u64, bandwidths: &mut [Bandwidth], _: &mut [()], tally: &mut Self::Tally) {
+        for (bandwidth, new) in bandwidths.iter_mut().zip(tally.map(f64::from)) {
             if new > 0.0 {
                 let kept = bandwidth.photons + self.alpha * new;
                 let factor = kept / (bandwidth.photons + new);
@@ -85,7 +84,7 @@ mod tests {
                 (n, radius2, tau) = (kept, radius2 * factor, (tau + flux) * factor);
             }
             let before = ours;
-            rule.update(i, std::slice::from_mut(&mut ours), &mut [new], 0);
+            rule.update(i, std::slice::from_mut(&mut ours), &mut [], &mut [new, 0, 0, 0, 0]);
             assert!(ours.radius2 > 0.0 && ours.radius2 <= before.radius2 && ours.photons >= before.photons);
             assert!((f64::from(ours.radius2) / radius2 - 1.0).abs() < 1e-4 && (ours.photons - n).abs() < 1e-9 * n);
             assert!((tau / radius2 - sum).abs() < 1e-9 * sum, "iteration {i}");
@@ -102,7 +101,7 @@ mod tests {
         for i in 1..=1000 {
             // So many photons that rounding to whole ones is nothing.
             let new = (1e8 * f64::from(bandwidth.radius2)).round() as u32;
-            rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [new], 0);
+            rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [], &mut [new, 0, 0, 0, 0]);
             let expected = 0.7 * super::super::memoryless::radius2_factor(i, 0.7);
             assert!((f64::from(bandwidth.radius2) / expected - 1.0).abs() < 1e-4, "iteration {i}");
         }

@@ -14,14 +14,16 @@ use crate::transport::Found;
 pub trait CountingRule: Sync {
     /// State of a level of a pixel, kept between iterations.
     type Bandwidth: Copy + Send + Sync;
-    /// What is counted.
-    type Tally: Copy + Default + Send + Sync;
+    /// What is kept beside it.
+    type Count: Copy + Default + Send + Sync;
+    /// What the photons of one eye path add up to, at all its levels.
+    type Tally: Default;
 
     /// Whether photons beyond the largest bandwidth may be counted.
     const BEYOND: bool = false;
 
-    /// Tallies per bandwidth.
-    fn tallies(&self) -> usize {
+    /// Counts per bandwidth.
+    fn counts(&self) -> usize {
         1
     }
     /// The bandwidth before the first iteration: its radius squared, the photons that the pilot found within it (0: not known), and by how
@@ -35,10 +37,15 @@ pub trait CountingRule: Sync {
         let _ = bandwidths;
         largest2
     }
-    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all iterations. Returns the
-    /// levels in which something was counted, one bit each; none where the rule does not ask for them.
-    fn count(&self, bandwidths: &[Self::Bandwidth], tallies: &mut [Self::Tally], frame: &Frame, photons: &Found)
-    -> u32;
-    /// After iteration `i` (from 1). `counted` are the levels that [`CountingRule::count`] has returned in this iteration.
-    fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], tallies: &mut [Self::Tally], counted: u32);
+    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all iterations.
+    fn count(
+        &self,
+        bandwidths: &[Self::Bandwidth],
+        counts: &mut [Self::Count],
+        tally: &mut Self::Tally,
+        frame: &Frame,
+        photons: &Found,
+    );
+    /// After the eye path of iteration `i` (from 1), of whose photons `tally` is.
+    fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], counts: &mut [Self::Count], tally: &mut Self::Tally);
 }
