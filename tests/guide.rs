@@ -135,7 +135,7 @@ fn guided_light_is_the_same_light() {
 #[test]
 fn cells_follow_the_error_they_leave() {
     let scene = &lit()[2].1;
-    let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
+    let mut guide = Guide::new(&scene.lights, false).expect("something to aim at");
     assert_eq!(guide.cells(), 3);
     let share = |guide: &Guide, seed| {
         let pass = LightPass::new(seed, 0, Domain::Test, 20_000, u32::MAX).guided(Some(guide));
@@ -159,6 +159,12 @@ fn cells_follow_the_error_they_leave() {
     guide.learn(&[0.0, 1.0, 1.0], &[1.0; 3], &[1.0, 1.0, 9.0]);
     let [_, first, second] = share(&guide, 3);
     assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
+    // Where light paths are for all light, a fifth goes to what makes caustics, however much that matters.
+    let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
+    guide.learn(&[0.0, 9.0, 1.0], &[1.0; 3], &[1.0; 3]);
+    let [unguided, first, second] = share(&guide, 4);
+    assert!((unguided - 0.8).abs() < 0.01, "{unguided}");
+    assert!((first - 0.2 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.2 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
 }
 
 /// Light of a part of the picture and the variance of all of it, summed over pixels, after twelve iterations of one level.
@@ -200,15 +206,33 @@ fn lamps_have_budgets_of_their_own() {
     assert!(unguided > 4.0 * guided, "{unguided} and {guided}");
 }
 
+/// Rules that count photons find the light of unguided paths by guided ones: means of 16 seeds, Welch's test, one false alarm in a thousand runs.
+#[test]
+fn rules_that_count_photons_can_be_guided() {
+    let scene = room_with(0.15);
+    let critical = t_critical(1e-3, 2, 15.0);
+    for method in [Method::Appm, Method::Cppm] {
+        let mean = |guided: bool| {
+            let seeds = (1..=16).map(|seed| {
+                let narrow = InitialBandwidth::Fixed(0.05);
+                let settings = Settings { photons: 10_000, guided, initial: narrow, seed, ..Settings::default() };
+                light_and_variance(&scene, Settings { method, ..settings }, |p| p.parts.caustic).0
+            });
+            mean_and_error(&seeds.collect::<Vec<f64>>())
+        };
+        let ((a, error_a), (b, error_b)) = (mean(false), mean(true));
+        let allowed = critical * error_a.hypot(error_b);
+        println!("{method:?}: {a:.4} +- {error_a:.4}, guided {b:.4} +- {error_b:.4}");
+        assert!(a != b, "not guided");
+        assert!((a - b).abs() <= allowed, "{method:?}: {a} and guided {b}, allowed {allowed}");
+        assert!((a - 1.5 * b).abs() > allowed, "{method:?}: half as much again goes unnoticed");
+    }
+}
+
 /// A small ball far below a lamp: the noise of its caustic with and without the guide, after as many light paths.
 #[test]
 fn the_caustic_of_a_small_ball_is_found() {
-    let mut description = Description::default();
-    add(&mut description, "floor", quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0), matte(0.5, 0.0));
-    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.12, 0.0), 0.05, 48), glass(1.5));
-    description.lights.push(point_light(DVec3::new(3.0, 10.0, 2.0), 100.0));
-    description.cameras.push(look_at(DVec3::new(0.0, 0.5, 0.7), DVec3::new(0.0, 0.03, 0.0), 30.0));
-    let scene = build(description);
+    let scene = small_ball();
     let variance = |guided, indirect| {
         let narrow = InitialBandwidth::Fixed(0.02);
         let settings = Settings { photons: 20_000, guided, indirect, initial: narrow, ..Settings::default() };
@@ -223,11 +247,25 @@ fn the_caustic_of_a_small_ball_is_found() {
     }
 }
 
+fn small_ball() -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0), matte(0.5, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.12, 0.0), 0.05, 48), glass(1.5));
+    description.lights.push(point_light(DVec3::new(3.0, 10.0, 2.0), 100.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.5, 0.7), DVec3::new(0.0, 0.03, 0.0), 30.0));
+    build(description)
+}
+
 fn glass_room() -> Scene {
+    room_with(0.4)
+}
+
+/// A ball of glass of a radius under a lamp.
+fn room_with(radius: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
     add(&mut description, "lamp", quad(Vec3::new(-0.2, 1.98, -0.2), Vec3::X * 0.4, Vec3::Z * 0.4), matte(0.0, 20.0));
-    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.45, 0.0), 0.4, 64), glass(1.5));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.45, 0.0), radius, 64), glass(1.5));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     build(description)
 }

@@ -18,6 +18,9 @@ use std::ops::Range;
 
 /// Least share of unguided light paths: what the guide has never seen keeps its photons.
 const LEAST_UNGUIDED: f64 = 0.2;
+/// Most of the paths that go to targets where they are for all light: with bandwidths that neighbours set, more of them would be paid for with wider
+/// bandwidths for all that is no caustic. A few, sent where they matter, are many times what came there by chance.
+const MOST_TARGETED: f64 = 0.2;
 /// Share of the guided paths that all cells keep, by their lamps' power.
 const PRIOR: f64 = 0.1;
 /// Lamps that can be guided; beyond this many the weakest go unguided.
@@ -47,6 +50,8 @@ pub struct Guide {
     cells: Vec<(usize, Option<usize>)>,
     /// Of the cells by power alone.
     prior: Vec<f64>,
+    /// Most of the paths that go to targets.
+    most_targeted: f64,
     choice: Cdf,
 }
 
@@ -58,6 +63,8 @@ pub struct Guided {
     pub cell: usize,
     /// Native density over the mixture's: what the flux was multiplied by.
     pub ratio: f32,
+    /// Density of starts that are drawn by power alone over the mixture's.
+    pub weight: f32,
     /// Share of the mixture's density that paths of all light have, without those sent where caustics are made.
     pub unaimed: f32,
 }
@@ -103,7 +110,8 @@ impl Guide {
         let prior: Vec<f64> = std::iter::once(0.0).chain(cells[1..].iter().map(each)).collect();
         let weights = prior.iter().enumerate().map(|(cell, p)| if cell == UNGUIDED { 0.5 } else { 0.5 * p });
         let choice = Cdf::new(weights)?;
-        let mut guide = Guide { lamps, lamp_of, cells, prior, choice };
+        let most_targeted = if all { MOST_TARGETED } else { 1.0 };
+        let mut guide = Guide { lamps, lamp_of, cells, prior, most_targeted, choice };
         guide.spread();
         Some(guide)
     }
@@ -138,7 +146,15 @@ impl Guide {
                 (1.0 - unguided) * ((1.0 - PRIOR) * best / guided + PRIOR * self.prior[cell])
             }
         };
-        if let Some(choice) = Cdf::new(best.iter().copied().enumerate().map(weight)) {
+        let mut weights: Vec<f64> = best.iter().copied().enumerate().map(weight).collect();
+        let targeted: f64 = weights.iter().zip(&self.cells).filter(|(_, cell)| cell.1.is_some()).map(|(w, _)| w).sum();
+        if targeted > self.most_targeted {
+            let others = (1.0 - self.most_targeted) / (1.0 - targeted);
+            for (weight, (_, target)) in weights.iter_mut().zip(&self.cells) {
+                *weight *= if target.is_some() { self.most_targeted / targeted } else { others };
+            }
+        }
+        if let Some(choice) = Cdf::new(weights.into_iter()) {
             self.choice = choice;
             self.spread();
         }
@@ -192,8 +208,9 @@ impl Guide {
         for &(other, weight) in lamp.iter().flat_map(|lamp| &lamp.targets) {
             mixed += weight * Self::density(lights, &emission, other, target == Some(other));
         }
+        let plain = lights.plain(&emission);
         let (emission, ratio) = emission.drawn_with(mixed)?;
-        Some(Guided { emission, cell, ratio, unaimed: untargeted * unaimed / mixed })
+        Some(Guided { emission, cell, ratio, weight: plain / mixed, unaimed: untargeted * unaimed / mixed })
     }
 
     /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give it there.

@@ -540,6 +540,12 @@ impl Lights {
         }
     }
 
+    /// Density that a start has where none are aimed.
+    #[inline]
+    pub fn plain(&self, emission: &EmissionSample) -> f32 {
+        if emission.infinite { 1.0 / (PI * self.sky.radius * self.sky.radius) } else { emission.density.onward }
+    }
+
     /// Density that an aimed start has with the region in the mixture, and the part of it that paths of all light have: those through the whole scene and the
     /// region, without what is aimed.
     #[inline]

@@ -4,6 +4,7 @@
 //! the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid it does not
 //! care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
 
+use super::Mark;
 use crate::math::{Rgb, Vec3};
 use crate::spectrum::Band;
 use rayon::prelude::*;
@@ -48,6 +49,8 @@ pub struct Photon {
     pub depth: u16,
     /// Of the light path's wavelength.
     pub band: Band,
+    /// Its weight; nothing where light paths are not guided.
+    pub mark: Mark,
 }
 
 impl Photon {
@@ -313,6 +316,7 @@ mod tests {
                     flags: PhotonFlags(0),
                     depth: 2,
                     band: Band::WHITE,
+                    mark: Mark::default(),
                 }
             })
             .collect()
@@ -354,6 +358,7 @@ mod tests {
             flags: PhotonFlags(0),
             depth: 2,
             band: Band::WHITE,
+            mark: Mark::default(),
         }]);
         let count = |radius2| {
             let mut n = 0;

@@ -150,7 +150,7 @@ impl<P: Located> Near<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Photon, PhotonFlags};
+    use crate::photon::{Mark, Photon, PhotonFlags};
     use crate::random::{Domain, Purpose, Stream};
     use crate::spectrum::Band;
 
@@ -175,6 +175,7 @@ mod tests {
                     flags: PhotonFlags(0),
                     depth: 2,
                     band: Band::WHITE,
+                    mark: Mark::default(),
                 }
             })
             .collect();

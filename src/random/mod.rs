@@ -81,6 +81,8 @@ pub enum Purpose {
     LobeChoice = 21,
     /// Distance of a point in a medium by the angle as seen from a lamp.
     Equiangular = 22,
+    /// Rank of a photon among those of other weights.
+    Mark = 23,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

@@ -12,6 +12,7 @@ use crate::estimator::rule::CountingRule;
 use crate::estimator::rule::adaptive::Adaptive;
 use crate::estimator::rule::chi_squared::ChiSquared;
 use crate::estimator::rule::local::LocalStatistics;
+use crate::estimator::rule::thinned::Thinned;
 use crate::photon::{Kernel, kernel};
 use crate::scene::Scene;
 use crate::transport::Surroundings;
@@ -37,6 +38,10 @@ pub(super) fn passes<'a>(
 /// Progressive photon mapping by the rule that the settings say.
 fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Iterate + 'a> {
     match (settings.method, settings.radius_rule, settings.kernel) {
+        // Photons of equal flux are as dense as the light.
+        (Method::Cppm, ..) if sppm.guide().is_some() && !settings.chi_squared.plus => {
+            counting(sppm, settings, Thinned::new(&settings.chi_squared), kernel::Box)
+        }
         (Method::Cppm, ..) => counting(sppm, settings, ChiSquared::new(&settings.chi_squared), kernel::Box),
         (Method::Appm, _, KernelChoice::Box) => adaptive(sppm, settings, kernel::Box),
         (Method::Appm, _, KernelChoice::Epanechnikov) => adaptive(sppm, settings, kernel::Epanechnikov),

@@ -120,6 +120,7 @@ impl<'a, R: CountingRule> Counter<'a, R> {
 impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
     const COUNTS: bool = true;
     const BEYOND: bool = R::BEYOND;
+    const MARKS: bool = R::MARKS;
 
     #[inline(always)]
     fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {

@@ -3,6 +3,8 @@
 //! A round draws light paths by what the rounds before it have learnt, gathers their photons where eye paths look, and adds up by cell of the guide how
 //! much squared relative error every photon leaves in the picture: its own share of the pixel, squared, for it is there or not. The pixel's value is
 //! what the round itself finds there.
+//!
+//! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once learnt, does not leave less, there is none.
 
 use super::settings::Settings;
 use super::sppm::chunks;
@@ -32,6 +34,9 @@ const NEIGHBOURS: usize = 16;
 /// Added to a pixel's squared value: the relative error of [`super::Rendered::relative_error`].
 const DARK: f32 = 0.01;
 
+/// A guide that leaves more than this of the error that unguided light paths leave is not worth what its starts cost.
+const WORTH: f64 = 0.9;
+
 /// What the start of a guided light path costs, in vertices of one: as `auto` counts them.
 const START: f64 = 2.2;
 
@@ -56,7 +61,7 @@ impl Located for Marked {
     }
 }
 
-/// The guide of a view, learnt; `None` where there is nothing to choose.
+/// The guide of a view, learnt; `None` where there is nothing to choose, or nothing to gain by it.
 pub(super) fn learnt(
     eye: &Eye<'_>,
     surroundings: &Surroundings,
@@ -71,7 +76,10 @@ pub(super) fn learnt(
         let error = error(eye, seed, round, &maps, guide.cells());
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
-        guide.learn(&error, &paths, &work);
+        if round + 1 == ROUNDS && error.ratio() > WORTH {
+            return None;
+        }
+        guide.learn(&error.of_cells, &paths, &work);
     }
     Some(guide)
 }
@@ -126,15 +134,37 @@ fn photons(
     (all.map(PhotonMap::build), walked)
 }
 
-/// Sum over a round's eye paths of the squared relative errors that photons leave, by cell.
-fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> Vec<f64> {
+/// Sums over a round's eye paths of the squared relative errors that photons leave.
+struct Left {
+    of_cells: Vec<f64>,
+    /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w unguided ones, each 1 / w times as bright.
+    unguided: f64,
+}
+
+impl Left {
+    fn none(cells: usize) -> Left {
+        Left { of_cells: vec![0.0; cells], unguided: 0.0 }
+    }
+
+    fn add(&mut self, other: &Left) {
+        self.of_cells.iter_mut().zip(&other.of_cells).for_each(|(sum, more)| *sum += more);
+        self.unguided += other.unguided;
+    }
+
+    /// What guiding leaves of the error.
+    fn ratio(&self) -> f64 {
+        self.of_cells.iter().sum::<f64>() / self.unguided
+    }
+}
+
+fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> Left {
     let (width, height) = eye.camera.size();
     let pixels = u64::from(width) * u64::from(height);
     let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
     // Pixels in even steps from a first one drawn anew every round.
     let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
-        let mut error = vec![0.0f64; cells];
+        let mut error = Left::none(cells);
         let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
@@ -148,11 +178,9 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>,
         }
         error
     };
-    let parts: Vec<Vec<f64>> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
-    let mut sum = vec![0.0; cells];
-    for part in parts {
-        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
-    }
+    let parts: Vec<Left> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
+    let mut sum = Left::none(cells);
+    parts.iter().for_each(|part| sum.add(part));
     sum
 }
 
@@ -162,7 +190,7 @@ fn weigh(
     maps: &ByKind<PhotonMap<Marked>>,
     nearest: &mut ByKind<Nearest<Marked>>,
     probe: &Probe,
-    error: &mut [f64],
+    error: &mut Left,
 ) {
     let point = &probe.point;
     let cap = SCREEN_CAP * span(eye.camera, point.length);
@@ -176,16 +204,18 @@ fn weigh(
             if photon.ng.dot(point.ng) > 0.0 {
                 let found = scale * photon.flux;
                 sum += found;
-                light.push((marked.cell, luminance(found)));
+                light.push((marked.cell, luminance(found), photon.mark.weight()));
             }
         });
     }
     let value = luminance(sum + probe.direct);
     let inverse = 1.0 / (value * value + DARK);
-    for (cell, light) in light {
+    for (cell, light, weight) in light {
         let share = f64::from(light * light * inverse);
-        if share.is_finite() {
-            error[cell as usize] += share;
+        let unguided = share / f64::from(weight);
+        if unguided.is_finite() {
+            error.of_cells[cell as usize] += share;
+            error.unguided += unguided;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The methods, and what of a render's shape follows from the one chosen.
 
-use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, RadiusRule};
+use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS};
 use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
@@ -102,13 +102,9 @@ impl Method {
         self.gathers() || self == Method::Pm
     }
 
-    /// Whether its light paths can be guided: photons then differ in weight, which rules that count them would take for light.
-    pub fn guides(self, rule: RadiusRule) -> bool {
-        match self {
-            Method::Sppm => rule == RadiusRule::Memoryless,
-            Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm => true,
-            Method::Path | Method::Pm | Method::Ppm | Method::Appm | Method::Cppm => false,
-        }
+    /// Whether its light paths can be guided.
+    pub fn guides(self) -> bool {
+        self.gathers() || matches!(self, Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm)
     }
 
     /// Light paths where no number is asked for, of methods that count them.

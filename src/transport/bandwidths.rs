@@ -1,7 +1,7 @@
 //! Bandwidths where eye paths gather: what gathering asks of those who set them, and tells them.
 
 use crate::math::Vec3;
-use crate::photon::{ByKind, Kind, PhotonMap};
+use crate::photon::{ByKind, Kind, Mark, PhotonMap};
 use wide::f32x8;
 
 /// Most bandwidth levels of one eye path.
@@ -60,12 +60,15 @@ pub struct Found {
     pub distance2: f32x8,
     /// What they add to the path's measure, mean of RGB, before it is divided by an area.
     pub light: f32x8,
+    /// Their marks' bits, for those who ask for marks.
+    pub marks: [u32; 8],
 }
 
 impl Found {
     /// One photon.
-    pub fn one(offset: Vec3, distance2: f32, light: f32) -> Found {
+    pub fn one(offset: Vec3, distance2: f32, light: f32, mark: Mark) -> Found {
         Found {
+            marks: [mark.bits(), 0, 0, 0, 0, 0, 0, 0],
             offset: offset.to_array().map(|x| lane(x, 0.0)),
             distance2: lane(distance2, f32::INFINITY),
             light: lane(light, 0.0),
@@ -84,6 +87,8 @@ pub trait Bandwidths {
     const COUNTS: bool = false;
     /// Whether [`Bandwidths::reach2`] may be larger than the largest bandwidth.
     const BEYOND: bool = false;
+    /// Whether photons' marks are asked for.
+    const MARKS: bool = false;
     /// Photons within reach of the vertex of the last call of [`Bandwidths::at`].
     #[inline]
     fn count(&mut self, photons: &Found) {

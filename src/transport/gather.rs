@@ -38,6 +38,8 @@ pub(super) struct Batch<'a, K> {
     rows: [Row; 8],
     /// For those who count: where they are from the gathering point.
     offset: [[f32; 8]; 3],
+    /// And, for those who ask for them, their marks.
+    marks: [u32; 8],
     /// By level, of every eighth photon.
     sums: [[f32x8; 3]; MAX_LEVELS],
 }
@@ -57,6 +59,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
             count: 0,
             rows: [ABSENT; 8],
             offset: [[0.0; 8]; 3],
+            marks: [0; 8],
             sums: [[f32x8::ZERO; 3]; MAX_LEVELS],
         }
     }
@@ -75,6 +78,9 @@ impl<'a, K: Kernel> Batch<'a, K> {
                 self.offset[axis][at] = photon.p[axis] - self.p[axis];
             }
         }
+        if B::MARKS {
+            self.marks[at] = photon.mark.bits();
+        }
         self.count += 1;
         if self.count == 8 {
             self.flush(counter);
@@ -86,7 +92,8 @@ impl<'a, K: Kernel> Batch<'a, K> {
     fn push_unreachable<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
         let Some(gathering) = &self.unreachable else { return };
         let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
-        let found = Found::one(photon.p - self.p, distance2, (light * self.throughput).element_sum() / 3.0);
+        let found =
+            Found::one(photon.p - self.p, distance2, (light * self.throughput).element_sum() / 3.0, photon.mark);
         self.add::<B>(&light.to_array().map(|light| lane(light, 0.0)), found.distance2);
         if B::COUNTS && light != Rgb::ZERO {
             counter.count(&found);
@@ -108,6 +115,7 @@ impl<'a, K: Kernel> Batch<'a, K> {
                 offset: self.offset.map(f32x8::from),
                 distance2: dark.blend(f32x8::splat(f32::INFINITY), distance2),
                 light: light * (1.0 / 3.0),
+                marks: self.marks,
             });
         }
         self.count = 0;

@@ -8,7 +8,7 @@ use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{Rgb, Vec2};
-use crate::photon::{ByKind, Kind, Photon, PhotonFlags, VolumePhoton};
+use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
@@ -49,6 +49,8 @@ pub struct Emitted {
     pub cell: usize,
     /// Density of unguided emission, without a region of interest, over that of the guide; 1 where there is no guide.
     pub ratio: f32,
+    /// Density of starts that are drawn by power alone over that of the guide; 1 where there is no guide.
+    pub weight: f32,
     /// Share of the start's density that paths of all light have, without those sent where caustics are made.
     pub unaimed: f32,
 }
@@ -127,17 +129,17 @@ impl<'a> LightPass<'a> {
         let choice = self.choice.point(index);
         let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
-        let (emission, cell, ratio, unaimed) = match self.guide {
+        let (emission, cell, ratio, weight, unaimed) = match self.guide {
             Some(guide) => {
                 let guided = guide.emit(lights, shapes, materials, self.region, (choice, point, direction))?;
-                (guided.emission, guided.cell, guided.ratio, guided.unaimed)
+                (guided.emission, guided.cell, guided.ratio, guided.weight, guided.unaimed)
             }
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
                 lights.aim_or_light(&mut emission, self.region, choice.y, point);
                 let (mixed, unaimed) = lights.lit(&emission, self.region);
                 let (emission, _) = emission.drawn_with(mixed)?;
-                (emission, guide::UNGUIDED, 1.0, unaimed / mixed)
+                (emission, guide::UNGUIDED, 1.0, 1.0, unaimed / mixed)
             }
         };
         let mut flux = emission.flux / self.paths as f32;
@@ -165,6 +167,7 @@ impl<'a> LightPass<'a> {
             density: emission.density,
             cell,
             ratio,
+            weight,
             unaimed,
         })
     }
@@ -197,6 +200,8 @@ struct Deposit<'a> {
     gain: f32,
     /// What flux is multiplied by here.
     scale: f32,
+    /// What photons would weigh if it were 1; `None` where no light path is guided.
+    weight: Option<f32>,
     /// Vertices so far.
     vertices: u32,
 }
@@ -221,6 +226,7 @@ impl<'a> Deposit<'a> {
             goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
             gain: 1.0 / probability,
             scale: 1.0,
+            weight: pass.guide.is_some().then_some(emitted.weight),
             vertices: 0,
         }
     }
@@ -253,6 +259,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
+            let mark = self.weight.map(|weight| Mark::new(weight * self.scale, vertex.draws.one(Purpose::Mark)));
             let flags = u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
             self.photons.surface[kind as usize].push(Photon {
                 p: vertex.surface.p,
@@ -262,6 +269,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flags: PhotonFlags(flags),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
                 band: Band::of(vertex.wavelength.as_ref()),
+                mark: mark.unwrap_or_default(),
             });
         }
         Next::Continue(self.onward)

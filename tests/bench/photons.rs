@@ -4,7 +4,7 @@
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
 use caustique::math::{Rgb, Vec3};
-use caustique::photon::{Nearest, Photon, PhotonFlags, PhotonMap};
+use caustique::photon::{Mark, Nearest, Photon, PhotonFlags, PhotonMap};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::spectrum::Band;
 use std::time::Instant;
@@ -173,6 +173,7 @@ fn main() {
             flags: PhotonFlags(0),
             depth: 2,
             band: Band::WHITE,
+            mark: Mark::default(),
         };
         let t = Instant::now();
         let map = PhotonMap::build(points.iter().map(photon).collect());

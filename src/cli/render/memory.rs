@@ -32,7 +32,10 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
     // Bandwidths of their own, and counts.
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
     let state = match method {
-        Method::Cppm => size_of::<chi_squared::Bandwidth>() + cells * size_of::<u32>(),
+        Method::Cppm => {
+            // Guided, the largest weight as well.
+            size_of::<chi_squared::Bandwidth>() + (cells + usize::from(settings.guided)) * size_of::<u32>()
+        }
         Method::Appm => size_of::<adaptive::Bandwidth>(),
         _ if method.gathers() && !settings.is_memoryless() => size_of::<local::Bandwidth>(),
         _ => 0,

@@ -41,7 +41,7 @@ pub struct RenderArgs {
     /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
-    /// Memory for the map of pm in MiB, while it is built: 152 bytes a photon. Where it is full, light paths end, and a warning says
+    /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a warning says
     /// so [default: 1024]
     #[arg(long, value_name = "MIB", value_parser = value_parser!(u32).range(1..), help_heading = "Method")]
     pub photon_memory: Option<u32>,
@@ -84,7 +84,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, help_heading = "Method")]
     pub kernel: Option<Kernel>,
     /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
-    /// the same, its noise another. Not for path, pm and the methods that count photons [default: off; auto tries both]
+    /// the same, its noise another. Not for path, pm and --cppm-plus [default: off; auto tries both]
     #[arg(long, value_enum, help_heading = "Method")]
     pub guide: Option<Switch>,
     /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
@@ -333,7 +333,7 @@ impl FromStr for ShardChoice {
 }
 
 /// The helps of `--levels` and `--photon-memory` name these.
-const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 152);
+const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 160);
 
 fn level_count(text: &str) -> std::result::Result<usize, String> {
     let range = format!("it must be a whole number from 1 to {MAX_LEVELS}");
@@ -372,7 +372,7 @@ impl RenderArgs {
             (self.cppm_beta.is_some() && method != render::Method::Cppm, "--cppm-beta"),
             (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
             (self.cppm_plus && method != render::Method::Cppm, "--cppm-plus"),
-            (self.guide == Some(Switch::On) && !method.guides(rule), "--guide"),
+            (self.guide == Some(Switch::On) && (!method.guides() || self.cppm_plus), "--guide"),
             (self.indirect == Some(Indirect::Paths) && (method != M::Sppm || local), "--indirect"),
             (self.debug_techniques.is_some() && !method.has_techniques(), "--debug-techniques"),
         ];
@@ -382,7 +382,8 @@ impl RenderArgs {
             return Err(error.hint("leave --kernel out, or choose --method sppm with the memoryless rule, or appm"));
         }
         let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
-        let cause = format!("{option} has no effect with --method {}", method.name());
+        let plus = if self.cppm_plus { " --cppm-plus" } else { "" };
+        let cause = format!("{option} has no effect with --method {}{plus}", method.name());
         let other = match *option {
             "--photon-memory" => "pm",
             "--debug-techniques" => "vcm",
@@ -425,7 +426,7 @@ impl RenderArgs {
     pub fn allowed(&self, way: Way) -> Option<Settings> {
         let guide = match self.guide {
             None => true,
-            Some(Switch::On) => way.guided || !way.method.guides(render::RadiusRule::Memoryless),
+            Some(Switch::On) => way.guided || !way.method.guides(),
             Some(Switch::Off) => !way.guided,
         };
         let indirect = self.indirect.is_none_or(|asked| !way.method.gathers() || way.indirect == asked.into());

@@ -86,10 +86,10 @@ impl Tally {
         true
     }
 
-    /// Makes room.
+    /// Adds the photons of all levels to their counts.
     #[cold]
     #[inline(never)]
-    fn unpack_all(&mut self, counts: &mut [u32]) {
+    pub fn settle(&mut self, counts: &mut [u32]) {
         for (level, counts) in counts.chunks_exact_mut(USUAL).enumerate() {
             self.counted[level] = self.unpack(level, counts);
         }
@@ -194,7 +194,7 @@ impl ChiSquared {
         }
         tally.eights += 1;
         if tally.eights == MOST_EIGHTS {
-            tally.unpack_all(counts);
+            tally.settle(counts);
         }
     }
 
@@ -312,6 +312,7 @@ impl CountingRule for ChiSquared {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::photon::Mark;
     use crate::random::{Domain, Purpose, Stream};
 
     fn rule() -> ChiSquared {
@@ -330,7 +331,7 @@ mod tests {
         let offset = frame.t * x + frame.b * y;
         let bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
         let mut tally = Tally::default();
-        rule.count(&[bandwidth], counts, &mut tally, &frame, &Found::one(offset, x * x + y * y, 1.0));
+        rule.count(&[bandwidth], counts, &mut tally, &frame, &Found::one(offset, x * x + y * y, 1.0, Mark::default()));
         tally.unpack(0, counts);
     }
 
@@ -339,8 +340,9 @@ mod tests {
         for sectors in [1, 2, 3, 4, 5, 6, 8, 12] {
             let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
             let frame = Frame::from_normal(Vec3::new(0.0, 1.0, 0.0));
-            let sector =
-                |offset: Vec3| rule.sectors(&frame, &Found::one(offset, 0.0, 1.0).offset).to_array()[0] as usize;
+            let sector = |offset: Vec3| {
+                rule.sectors(&frame, &Found::one(offset, 0.0, 1.0, Mark::default()).offset).to_array()[0] as usize
+            };
             for i in 0..2000 {
                 let (x, y) = uniform(0, i);
                 let turn = y.atan2(x).rem_euclid(std::f32::consts::TAU) / std::f32::consts::TAU * sectors as f32;
@@ -369,7 +371,12 @@ mod tests {
                 let (x, y) = uniform(trial, k as u64);
                 (offset[0][k], offset[1][k], distance2[k]) = (x, y, x * x + y * y);
             }
-            let found = Found { offset: offset.map(f32x8::from), distance2: f32x8::from(distance2), light: f32x8::ONE };
+            let found = Found {
+                offset: offset.map(f32x8::from),
+                distance2: f32x8::from(distance2),
+                light: f32x8::ONE,
+                marks: [0; 8],
+            };
             // As often as a path may find photons at its vertices.
             let (mut tally, mut tally_any) = (Tally::default(), Tally::default());
             for _ in 0..trial % 9 {

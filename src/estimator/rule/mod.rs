@@ -4,6 +4,7 @@ pub mod adaptive;
 pub mod chi_squared;
 pub mod local;
 pub mod memoryless;
+pub mod thinned;
 pub mod volume;
 
 use crate::math::Frame;
@@ -21,6 +22,9 @@ pub trait CountingRule: Sync {
 
     /// Whether photons beyond the largest bandwidth may be counted.
     const BEYOND: bool = false;
+
+    /// Whether it asks for photons' marks.
+    const MARKS: bool = false;
 
     /// Counts per bandwidth.
     fn counts(&self) -> usize {
