@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone and of vcm, with and without, of all pixels and without the worst 0.1 %.
+"""Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone, of sppm and cppm whose photons bring all light, and of vcm, with and without, of all pixels and without the worst 0.1 %.
 On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
 
 Settings, references and environment variables are those of auto.py.
@@ -11,12 +11,13 @@ import auto
 from _iteration import read
 from record import record
 
-RUNS = {
+PLAIN = {
     "sppm": auto.options("sppm") + " --indirect paths",
-    "sppm guided": auto.options("sppm") + " --indirect paths --guide on",
+    "all": auto.options("sppm"),
+    "cppm": auto.options("cppm"),
     "vcm": auto.options("vcm"),
-    "vcm guided": auto.options("vcm") + " --guide on",
 }
+RUNS = {name + how: plain + option for name, plain in PLAIN.items() for how, option in (("", ""), (" guided", " --guide on"))}
 
 
 def caustics(scene):
@@ -44,7 +45,7 @@ def caustics(scene):
 
 def main():
     rows = []
-    print(f"{'scene':<10}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + f"{'sppm gains':>12}{'vcm gains':>12}  mean ratios, guided")
+    print(f"{'scene':<10}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + "".join(f"{name + ' gains':>12}" for name in PLAIN) + "  mean ratios, guided")
     for scene in auto.SCENES:
         data, _ = auto.measure(scene, RUNS)
         runs = {name: [p for p in data["points"] if p["run"] == name] for name in RUNS}
@@ -57,14 +58,14 @@ def main():
                 point[figure] -= own
             errors = {name: auto.at(points, figure, seconds) for name, points in runs.items()}
             row[figure] = errors
-            gains = [errors[name] / errors[f"{name} guided"] for name in ("sppm", "vcm")]
+            gains = [errors[name] / errors[f"{name} guided"] for name in PLAIN]
             line = f"{scene:<10}{figure:<16}" + "".join(f"{error:>13.2g}" for error in errors.values())
-            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  {means['sppm guided']:.4f} {means['vcm guided']:.4f}", flush=True)
+            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + "  " + " ".join(f"{means[name + ' guided']:.4f}" for name in PLAIN), flush=True)
         if scene in auto.GUIDED:
             row["caustics"] = caustics(scene)
             errors = row["caustics"]["errors"]
             mean = {name: sum(each) / len(each) for name, each in errors.items()}
-            gains = [mean[name] / mean[f"{name} guided"] for name in ("sppm", "vcm")]
+            gains = [mean[name] / mean[f"{name} guided"] for name in PLAIN]
             line = f"{scene:<10}{'layer Caustic':<16}" + "".join(f"{error:>13.2g}" for error in mean.values())
             print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  reference {row['caustics']['reference']:.2g}", flush=True)
         rows.append(row)

@@ -6,6 +6,7 @@
 //!
 //! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once learnt, does not leave less, there is none.
 
+use super::auto::cost::GUIDED_START;
 use super::settings::Settings;
 use super::sppm::chunks;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
@@ -36,9 +37,6 @@ const DARK: f32 = 0.01;
 
 /// A guide that leaves more than this of the error that unguided light paths leave is not worth what its starts cost.
 const WORTH: f64 = 0.9;
-
-/// What the start of a guided light path costs, in vertices of one: as `auto` counts them.
-const START: f64 = 2.2;
 
 /// A photon and the component of the guide that has made it.
 #[derive(Clone, Copy)]
@@ -117,7 +115,7 @@ fn photons(
                 marked.extend(photons.drain(..).map(|photon| Marked { photon, cell: cell as u32 }));
             }
             walked[cell].paths += 1.0;
-            walked[cell].work += START + f64::from(vertices);
+            walked[cell].work += GUIDED_START + f64::from(vertices);
         }
         (marked, walked)
     };

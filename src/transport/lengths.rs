@@ -26,12 +26,17 @@ pub struct Lengths {
     pub light: f64,
     /// Of one that ends at broad lobes.
     pub light_to_broad: f64,
+    /// Those of an eye path that have lobes which are not delta: they ask for light, gather photons and are connected.
+    pub eye_open: f64,
+    /// The same of a light path.
+    pub light_open: f64,
 }
 
-/// Counts vertices, and those up to the first with broad lobes.
+/// Counts vertices, those up to the first with broad lobes, and those that are no perfect mirrors or clear glass.
 struct Count {
     all: u32,
     to_broad: u32,
+    open: u32,
     narrow: bool,
 }
 
@@ -40,7 +45,7 @@ impl<'a> Visitor<'a> for Count {
         self.narrow &= scattered.is_none_or(|s| !s.lobe.has(LobeSet::BROAD));
         self.all += 1;
         self.to_broad += u32::from(self.narrow);
-        let _ = vertex;
+        self.open += u32::from(vertex.shading.bsdf.lobes() != LobeSet::DELTA);
         Next::Continue(LobeSet::ALL)
     }
 }
@@ -53,7 +58,7 @@ impl Lengths {
         let lights = LightPass::new(seed, 0, Domain::GuideLight, PATHS, eye.max_depth).guided(guide);
         let count = |index: u32| {
             let arena = Bump::new();
-            let new = || Count { all: 0, to_broad: 0, narrow: true };
+            let new = || Count { all: 0, to_broad: 0, open: 0, narrow: true };
             let (mut from_eye, mut from_light) = (new(), new());
             let pixel = u64::from(index) * pixels / u64::from(PATHS);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
@@ -64,11 +69,13 @@ impl Lengths {
                 let (start, stream) = (&emitted.start, emitted.stream);
                 walk(eye.scene, &arena, start, stream, Transport::Importance, eye.max_depth, &mut from_light);
             }
-            [from_eye.all, from_eye.to_broad, from_light.all, from_light.to_broad].map(u64::from)
+            [&from_eye, &from_light].map(|count| [count.all, count.to_broad, count.open].map(f64::from))
         };
-        let counts: Vec<[u64; 4]> = (0..PATHS).into_par_iter().with_min_len(CHUNK).map(count).collect();
-        let sums = counts.iter().fold([0; 4], |a, b| std::array::from_fn(|k| a[k] + b[k]));
-        let [eye, eye_to_broad, light, light_to_broad] = sums.map(|sum| sum as f64 / f64::from(PATHS));
-        Lengths { eye, eye_to_broad, light, light_to_broad }
+        let counts: Vec<[[f64; 3]; 2]> = (0..PATHS).into_par_iter().with_min_len(CHUNK).map(count).collect();
+        // Whole numbers: their sums do not depend on any order.
+        let mean = |of: usize, k: usize| counts.iter().map(|count| count[of][k]).sum::<f64>() / f64::from(PATHS);
+        let [[eye, eye_to_broad, eye_open], [light, light_to_broad, light_open]] =
+            [0, 1].map(|of| [0, 1, 2].map(|k| mean(of, k)));
+        Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open }
     }
 }

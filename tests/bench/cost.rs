@@ -1,9 +1,9 @@
 //! What `--method auto` takes an iteration to cost, by counted work, beside what it costs.
 //!
-//! `cargo bench --bench cost -- SCENE.glb... [width=W]`: core-seconds of an iteration by way and scene; the last line is JSON for `scripts/figures`.
+//! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the last line is JSON for `scripts/figures`.
 
 use caustique::render::auto::{Way, counted_cost};
-use caustique::render::{Method, Session, Settings, Stage, cpu_seconds};
+use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
 use caustique::transport::Indirect;
@@ -12,7 +12,9 @@ const ITERATIONS: u32 = 4;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let width = arguments.iter().find_map(|a| a.strip_prefix("width=")?.parse().ok()).unwrap_or(320);
+    let number = |name: &str| arguments.iter().find_map(|a| a.strip_prefix(name)?.parse().ok());
+    let width = number("width=").unwrap_or(320);
+    let levels = number("levels=").map(|levels| Levels::new(levels as usize));
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
     let caustics = Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
     let ways = [
@@ -31,6 +33,7 @@ fn main() {
             scene.camera(&View { camera: None, width: Some(width), height: None }).unwrap_or_else(|e| panic!("{e}"));
         for way in ways {
             let settings = Settings::of(way);
+            let settings = Settings { levels: levels.unwrap_or(settings.levels), ..settings };
             let stage = Stage::new(&scene, &camera, &settings);
             let mut session = Session::new(&stage);
             session.step();

@@ -7,29 +7,31 @@ use crate::render::settings::Settings;
 use crate::transport::{Indirect, Lengths};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
-const EYE_PATH: f64 = 0.45e-6;
+const EYE_PATH: f64 = 0.43e-6;
 /// A vertex of an eye path with its light sample.
-const EYE_VERTEX: f64 = 0.65e-6;
+const EYE_VERTEX: f64 = 0.63e-6;
 /// Photons gathered at a vertex.
-const GATHER: f64 = 0.45e-6;
+const GATHER: f64 = 0.07e-6;
 /// The start of a light path.
-const LIGHT_PATH: f64 = 0.45e-6;
+const LIGHT_PATH: f64 = 0.06e-6;
 /// What guiding adds to that.
-const GUIDE: f64 = 1.0e-6;
+const GUIDE: f64 = 0.09e-6;
 /// A vertex of a light path, its photon, and its share of the map.
-const LIGHT_VERTEX: f64 = 0.65e-6;
+const LIGHT_VERTEX: f64 = 0.84e-6;
 /// A vertex of either path where both are kept and their MIS weights with them.
-const TWO_WAY_VERTEX: f64 = 0.75e-6;
+const TWO_WAY_VERTEX: f64 = 0.65e-6;
 /// A connection of two vertices.
-const CONNECTION: f64 = 0.35e-6;
+const CONNECTION: f64 = 0.62e-6;
 /// Photons merged at a vertex.
-const MERGE: f64 = 1.0e-6;
+const MERGE: f64 = 0.5e-6;
 
 /// What counting photons adds to gathering them.
-const COUNTING: f64 = 0.15e-6;
-/// Times as much where media scatter: vertices on the way, which are not counted, and paths that are longer. The second where both paths are kept: every
-/// connection goes through the medium.
-const MEDIA: (f64, f64) = (2.4, 2.8);
+const COUNTING: f64 = 0.13e-6;
+/// What the start of a guided light path costs, in vertices of one.
+pub(in crate::render) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
+/// Times as much where media scatter, of path tracing, where both paths are kept, and where photons are gathered: vertices on the way, which are not counted,
+/// and paths that are longer.
+const MEDIA: [f64; 3] = [2.8, 3.2, 2.0];
 
 /// Eye paths of a pixel in an iteration.
 fn eye_paths(settings: &Settings) -> f64 {
@@ -48,7 +50,7 @@ pub(super) struct Cost {
 impl Cost {
     /// Core-seconds of an iteration of a picture of so many pixels.
     pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
-        let Lengths { eye, eye_to_broad, light, light_to_broad } = self.lengths;
+        let Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open } = self.lengths;
         let paths = pixels * eye_paths(settings);
         let photons = f64::from(settings.photons);
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
@@ -59,12 +61,13 @@ impl Cost {
                 paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + gather)) + photons * (start + light * LIGHT_VERTEX)
             }
             (method, Indirect::Paths) if method.gathers() => {
-                paths * (EYE_PATH + eye * (EYE_VERTEX + gather)) + photons * (start + light_to_broad * LIGHT_VERTEX)
+                paths * (EYE_PATH + eye * EYE_VERTEX + eye_open * gather)
+                    + photons * (start + light_to_broad * LIGHT_VERTEX)
             }
             (method, _) => {
                 let merges = if method.has_bandwidths() { MERGE } else { 0.0 };
                 let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
-                paths * (both + eye * (EYE_VERTEX + light * CONNECTION + merges))
+                paths * (both + eye_open * (light_open * CONNECTION + merges))
             }
         };
         seconds * self.media(way.method)
@@ -73,8 +76,9 @@ impl Cost {
     fn media(&self, method: Method) -> f64 {
         match method {
             _ if !self.scattering => 1.0,
-            Method::Bdpt | Method::Vcm => MEDIA.1,
-            _ => MEDIA.0,
+            Method::Path => MEDIA[0],
+            method if method.gathers() => MEDIA[2],
+            _ => MEDIA[1],
         }
     }
 
@@ -96,9 +100,13 @@ impl Cost {
             (Method::Path, _) => [Some(media * pixels * beyond * EYE_VERTEX), None],
             // Without caustics there would be no photons.
             (method, Indirect::Paths) if method.gathers() => {
-                let paths = self.of(Way { method: Method::Path, ..way }, settings, pixels);
+                let alone = Way { method: Method::Path, ..way };
+                let paths = self.of(alone, settings, pixels) / self.media(alone.method);
                 let eyes = eye_paths(settings);
-                [Some(media * eyes * pixels * beyond * (EYE_VERTEX + GATHER)), Some(all - eyes * paths)]
+                [
+                    Some(media * eyes * pixels * beyond * (EYE_VERTEX + GATHER)),
+                    Some(media * (all / media - eyes * paths)),
+                ]
             }
             _ => [None, None],
         }

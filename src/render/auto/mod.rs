@@ -11,7 +11,7 @@
 
 mod balance;
 mod bias;
-mod cost;
+pub(super) mod cost;
 mod tail;
 mod trial;
 mod weights;
