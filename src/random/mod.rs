@@ -93,7 +93,8 @@ pub fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+/// Steps between numbers that are to be mixed: 2^64 over the golden ratio \[Steele, Lea, Flood 2014\].
+pub const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// 24 random bits to a float in `[0, 1)`.
 #[inline]

@@ -155,6 +155,7 @@ impl Left {
     }
 }
 
+/// What the photons of a round leave where its eye paths look.
 fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> Left {
     let (width, height) = eye.camera.size();
     let pixels = u64::from(width) * u64::from(height);

@@ -10,7 +10,7 @@ use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{Rgb, Vec2};
 use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
-use crate::random::{Domain, Purpose, SobolPair, Stream, mix};
+use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, mix};
 use crate::scene::Scene;
 use crate::spectrum::{Band, Comb, Hue};
 use bumpalo::Bump;
@@ -58,9 +58,7 @@ pub struct Emitted {
 impl<'a> LightPass<'a> {
     /// Pass `pass` of `paths` light paths.
     pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPass<'a> {
-        let key =
-            mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(0x9e37_79b9_7f4a_7c15))
-                ^ domain as u64);
+        let key = mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(GOLDEN)) ^ domain as u64);
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
         let (choice, point, direction) = (pair(1), pair(2), pair(3));
         LightPass {

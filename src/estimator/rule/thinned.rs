@@ -10,7 +10,7 @@ use super::CountingRule;
 use super::chi_squared::{self, Bandwidth, ChiSquared, ChiSquaredSettings};
 use crate::math::Frame;
 use crate::photon::mark;
-use crate::random::mix;
+use crate::random::{GOLDEN, mix};
 use crate::transport::{Found, MAX_LEVELS};
 use wide::f32x8;
 
@@ -31,7 +31,7 @@ fn thin(counts: &mut [u32], probability: f64, seed: u64) {
     let threshold = (probability * 2f64.powi(64)) as u64;
     let mut state = seed;
     let mut kept = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        state = state.wrapping_add(GOLDEN);
         mix(state) < threshold
     };
     for count in counts {
