@@ -32,8 +32,9 @@ impl PhotonFlags {
     }
 }
 
-/// A light-path vertex, as small as gathering allows.
-#[derive(Clone, Copy, Debug)]
+/// A light-path vertex, as small as gathering allows, and in the order in which gathering loads it.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
 pub struct Photon {
     /// World position.
     pub p: Vec3,
@@ -43,10 +44,10 @@ pub struct Photon {
     pub ng: Vec3,
     /// Flux (W), already divided by the number of light paths of the pass.
     pub flux: Rgb,
-    /// Kind of light path.
-    pub flags: PhotonFlags,
     /// Segments of the light path up to here.
     pub depth: u16,
+    /// Kind of light path.
+    pub flags: PhotonFlags,
     /// Of the light path's wavelength.
     pub band: Band,
     /// Its weight; nothing where light paths are not guided.

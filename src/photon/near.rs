@@ -97,13 +97,13 @@ impl<P: Located> PhotonMap<P> {
             return false;
         }
         for photons in near.photons.chunks(8) {
-            let of = |f: &dyn Fn(&P) -> f32| {
-                f32x8::from(std::array::from_fn::<f32, 8, _>(|k| photons.get(k).map_or(f32::INFINITY, f)))
+            let row = |k: usize| {
+                let Some(photon) = photons.get(k) else { return f32x8::splat(f32::INFINITY) };
+                let (p, n) = (photon.position(), photon.normal());
+                f32x8::from([p.x, p.y, p.z, n.x, n.y, n.z, 0.0, 0.0])
             };
-            near.eights.push(Eight {
-                p: std::array::from_fn(|a| of(&|photon| photon.position()[a])),
-                n: std::array::from_fn(|a| of(&|photon| photon.normal()[a])),
-            });
+            let [px, py, pz, nx, ny, nz, ..] = f32x8::transpose(std::array::from_fn(row));
+            near.eights.push(Eight { p: [px, py, pz], n: [nx, ny, nz] });
         }
         near.hits.resize(near.eights.len() + 1, Hits { distance2: f32x8::ZERO, inside: 0, first: 0 });
         (near.center, near.radius) = (center, radius);

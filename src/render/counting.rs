@@ -18,7 +18,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
 use crate::random::{Domain, Streams};
-use crate::transport::{Bandwidths, EqualFlux, EyeMeasure, Found, LevelRadii, PathStart, Scratch};
+use crate::transport::{Bandwidths, Counter, EqualFlux, EyeMeasure, Found, LevelRadii, PathStart, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -93,21 +93,13 @@ impl Layout {
     }
 }
 
-/// Both kinds; of one that is not there, no levels.
-struct Counter<'a, R: CountingRule> {
+/// Those of an eye path, by kind; of one that is not there, no levels.
+struct OfPath<'a, R: CountingRule> {
     rule: &'a R,
     states: ByKind<States<'a, R>>,
-    /// What is being counted, and where.
-    kind: Kind,
-    frame: Frame,
 }
 
-impl<'a, R: CountingRule> Counter<'a, R> {
-    #[inline(always)]
-    fn new(rule: &'a R, states: ByKind<States<'a, R>>) -> Counter<'a, R> {
-        Counter { rule, states, kind: Kind::Indirect, frame: Frame::from_normal(Vec3::Z) }
-    }
-
+impl<R: CountingRule> OfPath<'_, R> {
     /// After the eye path of iteration `i`.
     #[inline(always)]
     fn finish(&mut self, i: u64) {
@@ -117,27 +109,50 @@ impl<'a, R: CountingRule> Counter<'a, R> {
     }
 }
 
-impl<R: CountingRule> Bandwidths for &mut Counter<'_, R> {
-    const COUNTS: bool = true;
+impl<'a, R: CountingRule> Bandwidths for &mut OfPath<'a, R> {
+    type Place = Frame;
+    type Counter<'c>
+        = OfVertex<'c, 'a, R>
+    where
+        Self: 'c;
+
+    /// One function of the normal in all iterations: counts of different gathering points are added.
+    #[inline(always)]
+    fn place(ng: Vec3) -> Frame {
+        Frame::from_normal(ng)
+    }
+
+    #[inline(always)]
+    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
+        self.states[kind as usize].radii()
+    }
+
+    #[inline(always)]
+    fn counter<'c>(&'c mut self, kind: Kind, frame: &'c Frame) -> OfVertex<'c, 'a, R> {
+        OfVertex { rule: self.rule, states: &mut self.states[kind as usize], frame }
+    }
+}
+
+/// Those of a kind, where an eye path gathers it.
+struct OfVertex<'c, 'a, R: CountingRule> {
+    rule: &'a R,
+    states: &'c mut States<'a, R>,
+    frame: &'c Frame,
+}
+
+impl<R: CountingRule> Counter for OfVertex<'_, '_, R> {
     const BEYOND: bool = R::BEYOND;
     const MARKS: bool = R::MARKS;
 
     #[inline(always)]
-    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, ng: Vec3, _: f32) -> LevelRadii {
-        // One function of the normal in all iterations: counts of different gathering points are added.
-        (self.kind, self.frame) = (kind, Frame::from_normal(ng));
-        self.states[kind as usize].radii()
+    fn count(&mut self, photons: &Found) {
+        let States { bandwidths, counts, tally } = &mut *self.states;
+        self.rule.count(bandwidths, counts, tally, self.frame, photons);
     }
 
     #[inline]
     fn reach2(&self, largest2: f32) -> f32 {
-        self.rule.reach2(self.states[self.kind as usize].bandwidths, largest2)
-    }
-
-    #[inline(always)]
-    fn count(&mut self, photons: &Found) {
-        let States { bandwidths, counts, tally } = &mut self.states[self.kind as usize];
-        self.rule.count(bandwidths, counts, tally, &self.frame, photons);
+        self.rule.reach2(self.states.bandwidths, largest2)
     }
 }
 
@@ -217,9 +232,9 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                     let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
                     let volume = maps.volume(pixel, levels.clone());
                     let states = layout.states(channel, levels, bandwidths, counts);
-                    let mut counter = Counter::new(rule, states);
-                    let measure = eye.measure(scratch, start, &maps.surface, volume, &mut counter, kernel);
-                    counter.finish(i);
+                    let mut own = OfPath { rule, states };
+                    let measure = eye.measure(scratch, start, &maps.surface, volume, &mut own, kernel);
+                    own.finish(i);
                     measure
                 };
                 let correlated = correlated.as_ref().and_then(|starts| starts[k].as_ref());

@@ -72,6 +72,14 @@ struct Neighbours<'a> {
 }
 
 impl Bandwidths for Neighbours<'_> {
+    type Place = ();
+    type Counter<'c>
+        = ()
+    where
+        Self: 'c;
+
+    fn place(_: Vec3) {}
+
     fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
         let cap = (SCREEN_CAP * span(self.camera, length)).max(self.least);
         let cap2 = cap * cap;
@@ -79,6 +87,8 @@ impl Bandwidths for Neighbours<'_> {
         let radius2 = nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
         LevelRadii::new(std::iter::once(radius2.max(self.least * self.least)))
     }
+
+    fn counter(&mut self, _: Kind, (): &()) {}
 }
 
 /// The passes of a render.

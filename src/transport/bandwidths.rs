@@ -83,30 +83,64 @@ pub(super) fn lane(x: f32, others: f32) -> f32x8 {
 
 /// Bandwidths where an eye path gathers.
 pub trait Bandwidths {
-    /// Whether [`Bandwidths::count`] is to be called.
-    const COUNTS: bool = false;
-    /// Whether [`Bandwidths::reach2`] may be larger than the largest bandwidth.
+    /// What counting needs to know of a vertex, whatever the kind.
+    type Place;
+    /// Who is told of the photons found at a vertex.
+    type Counter<'c>: Counter
+    where
+        Self: 'c;
+
+    /// That of a vertex with geometric normal `ng`.
+    fn place(ng: Vec3) -> Self::Place;
+
+    /// Those for photons of a kind at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
+    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+    /// Who is told of those.
+    fn counter<'c>(&'c mut self, kind: Kind, place: &'c Self::Place) -> Self::Counter<'c>;
+}
+
+/// Counts the photons found at one vertex.
+pub trait Counter {
+    /// Whether [`Counter::count`] is to be called.
+    const COUNTS: bool = true;
+    /// Whether [`Counter::reach2`] may be larger than the largest bandwidth.
     const BEYOND: bool = false;
     /// Whether photons' marks are asked for.
     const MARKS: bool = false;
-    /// Photons within reach of the vertex of the last call of [`Bandwidths::at`].
-    #[inline]
-    fn count(&mut self, photons: &Found) {
-        let _ = photons;
-    }
+
+    /// Photons within reach.
+    fn count(&mut self, photons: &Found);
     /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
     #[inline]
     fn reach2(&self, largest2: f32) -> f32 {
         largest2
     }
-    /// Those for photons of a kind at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
-    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+}
+
+/// Counts nothing.
+impl Counter for () {
+    const COUNTS: bool = false;
+
+    #[inline]
+    fn count(&mut self, _: &Found) {}
 }
 
 /// The same all along the path.
 impl Bandwidths for &ByKind<LevelRadii> {
+    type Place = ();
+    type Counter<'c>
+        = ()
+    where
+        Self: 'c;
+
+    #[inline]
+    fn place(_: Vec3) {}
+
     #[inline]
     fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
         self[kind as usize]
     }
+
+    #[inline]
+    fn counter(&mut self, _: Kind, (): &()) {}
 }

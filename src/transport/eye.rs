@@ -13,9 +13,9 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
-use super::bandwidths::{Bandwidths, MAX_LEVELS};
+use super::bandwidths::{Bandwidths, Counter, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
-use super::gather::{Batch, Scratch};
+use super::gather::{Batch, Scratch, Waiting};
 use super::interior::Interior;
 use super::segment::Known;
 use super::shares::leads;
@@ -121,6 +121,7 @@ struct Gather<'a, B, K, const PATHS: bool> {
     near: &'a mut ByKind<Near<Photon>>,
     volume: Option<Volume<'a>>,
     near_volume: &'a mut Near<VolumePhoton>,
+    waiting: &'a mut Waiting,
     bandwidths: B,
     max_depth: u32,
     measure: EyeMeasure,
@@ -236,6 +237,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
         // What a photon of caustics makes of sharp lobes is in the same class.
         let sight = self.sight.then(Event::Broad);
+        let place = B::place(vertex.surface.ng);
         for (kind, beam) in [(Kind::Indirect, Beam::SCATTERED), (Kind::Caustic, Beam::FOCUSED)] {
             let class = sight.receives(beam);
             if self.photons[kind as usize].photons().is_empty() || !self.classes.has(class) {
@@ -243,13 +245,21 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             }
             // Caustics that surfaces scatter on before they are seen are indirect light.
             let caustic = kind == Kind::Caustic && (!PATHS || class.part() == Part::Caustic);
-            self.gather_kind(kind, caustic, vertex, broad, sharp);
+            self.gather_kind(kind, caustic, vertex, &place, broad, sharp);
         }
     }
 
     // Once for both kinds and all who gather: by far the most code of all that compilers see here.
     #[inline(never)]
-    fn gather_kind(&mut self, kind: Kind, caustic: bool, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
+    fn gather_kind(
+        &mut self,
+        kind: Kind,
+        caustic: bool,
+        vertex: &Vertex<'_, '_>,
+        place: &B::Place,
+        broad: LobeSet,
+        sharp: LobeSet,
+    ) {
         let (p, ng) = (vertex.surface.p, vertex.surface.ng);
         let photons = &self.photons[kind as usize];
         let mut radii = self.bandwidths.at(kind, photons, p, ng, self.length);
@@ -261,19 +271,20 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
-        let reach2 = self.bandwidths.reach2(largest);
-        let mut batch = Batch::new(self.kernel, radii, vertex, broad, broad | sharp);
-        let (near, bandwidths) = (&mut self.near[kind as usize], &mut self.bandwidths);
+        let mut counter = self.bandwidths.counter(kind, place);
+        let reach2 = counter.reach2(largest);
+        let mut batch = Batch::new(self.kernel, radii, self.waiting, vertex, broad, broad | sharp);
+        let near = &mut self.near[kind as usize];
         let push = |photon: &Photon, distance2| {
             if u32::from(photon.depth) <= longest {
-                batch.push(photon, distance2, bandwidths);
+                batch.push(photon, distance2, &mut counter);
             }
         };
         match &vertex.wavelength {
             None => photons.gather(near, p, ng, reach2, push),
             Some(wavelength) => gather_dispersed(photons, near, vertex, wavelength, reach2, push),
         }
-        let sums = batch.finish(&mut self.bandwidths);
+        let sums = batch.finish(&mut counter);
         let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
         for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
             into[usize::from(level)] += vertex.throughput * (FRAC_1_PI / radius2) * sum;
@@ -516,6 +527,7 @@ impl Eye<'_> {
             near: &mut scratch.near,
             volume,
             near_volume: &mut scratch.near_volume,
+            waiting: &mut scratch.waiting,
             bandwidths,
             max_depth: self.max_depth,
             measure: EyeMeasure::default(),

@@ -1,6 +1,6 @@
 //! Photons gathered at a vertex, eight at a time.
 
-use super::bandwidths::{Bandwidths, Found, MAX_LEVELS, lane};
+use super::bandwidths::{Counter, Found, MAX_LEVELS, lane};
 use super::walk::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
@@ -17,37 +17,65 @@ pub struct Scratch {
     pub(super) near: ByKind<Near<Photon>>,
     /// Photons in media near the last vertices there.
     pub(super) near_volume: Near<VolumePhoton>,
+    /// Room for those that are waiting for their BSDF.
+    pub(super) waiting: Waiting,
 }
 
-/// A photon that is waiting: the direction of its light, its cosine, its flux, and how far it is from the gathering point, squared.
-type Row = [f32; 8];
+/// Photons that are waiting, copied as they are: it takes two stores, and their columns are had by shuffles when eight are together.
+#[derive(Default)]
+pub(super) struct Waiting {
+    photons: [Photon; 8],
+    count: usize,
+}
 
-/// In the place of a photon that is not there: it has no cosine, so it brings nothing.
-const ABSENT: Row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f32::INFINITY];
+impl Waiting {
+    #[inline(always)]
+    fn push(&mut self, photon: &Photon) {
+        self.photons[self.count] = *photon;
+        self.count += 1;
+    }
+
+    /// Their positions, directions, normals and fluxes, component by component.
+    #[inline(always)]
+    fn columns(&self) -> [[f32x8; 3]; 4] {
+        let photons = self.photons.each_ref();
+        let rows = photons.map(|Photon { p, wi, ng, .. }| [p.x, p.y, p.z, wi.x, wi.y, wi.z, ng.x, ng.y]);
+        let [px, py, pz, wx, wy, wz, nx, ny] = f32x8::transpose(rows.map(f32x8::from));
+        // The last four numbers are the second half of a row that begins with others, which is one load.
+        let rows = photons.map(|Photon { wi, ng, flux, .. }| [wi.y, wi.z, ng.x, ng.y, ng.z, flux.x, flux.y, flux.z]);
+        let [.., nz, red, green, blue] = f32x8::transpose(rows.map(f32x8::from));
+        [[px, py, pz], [wx, wy, wz], [nx, ny, nz], [red, green, blue]]
+    }
+}
+
+/// Places of eight.
+const LANES: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 /// Photons of one kind waiting for their BSDF, and the sums of those that have had it.
-pub(super) struct Batch<'a, K> {
+pub(super) struct Batch<'a, 's, K> {
     kernel: std::marker::PhantomData<K>,
-    radii: &'a [f32],
+    radii: &'s [f32],
     p: Vec3,
     throughput: Rgb,
     gathering: Gathering<'a>,
     /// For photons that no eye path that goes on could find; `None` where it is the same.
     unreachable: Option<Gathering<'a>>,
-    count: usize,
-    rows: [Row; 8],
-    /// For those who count: where they are from the gathering point.
-    offset: [[f32; 8]; 3],
-    /// And, for those who ask for them, their marks.
-    marks: [u32; 8],
+    waiting: &'s mut Waiting,
     /// By level, of every eighth photon.
     sums: [[f32x8; 3]; MAX_LEVELS],
 }
 
-impl<'a, K: Kernel> Batch<'a, K> {
+impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
     /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else finds.
     #[inline]
-    pub fn new(_: K, radii: &'a [f32], vertex: &Vertex<'a, '_>, set: LobeSet, all: LobeSet) -> Batch<'a, K> {
+    pub fn new(
+        _: K,
+        radii: &'s [f32],
+        waiting: &'s mut Waiting,
+        vertex: &Vertex<'a, '_>,
+        set: LobeSet,
+        all: LobeSet,
+    ) -> Batch<'a, 's, K> {
         let shading = vertex.shading;
         Batch {
             kernel: std::marker::PhantomData,
@@ -56,76 +84,70 @@ impl<'a, K: Kernel> Batch<'a, K> {
             throughput: vertex.throughput,
             gathering: shading.gathering(set),
             unreachable: (set != all).then(|| shading.gathering(all)),
-            count: 0,
-            rows: [ABSENT; 8],
-            offset: [[0.0; 8]; 3],
-            marks: [0; 8],
+            waiting,
             sums: [[f32x8::ZERO; 3]; MAX_LEVELS],
         }
     }
 
     /// Adds a photon at a distance squared within reach.
     #[inline(always)]
-    pub fn push<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
+    pub fn push<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
         if photon.flags.has(PhotonFlags::UNREACHABLE) && self.unreachable.is_some() {
             return self.push_unreachable(photon, distance2, counter);
         }
-        let at = self.count;
-        let Photon { wi, flux, .. } = photon;
-        self.rows[at] = [wi.x, wi.y, wi.z, photon.cosine(), flux.x, flux.y, flux.z, distance2];
-        if B::COUNTS {
-            for axis in 0..3 {
-                self.offset[axis][at] = photon.p[axis] - self.p[axis];
-            }
-        }
-        if B::MARKS {
-            self.marks[at] = photon.mark.bits();
-        }
-        self.count += 1;
-        if self.count == 8 {
+        self.waiting.push(photon);
+        if self.waiting.count == 8 {
             self.flush(counter);
         }
     }
 
     /// Adds a photon that no eye path could find: few, and out of the way of the others.
     #[inline(never)]
-    fn push_unreachable<B: Bandwidths>(&mut self, photon: &Photon, distance2: f32, counter: &mut B) {
+    fn push_unreachable<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
         let Some(gathering) = &self.unreachable else { return };
         let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
         let found =
             Found::one(photon.p - self.p, distance2, (light * self.throughput).element_sum() / 3.0, photon.mark);
-        self.add::<B>(&light.to_array().map(|light| lane(light, 0.0)), found.distance2);
-        if B::COUNTS && light != Rgb::ZERO {
+        self.add::<C>(&light.to_array().map(|light| lane(light, 0.0)), found.distance2);
+        if C::COUNTS && light != Rgb::ZERO {
             counter.count(&found);
         }
     }
 
     #[inline(never)]
-    fn flush<B: Bandwidths>(&mut self, counter: &mut B) {
-        let [x, y, z, cosine, red, green, blue, distance2] = f32x8::transpose(self.rows.map(f32x8::from));
-        let f = self.gathering.eight([x, y, z], cosine);
-        let found = [f[0] * red, f[1] * green, f[2] * blue];
-        self.add::<B>(&found, distance2);
-        if B::COUNTS {
+    fn flush<C: Counter>(&mut self, counter: &mut C) {
+        let [p, wi, ng, flux] = self.waiting.columns();
+        let there = LANES.cmp_lt(f32x8::splat(self.waiting.count as f32));
+        let from = self.p.to_array().map(f32x8::splat);
+        let offset = [p[0] - from[0], p[1] - from[1], p[2] - from[2]];
+        // As the map has found it.
+        let distance2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+        let distance2 = there.blend(distance2, f32x8::splat(f32::INFINITY));
+        // Where none waits, what is left of another has no cosine, so that it brings nothing.
+        let cosine = there & (wi[0] * ng[0] + wi[1] * ng[1] + wi[2] * ng[2]).abs();
+        let f = self.gathering.eight(wi, cosine);
+        let found = [f[0] * flux[0], f[1] * flux[1], f[2] * flux[2]];
+        self.add::<C>(&found, distance2);
+        if C::COUNTS {
             let weight = self.throughput.to_array().map(f32x8::splat);
             let light = found[0].mul_add(weight[0], found[1].mul_add(weight[1], found[2] * weight[2]));
             // Photons that bring nothing do not count [CPPM 2020, 7.2].
             let dark = light.cmp_eq(f32x8::ZERO);
             counter.count(&Found {
-                offset: self.offset.map(f32x8::from),
+                offset,
                 distance2: dark.blend(f32x8::splat(f32::INFINITY), distance2),
                 light: light * (1.0 / 3.0),
-                marks: self.marks,
+                marks: if C::MARKS { self.waiting.photons.map(|photon| photon.mark.bits()) } else { [0; 8] },
             });
         }
-        self.count = 0;
+        self.waiting.count = 0;
     }
 
     /// Adds what photons bring to the levels that hold them.
     #[inline(always)]
-    fn add<B: Bandwidths>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
+    fn add<C: Counter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
         // What is within reach is within the largest.
-        if K::BOX && !B::BEYOND && self.radii.len() == 1 {
+        if K::BOX && !C::BEYOND && self.radii.len() == 1 {
             self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
             return;
         }
@@ -141,9 +163,8 @@ impl<'a, K: Kernel> Batch<'a, K> {
 
     /// The sums by level.
     #[inline]
-    pub fn finish<B: Bandwidths>(&mut self, counter: &mut B) -> [Rgb; MAX_LEVELS] {
-        if self.count > 0 {
-            self.rows[self.count..].fill(ABSENT);
+    pub fn finish<C: Counter>(&mut self, counter: &mut C) -> [Rgb; MAX_LEVELS] {
+        if self.waiting.count > 0 {
             self.flush(counter);
         }
         self.sums.map(|sums| Rgb::from(sums.map(f32x8::reduce_add)))

@@ -21,7 +21,7 @@ mod site;
 mod volume;
 mod walk;
 
-pub use bandwidths::{Bandwidths, Found, LevelRadii, MAX_LEVELS};
+pub use bandwidths::{Bandwidths, Counter, Found, LevelRadii, MAX_LEVELS};
 pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Strategies, Technique};
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Left, LightVertices, Splat};

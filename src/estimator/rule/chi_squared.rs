@@ -7,7 +7,7 @@ use super::CountingRule;
 use crate::math::{Frame, Vec3};
 use crate::transport::{Found, MAX_LEVELS};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
-use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, u32x4};
+use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, i32x4, u32x4, u64x4};
 
 /// Parameters, with the paper's defaults (section 9.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,20 +48,32 @@ pub struct ChiSquared {
     rings: Vec<f32>,
     /// Directions of the borders between sectors, from the first axis, on one half of the disc if their number is even.
     rays: Vec<(f32, f32)>,
+    /// Whether there are two annuli of six sectors.
+    usual: bool,
 }
 
 /// Cells of two annuli of six sectors.
 const USUAL: usize = 12;
-/// Bits of a cell in [`Tally::packed`], and how many times eight photons they count at most.
+/// Bits of a cell in [`Tally::packed`], and how many times eight photons they count at most, of which a quarter are in each number.
 const BITS: u32 = 5;
-const MOST_EIGHTS: u32 = 3;
-const _: () = assert!(8 * MOST_EIGHTS < 1 << BITS && USUAL as u32 * BITS < u64::BITS);
+const MOST_EIGHTS: u32 = 15;
+const _: () = assert!(2 * MOST_EIGHTS < 1 << BITS && USUAL as u32 * BITS < u64::BITS);
+/// Bits of a cell beside every other in the sum of those numbers, and all that every other cell has in them.
+const WIDE: u32 = 2 * BITS;
+const EVEN: u64 = {
+    let (mut mask, mut cell) = (0, 0);
+    while cell < USUAL as u32 {
+        mask |= ((1 << BITS) - 1) << (cell * BITS);
+        cell += 2;
+    }
+    mask
+};
 
 /// What the photons of one eye path add to counts.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within.
-    packed: [u64; MAX_LEVELS],
+    /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within; the sum of four numbers.
+    packed: [u64x4; MAX_LEVELS],
     /// How many times eight photons these may be.
     eights: u32,
     /// By level, whether something has been counted beside those.
@@ -72,16 +84,19 @@ impl Tally {
     /// Adds the photons of a level to its counts, and says whether any were there.
     #[inline(always)]
     fn unpack(&mut self, level: usize, counts: &mut [u32]) -> bool {
-        let packed = std::mem::take(&mut self.packed[level]);
-        if packed << (u64::BITS - USUAL as u32 * BITS) == 0 {
+        let packed = std::mem::take(&mut self.packed[level]).to_array();
+        // Sums of cells that have room beside each other.
+        let even = packed.iter().fold(0, |sum, packed| sum + (packed & EVEN));
+        let odd = packed.iter().fold(0, |sum, packed| sum + (packed >> BITS & EVEN));
+        if even | odd == 0 {
             return self.counted[level];
         }
         let Some(counts) = counts.first_chunk_mut::<USUAL>() else { return false };
         let (fours, _) = counts.as_chunks_mut::<4>();
         for (k, four) in fours.iter_mut().enumerate() {
-            let shifts = u32x4::from(std::array::from_fn(|cell| cell as u32 * BITS));
-            let added = u32x4::splat((packed >> (4 * BITS * k as u32)) as u32) >> shifts;
-            *four = (u32x4::from(*four) + (added & u32x4::splat((1 << BITS) - 1))).to_array();
+            let [even, odd] = [even, odd].map(|cells| (cells >> (2 * WIDE * k as u32)) as u32);
+            let added = u32x4::from([even, odd, even, odd]) >> u32x4::from([0, 0, WIDE, WIDE]);
+            *four = (u32x4::from(*four) + (added & u32x4::splat((1 << WIDE) - 1))).to_array();
         }
         true
     }
@@ -127,6 +142,7 @@ impl ChiSquared {
             critical: (1..=annuli).map(|annuli| quantile(annuli * sectors)).collect(),
             rings: (1..annuli).map(|ring| ring as f32 / annuli as f32).collect(),
             rays,
+            usual: (annuli, sectors) == (2, 6),
         }
     }
 
@@ -190,7 +206,9 @@ impl ChiSquared {
             let within = photons.distance2.cmp_lt(by(bandwidth.radius2));
             let place = within.blend(sector + (outside & outer), by((USUAL as u32 * BITS) as f32));
             let places = place.fast_trunc_int().to_array();
-            *packed = places.into_iter().fold(*packed, |sum, place| sum.wrapping_add(1 << place));
+            let ones = |first: usize| u64x4::from(std::array::from_fn(|k| 1 << places[first + k]));
+            // Those not within may run over the last bit, and are nobody's.
+            *packed += ones(0) + ones(4);
         }
         tally.eights += 1;
         if tally.eights == MOST_EIGHTS {
@@ -198,7 +216,7 @@ impl ChiSquared {
         }
     }
 
-    /// Sum of counts, and of their squares; exact as long as those are below 2^53.
+    /// Sum of counts, and of their squares; exact as long as those are below 2^53, and each count below 2^31.
     #[inline]
     fn sums(counts: &[u32]) -> (f64, f64) {
         let (mut totals, mut squares) = (f64x4::ZERO, f64x4::ZERO);
@@ -207,10 +225,12 @@ impl ChiSquared {
             squares += count * count;
         };
         let (fours, rest) = counts.as_chunks::<4>();
+        // Numbers with a sign are converted by one instruction, those without by three.
+        let signed = |four: &[u32; 4]| f64x4::from_i32x4(i32x4::from(four.map(u32::cast_signed)));
         match fours {
             // Those of the usual cells without a loop.
-            [a, b, c] => [a, b, c].into_iter().for_each(|four| add(f64x4::from(four.map(f64::from)))),
-            fours => fours.iter().for_each(|four| add(f64x4::from(four.map(f64::from)))),
+            [a, b, c] => [a, b, c].into_iter().for_each(|four| add(signed(four))),
+            fours => fours.iter().for_each(|four| add(signed(four))),
         }
         rest.iter().for_each(|&count| add(f64x4::from([f64::from(count), 0.0, 0.0, 0.0])));
         (totals.reduce_add(), squares.reduce_add())
@@ -289,11 +309,11 @@ impl CountingRule for ChiSquared {
 
     #[inline(always)]
     fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], tally: &mut Tally, frame: &Frame, photons: &Found) {
-        match (self.annuli, self.sectors) {
-            (2, 6) => Self::count_usual(bandwidths, counts, tally, frame, photons),
-            // A copy, so that photons need not be in memory for the others.
-            _ => self.count_any(bandwidths, counts, tally, frame, &photons.clone()),
+        if self.usual {
+            return Self::count_usual(bandwidths, counts, tally, frame, photons);
         }
+        // A copy, so that photons need not be in memory for the others.
+        self.count_any(bandwidths, counts, tally, frame, &photons.clone());
     }
 
     /// Tests that have been passed need not be taken again before more photons are there.
@@ -377,19 +397,20 @@ mod tests {
                 light: f32x8::ONE,
                 marks: [0; 8],
             };
-            // As often as a path may find photons at its vertices.
+            // As often as a path may find photons at its vertices, and more often than a tally holds.
+            let times = trial % 37;
             let (mut tally, mut tally_any) = (Tally::default(), Tally::default());
-            for _ in 0..trial % 9 {
+            for _ in 0..times {
                 rule.count(&levels, &mut together, &mut tally, &frame, &found);
                 rule.count_any(&levels, &mut any, &mut tally_any, &frame, &found);
             }
             for (level, counts) in apart.chunks_exact_mut(12).enumerate() {
                 let mut alone = Tally::default();
-                (0..trial % 9).for_each(|_| rule.count(&levels[level..=level], counts, &mut alone, &frame, &found));
+                (0..times).for_each(|_| rule.count(&levels[level..=level], counts, &mut alone, &frame, &found));
                 let counted = alone.unpack(0, counts);
                 assert_eq!(counted, tally.unpack(level, &mut together[12 * level..][..12]));
                 assert_eq!(counted, tally_any.unpack(level, &mut any[12 * level..][..12]));
-                assert_eq!(counted, trial % 9 > 0 && distance2.iter().any(|d2| *d2 < levels[level].radius2));
+                assert_eq!(counted, times > 0 && distance2.iter().any(|d2| *d2 < levels[level].radius2));
             }
             assert_eq!((together, apart), (any, any));
         }
