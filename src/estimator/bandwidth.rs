@@ -40,6 +40,11 @@ pub fn span(camera: &Camera, length: f32) -> f32 {
     slope * length + at_zero
 }
 
+/// [`InitialBandwidth::Footprint`] at the end of a path of some length.
+pub fn footprint(camera: &Camera, length: f32) -> f32 {
+    FOOTPRINT_PIXELS * span(camera, length) / camera.size().0 as f32
+}
+
 /// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the picture's width.
 pub fn initial_bandwidths<const MAPS: usize>(
     eye: &Eye<'_>,
@@ -101,7 +106,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
             InitialBandwidth::Nearest(k) => {
                 nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
             }
-            _ => (FOOTPRINT_PIXELS * span / width as f32).min(cap),
+            _ => footprint(camera, point.length).min(cap),
         };
         r.max(least)
     };

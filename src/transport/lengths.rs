@@ -6,6 +6,8 @@ use super::light::LightPass;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Guide;
+use crate::math::Vec3;
+use crate::photon::{Located, PhotonMap, same_surface};
 use crate::random::{Domain, Stream};
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -30,14 +32,50 @@ pub struct Lengths {
     pub eye_open: f64,
     /// The same of a light path.
     pub light_open: f64,
+    /// Vertices of light paths that one of the eye merges with, where there are as many light paths as pixels.
+    pub merged: f64,
 }
 
-/// Counts vertices, those up to the first with broad lobes, and those that are no perfect mirrors or clear glass.
+/// Where a vertex is that has lobes which are not delta.
+#[derive(Clone, Copy)]
+struct Open {
+    p: Vec3,
+    ng: Vec3,
+}
+
+impl Located for Open {
+    fn position(&self) -> Vec3 {
+        self.p
+    }
+
+    fn normal(&self) -> Vec3 {
+        self.ng
+    }
+
+    fn is_finite(&self) -> bool {
+        self.p.is_finite()
+    }
+}
+
+/// Counts vertices, those up to the first with broad lobes, and lists those that are no perfect mirrors or clear glass.
 struct Count {
     all: u32,
     to_broad: u32,
-    open: u32,
+    open: Vec<Open>,
     narrow: bool,
+    /// Length of the path up to the first of the listed ones.
+    length: f32,
+}
+
+impl Count {
+    fn new() -> Count {
+        Count { all: 0, to_broad: 0, open: Vec::new(), narrow: true, length: 0.0 }
+    }
+
+    /// Vertices, those up to the first with broad lobes, and those that are listed.
+    fn counts(&self) -> [f64; 3] {
+        [f64::from(self.all), f64::from(self.to_broad), self.open.len() as f64]
+    }
 }
 
 impl<'a> Visitor<'a> for Count {
@@ -45,37 +83,66 @@ impl<'a> Visitor<'a> for Count {
         self.narrow &= scattered.is_none_or(|s| !s.lobe.has(LobeSet::BROAD));
         self.all += 1;
         self.to_broad += u32::from(self.narrow);
-        self.open += u32::from(vertex.shading.bsdf.lobes() != LobeSet::DELTA);
+        if self.open.is_empty() {
+            self.length += vertex.distance;
+        }
+        if vertex.shading.bsdf.lobes() != LobeSet::DELTA {
+            self.open.push(Open { p: vertex.surface.p, ng: vertex.surface.ng });
+        }
         Next::Continue(LobeSet::ALL)
     }
 }
 
 impl Lengths {
-    /// Of paths of a view, the light paths guided if there is a guide.
-    pub fn new(eye: &Eye<'_>, surroundings: &Surroundings, seed: u64, guide: Option<&Guide>) -> Lengths {
+    /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which an eye path merges that is so long up to where
+    /// it first may.
+    pub fn new(
+        eye: &Eye<'_>,
+        surroundings: &Surroundings,
+        seed: u64,
+        guide: Option<&Guide>,
+        reach: impl Fn(f32) -> f32 + Sync,
+    ) -> Lengths {
         let (width, height) = eye.camera.size();
         let pixels = u64::from(width) * u64::from(height);
         let lights = LightPass::new(seed, 0, Domain::GuideLight, PATHS, eye.max_depth).guided(guide);
-        let count = |index: u32| {
-            let arena = Bump::new();
-            let new = || Count { all: 0, to_broad: 0, open: 0, narrow: true };
-            let (mut from_eye, mut from_light) = (new(), new());
+        let from_light = |index: u32| {
+            let mut count = Count::new();
+            if let Some(emitted) = lights.emit(eye.scene, surroundings, index) {
+                let (start, stream) = (&emitted.start, emitted.stream);
+                walk(eye.scene, &Bump::new(), start, stream, Transport::Importance, eye.max_depth, &mut count);
+            }
+            count
+        };
+        let from_eye = |index: u32| {
+            let mut count = Count::new();
             let pixel = u64::from(index) * pixels / u64::from(PATHS);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
             let stream = Stream::new(seed, u64::MAX, Domain::GuideEye, u64::from(index));
             let start = eye.start(at, stream);
-            walk(eye.scene, &arena, &start, stream, Transport::Radiance, eye.max_depth, &mut from_eye);
-            if let Some(emitted) = lights.emit(eye.scene, surroundings, index) {
-                let (start, stream) = (&emitted.start, emitted.stream);
-                walk(eye.scene, &arena, start, stream, Transport::Importance, eye.max_depth, &mut from_light);
-            }
-            [&from_eye, &from_light].map(|count| [count.all, count.to_broad, count.open].map(f64::from))
+            walk(eye.scene, &Bump::new(), &start, stream, Transport::Radiance, eye.max_depth, &mut count);
+            count
         };
-        let counts: Vec<[[f64; 3]; 2]> = (0..PATHS).into_par_iter().with_min_len(CHUNK).map(count).collect();
+        let paths = || (0..PATHS).into_par_iter().with_min_len(CHUNK);
+        let light: Vec<Count> = paths().map(from_light).collect();
+        let eye: Vec<Count> = paths().map(from_eye).collect();
+        let map = PhotonMap::build(light.iter().flat_map(|count| &count.open).copied().collect());
+        // As many as are there are found in an area that is larger by as much as these paths are fewer.
+        let larger = pixels as f32 / PATHS as f32;
+        let merged = |count: &Count| {
+            let (mut merged, radius2) = (0u64, reach(count.length).powi(2) * larger);
+            for open in &count.open {
+                map.within(open.p, radius2, |other, _| merged += u64::from(same_surface(other, open.ng)));
+            }
+            merged
+        };
+        let merged: Vec<u64> = eye.par_iter().with_min_len(CHUNK).map(merged).collect();
         // Whole numbers: their sums do not depend on any order.
-        let mean = |of: usize, k: usize| counts.iter().map(|count| count[of][k]).sum::<f64>() / f64::from(PATHS);
+        let mean =
+            |counts: &[Count], k: usize| counts.iter().map(|count| count.counts()[k]).sum::<f64>() / f64::from(PATHS);
         let [[eye, eye_to_broad, eye_open], [light, light_to_broad, light_open]] =
-            [0, 1].map(|of| [0, 1, 2].map(|k| mean(of, k)));
-        Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open }
+            [&eye, &light].map(|counts| [0, 1, 2].map(|k| mean(counts, k)));
+        let merged = merged.iter().sum::<u64>() as f64 / f64::from(PATHS);
+        Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open, merged }
     }
 }

@@ -22,9 +22,10 @@ const LIGHT_VERTEX: f64 = 0.84e-6;
 const TWO_WAY_VERTEX: f64 = 0.65e-6;
 /// A connection of two vertices.
 const CONNECTION: f64 = 0.62e-6;
-/// Photons merged at a vertex.
-const MERGE: f64 = 0.5e-6;
-
+/// A vertex where photons to merge with are looked for.
+const LOOK: f64 = 0.1e-6;
+/// A photon that is merged.
+const MERGE: f64 = 0.058e-6;
 /// What counting photons adds to gathering them.
 const COUNTING: f64 = 0.13e-6;
 /// What the start of a guided light path costs, in vertices of one.
@@ -50,7 +51,7 @@ pub(super) struct Cost {
 impl Cost {
     /// Core-seconds of an iteration of a picture of so many pixels.
     pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
-        let Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open } = self.lengths;
+        let Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open, merged } = self.lengths;
         let paths = pixels * eye_paths(settings);
         let photons = f64::from(settings.photons);
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
@@ -65,9 +66,9 @@ impl Cost {
                     + photons * (start + light_to_broad * LIGHT_VERTEX)
             }
             (method, _) => {
-                let merges = if method.has_bandwidths() { MERGE } else { 0.0 };
+                let merges = if method.has_bandwidths() { eye_open * LOOK + merged * MERGE } else { 0.0 };
                 let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
-                paths * (both + eye_open * (light_open * CONNECTION + merges))
+                paths * (both + eye_open * light_open * CONNECTION + merges)
             }
         };
         seconds * self.media(way.method)

@@ -26,6 +26,8 @@ use super::method::Method;
 use super::session::{Session, Spent, Stage};
 use super::settings::Settings;
 use crate::camera::Camera;
+use crate::estimator::InitialBandwidth;
+use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
 use crate::plan::Presence;
 use crate::scene::Scene;
@@ -167,7 +169,12 @@ fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Gu
     let surroundings = Surroundings::new(scene, camera.position());
     let Settings { max_depth, seed, classes, .. } = *settings;
     let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons, classes };
-    Cost { lengths: Lengths::new(&eye, &surroundings, seed, guide), scattering: scene.survey.scattering() }
+    let reach = |length: f32| match settings.initial {
+        InitialBandwidth::Fixed(radius) => radius,
+        _ => footprint(camera, length),
+    };
+    let lengths = Lengths::new(&eye, &surroundings, seed, guide, reach);
+    Cost { lengths, scattering: scene.survey.scattering() }
 }
 
 /// What a pilot is of.
