@@ -11,7 +11,9 @@ use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{Description, Scene};
-use support::scenes::{add, build, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use caustique::transport::{Lengths, Surroundings};
+use std::f64::consts::PI;
+use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
 /// Variance of one iteration.
 fn variance(pixel: &Pixel) -> f64 {
@@ -121,4 +123,30 @@ fn caustics_on_glossy_surfaces_stay_noisy() {
     let [rough, glossy] = [0.8, 0.2].map(relative_variance);
     println!("relative variance of an iteration: roughness 0.8 {rough:.3}, roughness 0.2 {glossy:.3}");
     assert!(glossy > 4.0 * rough, "rough {rough}, glossy {glossy}");
+}
+
+/// What merging is taken to cost follows from how many vertices it finds. In a closed box whose walls shine and reflect alike those of light paths are
+/// equally dense on all of its 24 square metres, so that an eye path finds `eye light pixels pi r^2 / 24`, whatever the picture's size if the kernel shrinks with
+/// its pixels. Sixteen seeds tell the mean to half a percent (some 1,400 vertices are in view). Discs at the edges lose `8 r / (3 pi s)` of those of a wall of side s.
+#[test]
+fn as_many_are_merged_as_are_there() {
+    const SEEDS: u64 = 16;
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.0, -0.1), DVec3::new(0.0, 0.0, 1.0), 85.0));
+    let scene = build(description);
+    for size in [32u32, 256] {
+        let camera = scene.camera(&square(size)).expect("a camera");
+        let surroundings = Surroundings::new(&scene, camera.position());
+        let radius = 0.04 * 64.0 / f64::from(size);
+        let ratio = |seed: u64| {
+            let Lengths { eye_open, light_open, merged, .. } =
+                Lengths::new(&eye(&scene, &camera), &surroundings, seed, None, |_| radius as f32);
+            merged / (eye_open * light_open * f64::from(size).powi(2) * PI * radius * radius / 24.0)
+        };
+        let mean = (1..=SEEDS).map(ratio).sum::<f64>() / SEEDS as f64;
+        println!("{size}: {mean} of what is expected");
+        let edges = 8.0 * 0.04 / (3.0 * PI * 2.0);
+        assert!((mean - (1.0 - edges)).abs() < 0.03, "{mean}");
+    }
 }
