@@ -51,6 +51,12 @@ impl Waiting {
 /// Places of eight.
 const LANES: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
+/// Dot products of eight vectors with eight, added up as `Vec3::dot` does.
+#[inline(always)]
+fn dot(a: &[f32x8; 3], b: &[f32x8; 3]) -> f32x8 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 /// Photons of one kind waiting for their BSDF, and the sums of those that have had it.
 pub(super) struct Batch<'a, 's, K> {
     kernel: std::marker::PhantomData<K>,
@@ -121,10 +127,9 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         let from = self.p.to_array().map(f32x8::splat);
         let offset = [p[0] - from[0], p[1] - from[1], p[2] - from[2]];
         // As the map has found it.
-        let distance2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-        let distance2 = there.blend(distance2, f32x8::splat(f32::INFINITY));
+        let distance2 = there.blend(dot(&offset, &offset), f32x8::splat(f32::INFINITY));
         // Where none waits, what is left of another has no cosine, so that it brings nothing.
-        let cosine = there & (wi[0] * ng[0] + wi[1] * ng[1] + wi[2] * ng[2]).abs();
+        let cosine = there & dot(&wi, &ng).abs();
         let f = self.gathering.eight(wi, cosine);
         let found = [f[0] * flux[0], f[1] * flux[1], f[2] * flux[2]];
         self.add::<C>(&found, distance2);

@@ -48,7 +48,7 @@ pub struct ChiSquared {
     rings: Vec<f32>,
     /// Directions of the borders between sectors, from the first axis, on one half of the disc if their number is even.
     rays: Vec<(f32, f32)>,
-    /// Whether there are two annuli of six sectors.
+    /// Whether there are two annuli of six sectors: asked for every eight photons.
     usual: bool,
 }
 
