@@ -23,7 +23,7 @@ fn unit(x: f32) -> f32 {
 }
 
 #[inline]
-fn unit_color(c: Rgb) -> Rgb {
+pub(super) fn unit_color(c: Rgb) -> Rgb {
     Rgb::new(unit(c.x), unit(c.y), unit(c.z))
 }
 
@@ -47,6 +47,20 @@ impl Material {
             transmission *= unit(look_up(&self.transmission_texture, surface, textures).x);
         }
         (base, metallic, transmission)
+    }
+
+    /// The same without textures, the colour before vertex colours and bounds; `None` where there are any.
+    pub(super) fn plain_shares(&self) -> Option<(Vec4, f32, f32)> {
+        let (metallic, transmission) = (unit(self.metallic), unit(self.transmission));
+        let textured = self.base_color_texture.is_some()
+            || (metallic > 0.0 && self.metallic_roughness_texture.is_some())
+            || (transmission > 0.0 && self.transmission_texture.is_some());
+        (!textured).then_some((Vec4::from_array(self.base_color), metallic, transmission))
+    }
+
+    /// Whether shading frames are those of the interpolated normals.
+    pub(super) fn has_plain_frame(&self) -> bool {
+        self.normal_texture.is_none() && self.anisotropy == 0.0
     }
 
     /// Whether no texture says anything about the interface, so that one serves all surfaces of the material.
@@ -117,7 +131,7 @@ impl Material {
     /// direction of anisotropy. Where the mesh has no tangents, a normal map has no frame to be read in and is ignored.
     #[inline]
     pub fn shading_frame(&self, surface: &Surface, textures: &[Texture]) -> Frame {
-        if self.normal_texture.is_none() && self.anisotropy == 0.0 {
+        if self.has_plain_frame() {
             return Frame::from_normal(surface.ns);
         }
         let tangent = surface.tangent.truncate();

@@ -1,16 +1,27 @@
 //! How the materials of a scene scatter: what of it can be made before the first path.
 
+use super::evaluate::unit_color;
 use super::{Material, Materials};
-use crate::bsdf::{Bsdf, Coverings, EnergyTables, Interface};
+use crate::bsdf::{Bsdf, Coverings, EnergyTables, Interface, Parameters, Shading};
 use crate::geometry::Surface;
-use crate::math::{Rgb, Vec2, Vec3, Vec4};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use bumpalo::Bump;
 
-/// Energy compensation tables, and the interfaces of all materials whose interface no texture changes.
+/// Energy compensation tables, and what of all materials no texture changes.
 pub struct Scattering {
     tables: EnergyTables,
-    /// By material: relative indices of refraction, and the interface there.
-    interfaces: Vec<Vec<(f32, Interface)>>,
+    of_materials: Vec<Ready>,
+}
+
+/// A material as it is at every surface, on its own in memory: a [`Material`] is ten times as large.
+struct Ready {
+    unlit: bool,
+    /// It has neither a normal map nor a direction.
+    plain_frame: bool,
+    /// Base colour before vertex colours, share of metal, share of the dielectric that transmits; `None` where textures say.
+    shares: Option<(Vec4, f32, f32)>,
+    /// Relative indices of refraction, and the interface there; none where textures change it.
+    interfaces: Vec<(f32, Interface)>,
 }
 
 /// Indices of refraction that surround surfaces: the open space's and the solids'.
@@ -52,7 +63,7 @@ impl Scattering {
             primitive: 0,
             material: 0,
         };
-        let of_material = |material: &Material| {
+        let interfaces = |material: &Material| {
             if material.unlit || !material.has_plain_interface() {
                 return Vec::new();
             }
@@ -62,24 +73,72 @@ impl Scattering {
             };
             around.iter().map(at).collect()
         };
-        let interfaces = materials.iter().map(of_material).collect();
-        Scattering { tables, interfaces }
+        let ready = |material: &Material| Ready {
+            unlit: material.unlit,
+            plain_frame: material.has_plain_frame(),
+            shares: material.plain_shares(),
+            interfaces: interfaces(material),
+        };
+        let of_materials = materials.iter().map(ready).collect();
+        Scattering { tables, of_materials }
     }
 
-    /// The BSDF at a surface; `eta` is the index of refraction behind the surface (its back) over the one before it. An interface that
-    /// textures change is made in `arena`.
+    /// Scattering at a surface seen along the unit direction `wo`; `eta` is the index of refraction behind the surface (its back) over the one before it. An
+    /// interface that textures change is made in `arena`.
     #[inline(always)]
-    pub fn bsdf<'a>(&'a self, materials: &Materials, surface: &Surface, eta: f32, arena: &'a Bump) -> Bsdf<'a> {
-        let (material, textures) = (&materials.list[surface.material as usize], &materials.textures);
-        if material.unlit {
+    pub fn shading<'a>(
+        &'a self,
+        materials: &Materials,
+        surface: &Surface,
+        eta: f32,
+        wo: Vec3,
+        arena: &'a Bump,
+    ) -> Shading<'a> {
+        let ready = &self.of_materials[surface.material as usize];
+        let frame = if ready.plain_frame { Frame::from_normal(surface.ns) } else { materials.shading_frame(surface) };
+        Shading::new(frame, surface.ng, self.bsdf(ready, materials, surface, eta, arena), wo)
+    }
+
+    #[inline(always)]
+    fn bsdf<'a>(
+        &'a self,
+        ready: &'a Ready,
+        materials: &Materials,
+        surface: &Surface,
+        eta: f32,
+        arena: &'a Bump,
+    ) -> Bsdf<'a> {
+        if ready.unlit {
             return Bsdf::Matte(Rgb::ZERO);
         }
-        let (base, metallic, transmission) = material.base_and_shares(surface, textures);
-        let made = self.interfaces[surface.material as usize].iter().find(|(e, _)| *e == eta);
+        let (base, metallic, transmission) = match ready.shares {
+            Some((base, metallic, transmission)) => {
+                (unit_color((base * surface.color).truncate()), metallic, transmission)
+            }
+            None => materials.base_and_shares(surface),
+        };
+        let made = ready.interfaces.iter().find(|(e, _)| *e == eta);
         let interface = match made {
             Some((_, interface)) => interface,
-            None => arena.alloc_with(|| Interface::new(&material.parameters(surface, textures, eta), &self.tables)),
+            None => arena.alloc_with(|| Interface::new(&materials.parameters(surface, eta), &self.tables)),
         };
         Bsdf::of(base, metallic, transmission, interface)
+    }
+}
+
+/// What textures say, out of the way of what needs none.
+impl Materials {
+    #[inline(never)]
+    fn shading_frame(&self, surface: &Surface) -> Frame {
+        self.list[surface.material as usize].shading_frame(surface, &self.textures)
+    }
+
+    #[inline(never)]
+    fn base_and_shares(&self, surface: &Surface) -> (Rgb, f32, f32) {
+        self.list[surface.material as usize].base_and_shares(surface, &self.textures)
+    }
+
+    fn parameters(&self, surface: &Surface, eta: f32) -> Parameters {
+        self.list[surface.material as usize].parameters(surface, &self.textures, eta)
     }
 }

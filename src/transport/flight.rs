@@ -24,7 +24,7 @@ fn arrival(scene: &Scene, span: &Span<'_>, collision: Collision) -> MediumArriva
     MediumArrival {
         p,
         medium: *span.medium,
-        interior: *span.interior,
+        interior: span.interior,
         weight: span.left * collision.weight,
         distance: span.before + collision.distance,
         first: span.first_hit(scene, p),

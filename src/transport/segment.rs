@@ -75,7 +75,7 @@ pub(super) struct Span<'s> {
     /// The medium.
     pub medium: &'s MediumParameters,
     /// The solids here.
-    pub interior: &'s Interior,
+    pub interior: Interior,
     /// Where it begins.
     pub origin: Vec3,
     /// Unit direction.
@@ -89,7 +89,7 @@ pub(super) struct Span<'s> {
     /// Parts before it, in media or not.
     pub crossed: u32,
     /// The surface at its end.
-    pub beyond: Option<&'s Surface>,
+    pub beyond: Option<FirstHit>,
 }
 
 impl Span<'_> {
@@ -97,7 +97,7 @@ impl Span<'_> {
     pub fn first_hit(&self, scene: &Scene, p: Vec3) -> Option<FirstHit> {
         match self.interior.host(scene) {
             Some(instance) => Some(FirstHit { p, instance }),
-            None => self.beyond.map(|surface| FirstHit { p: surface.p, instance: surface.instance }),
+            None => self.beyond,
         }
     }
 }
@@ -194,28 +194,37 @@ pub(super) fn next_vertex(
             Known::Hit(hit) if crossed == 0 => Some(*hit),
             _ => scene.tracer.intersect(&ray),
         };
-        let surface = match met {
-            None => None,
-            Some(hit) => match scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) {
-                None => return End::Lost,
-                surface => surface,
-            },
+        // Twice the same, so that a surface is in registers where there are no media.
+        let mut pass = |t: f32, beyond: Option<FirstHit>| {
+            let medium = if scene.survey.media() { interior.medium(scene) } else { None };
+            let Some(medium) = &medium else { return Passage::Left(Rgb::ONE) };
+            let (origin, left) = (ray.origin, transmittance);
+            through.pass(&Span {
+                medium,
+                interior,
+                origin,
+                direction,
+                distance: t,
+                before: distance,
+                left,
+                crossed,
+                beyond,
+            })
         };
-        let t = met.map_or(f32::INFINITY, |hit| hit.t);
-        if scene.survey.media()
-            && let Some(medium) = interior.medium(scene)
-        {
-            let (origin, left, beyond) = (ray.origin, transmittance, surface.as_ref());
-            let (medium, interior) = (&medium, &interior);
-            let span =
-                Span { medium, interior, origin, direction, distance: t, before: distance, left, crossed, beyond };
-            match through.pass(&span) {
-                Passage::Left(left) => transmittance *= left,
-                Passage::Ended(arrival) => return End::Medium(arrival),
-            }
+        let Some(hit) = met else {
+            return match pass(f32::INFINITY, None) {
+                Passage::Left(left) => End::Escaped(transmittance * left),
+                Passage::Ended(arrival) => End::Medium(arrival),
+            };
+        };
+        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
+            return End::Lost;
+        };
+        match pass(hit.t, Some(FirstHit { p: surface.p, instance: surface.instance })) {
+            Passage::Left(left) => transmittance *= left,
+            Passage::Ended(arrival) => return End::Medium(arrival),
         }
-        let Some(surface) = surface else { return End::Escaped(transmittance) };
-        distance += t;
+        distance += hit.t;
         match boundary(scene, &surface, &interior, direction) {
             Boundary::Scattering(eta, crossing) => {
                 return End::Surface(Arrival { surface, eta, crossing, interior, transmittance, distance });

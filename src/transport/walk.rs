@@ -301,10 +301,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
                 return;
             }
         }
-        let material = &scene.materials.list[surface.material as usize];
-        let frame = material.shading_frame(surface, &scene.materials.textures);
-        let bsdf = scene.scattering.bsdf(&scene.materials, surface, eta, arena);
-        let shading = Shading::new(frame, surface.ng, bsdf, -direction);
+        let shading = scene.scattering.shading(&scene.materials, surface, eta, -direction, arena);
         let behind = crossing.as_ref().map_or(here, |c| c.interior);
         let draws = stream.vertex(depth);
         let vertex = Vertex {
