@@ -76,8 +76,8 @@ impl Camera {
         Camera { width: scaled(self.width), height: scaled(self.height), ..*self }
     }
 
-    /// A sample of this camera's pixels, `factor` times as many a side and spread evenly over the film: each sees as much as a pixel does here. For methods that
-    /// send nothing to the film from elsewhere.
+    /// A sample of this camera's pixels, `factor` times as many a side and spread evenly over the film: each sees as much as a pixel does here. What light
+    /// paths send to the film is taken from all around it: as much noise as if there were all pixels and as many light paths.
     pub fn sparse(&self, factor: f64) -> Camera {
         Camera { covered: self.covered * factor.min(1.0) as f32, ..self.resized(factor) }
     }

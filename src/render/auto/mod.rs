@@ -4,7 +4,7 @@
 //! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants (`cost`). So the same arguments give the
 //! same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances: noise falls as
 //! 1/n where paths are whole, and as n^-alpha where photons are gathered; the squared bias there as the area n^-(1 - alpha) to an exponent that levels
-//! tell (`bias`) \[Knaus and Zwicker 2011\].
+//! tell (`bias`) \[Knaus and Zwicker 2011\]. Light that connections hardly ever find is told by merging (`missing`).
 //!
 //! Where photons are gathered the pilot also balances: noise that bandwidths can smooth against the bias they bring, and light paths against eye paths
 //! ([`Balance`]).
@@ -12,6 +12,7 @@
 mod balance;
 mod bias;
 pub(super) mod cost;
+mod missing;
 mod tail;
 mod trial;
 mod weights;
@@ -260,7 +261,7 @@ impl<'a> Pilot<'a> {
         let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
         let most = least + (allowed_once - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
         let factor = (most.clamp(least, PIXELS.1.max(least)) / pixels).sqrt().min(1.0);
-        let (small, sparse) = (camera.resized(factor), camera.sparse(factor));
+        let small = camera.sparse(factor);
         let small_pixels = f64::from(small.size().0) * f64::from(small.size().1);
         // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
         let spare = allowed_once / trial_cost(small_pixels, few);
@@ -273,16 +274,23 @@ impl<'a> Pilot<'a> {
                 let once = cost.of(*way, &trial::settings(settings, photons), small_pixels);
                 let iterations = (allowed / (ways.len() as f64 * once)) as u64;
                 let iterations = iterations.clamp(ITERATIONS.0, ITERATIONS.1);
-                // What light paths send to the film needs pixels that cover it.
-                let bidirectional = matches!(way.method, Method::Bdpt | Method::Vcm);
-                let small = if bidirectional { &small } else { &sparse };
                 let guided = |guide: &Guide| counts(scene, camera, untried, Some(guide));
                 let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
-                Trial::new(scene, small, (*way, settings), cost_with, (&plan, iterations), &mut values)
+                Trial::new(scene, &small, (*way, settings), cost_with, (&plan, iterations), &mut values)
             })
             .collect();
         rule_out(&mut trials);
+        add_missing(&mut trials, &values, small.size().0 as usize);
         (trials, "least expected error".into())
+    }
+}
+
+/// Adds what connections leave out of what merging finds. `values` are what the pixels of the pilot's picture are worth, which is so wide.
+fn add_missing(trials: &mut [Trial], values: &[f64], width: usize) {
+    let merging = trials.iter().position(|trial| trial.way.method == Method::Vcm);
+    let Some(complete) = merging.map(|merging| std::mem::take(&mut trials[merging].found)) else { return };
+    for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
+        trial.expected += trial.found.missing(&complete, values, width);
     }
 }
 

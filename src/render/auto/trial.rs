@@ -2,6 +2,7 @@
 
 use super::bias::{Bias, Differences};
 use super::cost::Cost;
+use super::missing::Caustics;
 use super::tail::Tail;
 use super::{Balance, Free, Way};
 use crate::camera::Camera;
@@ -24,7 +25,7 @@ const COUNTED: f64 = 0.7;
 pub(super) const DARK: f64 = 0.01;
 
 /// A candidate and how it did.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Trial {
     /// The candidate.
     pub way: Way,
@@ -38,6 +39,8 @@ pub struct Trial {
     pub expected: f64,
     /// What suits it.
     pub balance: Balance,
+    /// Its caustics.
+    pub(super) found: Caustics,
 }
 
 /// Settings of a trial: those of the render with a share of its photons, and all levels, which tell the bias.
@@ -185,8 +188,10 @@ impl Trial {
         let trial = settings(of, plan.photons);
         let stage = Stage::new(scene, small, &trial);
         let mut session = Session::new(&stage);
+        let mut found = Caustics::default();
         for _ in 0..iterations {
             session.step();
+            found.add(session.pixels(), small.size().0 as usize);
         }
         let levels = stage.settings().levels;
         if values.is_empty() {
@@ -239,6 +244,7 @@ impl Trial {
             cost,
             expected: expected(balance, n),
             balance,
+            found,
         }
     }
 }
