@@ -10,6 +10,7 @@ use caustique::math::{DVec3, Vec3};
 use caustique::plan::{Effect, PathClass};
 use caustique::random::Domain;
 use caustique::render::auto::{Choice, Free, Way, choose};
+use caustique::render::output::Present;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
@@ -351,10 +352,27 @@ fn only_what_is_called_for_is_tried() {
     add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
     description.lights.push(point_light(DVec3::new(0.0, 1.5, 0.0), 1.0));
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
-    let matte_only = auto(&build(description), 2, 20_000);
+    let scene = build(description);
+    let matte_only = auto(&scene, 2, 20_000);
     let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.way.method).collect();
     assert_eq!(tried, [Method::Sppm, Method::Path, Method::Bdpt]);
     assert!(matte_only.trials.iter().all(|trial| !trial.way.guided && trial.caustics == 0.0));
+    // Where nothing has narrow lobes no photons of caustics are sent.
+    let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
+    let photons = |narrow_lobes| of_caustics.of_photons(Present { narrow_lobes, ..Present::default() });
+    assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
+    // Nothing but indirect light asks for photons, and nothing is counted of direct light.
+    let camera = scene.camera(&square(24)).expect("a camera");
+    let make = |way: Way| {
+        let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
+        (way.method != Method::Bdpt).then_some(settings)
+    };
+    let free = Free { photons: true, neighbours: true };
+    let choice = choose(&scene, &camera, free, make).expect("a choice");
+    let saved = |effect: Effect| choice.weights.iter().find(|w| w.effect == effect).and_then(|w| w.saved);
+    let whole = choice.trial().map(|trial| trial.seconds_per_iteration);
+    assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);
+    assert!(saved(Effect::Direct).is_none(), "{:?}", choice.weights);
     let short = auto(&glass_room(), 2, 2);
     assert!(short.trials.is_empty() && short.way == Way::UNTRIED);
 }

@@ -2,7 +2,7 @@
 # What effects cost scenes that do not call for them: core-seconds of an iteration of the whole program over those of one built without media, dispersion, textures
 # and lenses. The pictures must be the same.
 #
-# CAUSTIQUE_BIN is the whole program; BARE_BIN the other one, built here if it is not given. ROUNDS (8) and WIDTH (320) shorten a trial.
+# CAUSTIQUE_BIN is the whole program; BARE_BIN the other one, built here if it is not given. ROUNDS (24) and WIDTH (320) shorten a trial.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 if [ -z "${BARE_BIN:-}" ]; then

@@ -2,26 +2,30 @@
 """Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone, of sppm and cppm whose photons bring all light, and of vcm, with and without, of all pixels and without the worst 0.1 %.
 On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
 
-Settings, references and environment variables are those of auto.py.
+Settings, references and environment variables are those of auto.py; METHODS (sppm,all,cppm,vcm) chooses among the pairs.
 """
 
+import os
 import subprocess
 
 import auto
 from _iteration import read
 from record import record
 
+# Photons of caustics alone do not do for media that scatter.
+SCENES = [scene for scene in auto.SCENES if scene not in ("fog", "godrays")]
 PLAIN = {
     "sppm": auto.options("sppm") + " --indirect paths",
     "all": auto.options("sppm"),
     "cppm": auto.options("cppm"),
     "vcm": auto.options("vcm"),
 }
+PLAIN = {name: PLAIN[name] for name in os.environ.get("METHODS", ",".join(PLAIN)).split(",")}
 RUNS = {name + how: plain + option for name, plain in PLAIN.items() for how, option in (("", ""), (" guided", " --guide on"))}
 
 
 def caustics(scene):
-    """relMSE of the layer Caustic by run after RUN_SECONDS, and half that of two references against each other."""
+    """relMSE of the layer Caustic by run after RUN_SECONDS, and half that of two references against each other; "all paths": as many light paths with a guide as without."""
 
     def render(name, options, seconds, seed):
         path = auto.OUT / f"{scene}-{auto.WIDTH}-{name.replace(' ', '-')}-{seconds:g}s-{seed}.exr"
@@ -34,11 +38,14 @@ def caustics(scene):
     def error(of, to):
         return read("compare", of, to, "--layer", "Caustic")["relmse"]
 
-    reference, other = (render("caustics", RUNS["vcm guided"], auto.REFERENCE, seed) for seed in (77, 78))
+    reference, other = (render("caustics", auto.options("vcm") + " --guide on", auto.REFERENCE, seed) for seed in (77, 78))
     own = error(other, reference) / 2
-    found = {name: [] for name in RUNS}
+    runs = dict(RUNS)
+    if "sppm" in PLAIN:
+        runs["sppm guided, all paths"] = RUNS["sppm guided"] + " --photons 100000"
+    found = {name: [] for name in runs}
     for seed in (1, 2, 3):
-        for name, options in RUNS.items():
+        for name, options in runs.items():
             found[name].append(error(render(f"caustics {name}", options, auto.SECONDS, seed), reference) - own)
     return {"errors": found, "reference": own}
 
@@ -46,7 +53,7 @@ def caustics(scene):
 def main():
     rows = []
     print(f"{'scene':<10}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + "".join(f"{name + ' gains':>12}" for name in PLAIN) + "  mean ratios, guided")
-    for scene in auto.SCENES:
+    for scene in SCENES:
         data, _ = auto.measure(scene, RUNS)
         runs = {name: [p for p in data["points"] if p["run"] == name] for name in RUNS}
         seconds = min(points[-1]["cpu_seconds"] for points in runs.values())
@@ -66,8 +73,9 @@ def main():
             errors = row["caustics"]["errors"]
             mean = {name: sum(each) / len(each) for name, each in errors.items()}
             gains = [mean[name] / mean[f"{name} guided"] for name in PLAIN]
-            line = f"{scene:<10}{'layer Caustic':<16}" + "".join(f"{error:>13.2g}" for error in mean.values())
-            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  reference {row['caustics']['reference']:.2g}", flush=True)
+            line = f"{scene:<10}{'layer Caustic':<16}" + "".join(f"{mean[name]:>13.2g}" for name in RUNS)
+            rest = "".join(f"  {name} {error:.2g}" for name, error in mean.items() if name not in RUNS)
+            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
         rows.append(row)
     record("guide", {"seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE, "scenes": rows})
 

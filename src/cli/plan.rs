@@ -70,8 +70,11 @@ fn report(args: &PlanArgs) -> Result<()> {
     let classes = args.scene.switches().classes();
     let (time, iterations) = (args.time, args.iterations.or(args.time.is_none().then_some(DEFAULT_ITERATIONS)));
     // As a render does that combines levels.
+    let (width, height) = camera.size();
     let make = |way| {
         let settings = Settings { max_depth, classes, time, iterations, ..Settings::of(way) };
+        let photons = settings.usual_photons(u64::from(width) * u64::from(height));
+        let settings = Settings { photons, ..settings };
         (settings.levels.count > 1).then_some(settings)
     };
     let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();
@@ -104,6 +107,9 @@ fn columns(plan: &Plan) -> Vec<Column> {
     let any = |figure: fn(&EffectPlan) -> Option<f64>| plan.effects.iter().any(|e| figure(e).is_some());
     if any(|e| e.energy) {
         columns.push(("of the light", |e| figure(e.energy, percent)));
+    }
+    if any(|e| e.time) {
+        columns.push(("of the time", |e| figure(e.time, percent)));
     }
     if any(|e| e.seconds_per_iteration) {
         columns.push(("off saves", |e| figure(e.seconds_per_iteration, |s| format!("{s:.2} s"))));

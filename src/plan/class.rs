@@ -178,6 +178,11 @@ impl ClassSet {
     /// No class.
     pub const NONE: ClassSet = ClassSet(0);
 
+    /// Those of an effect.
+    pub fn of(effect: Effect) -> ClassSet {
+        PathClass::ALL.into_iter().filter(|class| class.effect() == effect).collect()
+    }
+
     /// All but those of some effects.
     pub fn without(effects: EffectSet) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| !effects.has(class.effect())).collect()
@@ -187,6 +192,11 @@ impl ClassSet {
     #[inline]
     pub const fn one(class: PathClass) -> ClassSet {
         ClassSet(1 << class as u16)
+    }
+
+    /// All but these.
+    pub const fn complement(self) -> ClassSet {
+        ClassSet(ClassSet::ALL.0 & !self.0)
     }
 
     /// Both.
@@ -235,7 +245,7 @@ impl FromIterator<PathClass> for ClassSet {
 
 /// What narrow lobes show.
 fn glossy() -> ClassSet {
-    PathClass::ALL.into_iter().filter(|class| class.effect() == Effect::Glossy).collect()
+    ClassSet::of(Effect::Glossy)
 }
 
 #[cfg(test)]

@@ -38,8 +38,10 @@ pub struct EffectPlan {
     pub by: Option<&'static str>,
     /// Its share of the picture's light, 0 to 1; `None` where nothing has measured it.
     pub energy: Option<f64>,
-    /// Core-seconds that it takes of an iteration.
+    /// Core-seconds that an iteration without it would save, where that is counted.
     pub seconds_per_iteration: Option<f64>,
+    /// The same over what an iteration takes, 0 to 1.
+    pub time: Option<f64>,
     /// Relative error (the root of relMSE) of the picture without it.
     pub error_if_off: Option<f64>,
 }
@@ -97,6 +99,7 @@ impl Plan {
                 by: simulated.then(|| asked.search.carrier(effect, scene.survey.scattering())),
                 energy: None,
                 seconds_per_iteration: None,
+                time: None,
                 error_if_off: None,
             }
         };

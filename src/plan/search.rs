@@ -71,6 +71,8 @@ impl Search {
             (Search::LightPaths, Effect::Sds) => false,
             (Search::Connections, Effect::Sds) => !sizeless_lights,
             (Search::Map | Search::Merging, Effect::Volume) => !media_scatter,
+            // Photons end where they first scatter broadly, eye paths do not scatter in media.
+            (Search::PathsAndPhotons, Effect::Volume | Effect::Indirect) => !media_scatter,
             _ => true,
         }
     }

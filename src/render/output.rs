@@ -9,6 +9,7 @@ use crate::estimator::Pixel;
 use crate::estimator::rule::{memoryless::radius2_factor, volume::radius_factor};
 use crate::film::{LayerSet, output};
 use crate::photon::ByKind;
+use crate::plan::{ClassSet, Effect, PathClass};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
@@ -31,6 +32,15 @@ impl Present {
             volume: scene.survey.scattering(),
             narrow_lobes: scene.survey.narrow_lobes,
         }
+    }
+
+    /// Classes of light paths that there can be.
+    pub fn classes(self) -> ClassSet {
+        let narrow = [Effect::Glossy, Effect::Caustic, Effect::Sds];
+        let absent = narrow.into_iter().filter(|_| !self.narrow_lobes);
+        let absent = absent.chain((!self.volume).then_some(Effect::Volume));
+        let focused = if self.narrow_lobes { ClassSet::NONE } else { ClassSet::one(PathClass::IndirectFocus) };
+        ClassSet::without(absent.collect()) & focused.complement()
     }
 }
 

@@ -11,7 +11,7 @@ use crate::estimator::rule::{memoryless, volume};
 use crate::photon::ByKind;
 #[cfg(doc)]
 use crate::photon::kernel;
-use crate::plan::{ClassSet, Effect, EffectSet, Owner, Search};
+use crate::plan::{ClassSet, Owner, Search};
 use crate::transport::{Indirect, MAX_LEVELS};
 
 /// Iterations when no stop condition is given.
@@ -179,6 +179,13 @@ impl Settings {
         }
     }
 
+    /// Light paths of an iteration of a picture of so many pixels where no number is asked for. Where they bring caustics alone, eye paths bring the rest and are what most of the error
+    /// is left by: guided ones, which meet glass at once and take several times as long, are no more than those.
+    pub fn usual_photons(&self, pixels: u64) -> u32 {
+        let usual = self.method.photons();
+        if self.guided && self.indirect == Indirect::Paths { pixels.min(u64::from(usual)) as u32 } else { usual }
+    }
+
     /// How it looks for light.
     pub fn search(&self) -> Search {
         match (self.method, self.indirect) {
@@ -189,12 +196,7 @@ impl Settings {
 
     /// Classes of light that photons are to bring to eye paths that gather them.
     pub fn of_photons(&self, present: Present) -> ClassSet {
-        let absent = [
-            (present.volume, &[Effect::Volume][..]),
-            (present.narrow_lobes, &[Effect::Glossy, Effect::Caustic, Effect::Sds][..]),
-        ];
-        let absent = absent.into_iter().filter(|(there, _)| !there).flat_map(|(_, effects)| effects.iter().copied());
-        self.search().owned_by(Owner::Photons) & self.classes & ClassSet::without(absent.collect::<EffectSet>())
+        self.search().owned_by(Owner::Photons) & self.classes & present.classes()
     }
 
     /// Kinds of photons that have bandwidths; where light paths are merged, which tells no kinds apart, the first.

@@ -222,6 +222,22 @@ fn a_picture_per_technique() {
     assert!(refused.code == Some(1) && refused.stderr.starts_with("file: "), "{}", refused.stderr);
 }
 
+/// Guided light paths for caustics alone are as many as pixels, unless their number is asked for.
+#[test]
+fn small_pictures_have_few_guided_light_paths() {
+    let folder = Folder::new();
+    let guided = "--method sppm --indirect paths --guide on";
+    for (options, paths) in [(guided, 48 * 36), ("--method sppm --indirect paths", 100_000)] {
+        for (photons, paths) in [("", paths), (" --photons 3000", 3000)] {
+            let render =
+                format!("render scene.glb --width 48 --height 36 --iterations 1 --no-combine {options}{photons}");
+            let outcome = folder.run(&format!("{render} -o out.exr"));
+            assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+            assert_eq!(folder.read("out.exr").1["light_paths"], paths, "{options}{photons}");
+        }
+    }
+}
+
 /// A map that does not fit ends early, says so, and shines no less.
 #[test]
 fn a_full_photon_map_is_said() {

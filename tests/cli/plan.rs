@@ -45,13 +45,13 @@ fn the_plan_as_json() {
     assert_eq!(names.join(" "), all);
     let effect = |name: &str| effects.iter().find(|effect| effect["name"] == name).expect("it is listed");
     let unmeasured = |mut effect: Value| {
-        for figure in ["energy", "seconds_per_iteration", "error_if_off"] {
+        for figure in ["energy", "seconds_per_iteration", "time", "error_if_off"] {
             effect[figure] = Value::Null;
         }
         effect
     };
     let caustic = json!({"name": "caustic", "present": true, "simulated": true, "by": "photons", "energy": null,
-        "because": ["material \"silver\" on \"Mirror\" under light \"Lamp\""], "seconds_per_iteration": null, "error_if_off": null});
+        "because": ["material \"silver\" on \"Mirror\" under light \"Lamp\""], "seconds_per_iteration": null, "time": null, "error_if_off": null});
     assert_eq!(unmeasured(effect("caustic").clone()), caustic);
     let environment = effect("environment");
     assert_eq!((&environment["present"], &environment["simulated"]), (&true.into(), &false.into()));

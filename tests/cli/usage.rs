@@ -276,7 +276,7 @@ fn missing_libraries() {
     assert_eq!((well.code, well.stderr.as_str()), (Some(0), ""));
 }
 
-/// Methods that gather photons on surfaces alone would show no light that media scatter: they refuse, before any work is done.
+/// Methods that gather photons on surfaces alone, or those of caustics alone, would show no light that media scatter, or some of it: they refuse, before any work is done.
 #[test]
 fn scattering_media_and_the_methods_that_refuse_them() {
     let folder = Folder::new();
@@ -290,6 +290,10 @@ fn scattering_media_and_the_methods_that_refuse_them() {
         assert_eq!((outcome.code, outcome.stderr), (Some(2), error));
         assert_eq!((outcome.stdout.as_str(), folder.files().len()), ("", 0));
     }
+    let outcome = folder.run(&format!("{render} sppm --indirect paths"));
+    let error =
+        "scene.glb: --indirect paths does not render media that scatter light\nhint: leave --indirect paths out\n";
+    assert_eq!((outcome.code, outcome.stderr.as_str(), folder.files().len()), (Some(2), error, 0));
     for method in ["sppm --photons 100", "cppm --photons 100", "vcm", "bdpt", "path"] {
         let outcome = folder.run(&format!("{render} {method}"));
         assert_eq!(outcome.code, Some(0), "{method}: {}", outcome.stderr);

@@ -132,7 +132,8 @@ fn choose_all(
     let choose_one = |run: &mut Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
-        let make = |way| run.args.allowed(way).map(limits);
+        run.entry.settings = run.args.sized(run.entry.settings.clone(), camera.size());
+        let make = |way| run.args.allowed(way, camera.size()).map(limits);
         let chosen =
             (run.args.method == Method::Auto).then(|| choose(scene, camera, run.args.free(), make)).flatten()?;
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));

@@ -50,6 +50,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     scene::tell(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.view())?;
     plan::check_media(args, &scene)?;
+    let settings = &args.sized(settings.clone(), camera.size());
     let present = Present::of(&scene);
     self::selection(args, settings, present)?;
     // Before anything is tried, which takes time.
@@ -126,7 +127,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
 /// What auto chooses, where it is to: among ways whose pictures have the layers asked for.
 fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, present: Present) -> Option<Choice> {
     let layers = |settings: &Settings| selection(args, settings, present).is_ok();
-    let make = |way| args.allowed(way).filter(layers);
+    let make = |way| args.allowed(way, camera.size()).filter(layers);
     (args.method == Method::Auto).then(|| choose(scene, camera, args.free(), make)).flatten()
 }
 

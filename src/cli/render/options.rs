@@ -38,7 +38,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
     /// Light paths sent from the lights, by ppm, sppm, appm and cppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
-    /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000]
+    /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000; guided ones with --indirect paths: one a pixel, at most 100000]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
     /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a warning says
@@ -422,8 +422,14 @@ impl RenderArgs {
         self.settings().is_ok_and(|settings| settings.levels.count > 1) && !self.no_combine
     }
 
-    /// Settings of a way that auto may choose; `None` where the options rule it out.
-    pub fn allowed(&self, way: Way) -> Option<Settings> {
+    /// The settings for a picture of that size: what the number of light paths follows from where none is asked for.
+    pub fn sized(&self, settings: Settings, (width, height): (u32, u32)) -> Settings {
+        let pixels = u64::from(width) * u64::from(height);
+        Settings { photons: self.photons.unwrap_or(settings.usual_photons(pixels)), ..settings }
+    }
+
+    /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out. Where auto balances light paths it starts from the usual number.
+    pub fn allowed(&self, way: Way, size: (u32, u32)) -> Option<Settings> {
         let guide = match self.guide {
             None => true,
             Some(Switch::On) => way.guided || !way.method.guides(),
@@ -434,6 +440,7 @@ impl RenderArgs {
         self.settings_of(way)
             .ok()
             .filter(|settings| guide && indirect && (!self.combines() || settings.levels == usual))
+            .map(|settings| if self.free().photons { settings } else { self.sized(settings, size) })
     }
 
     fn settings_of(&self, way: Way) -> Result<Settings> {

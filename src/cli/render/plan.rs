@@ -1,6 +1,6 @@
 //! The plan of a render: from the options to what the library plans, and its warnings told.
 
-use super::options::{Method, RenderArgs};
+use super::options::{Indirect, Method, RenderArgs};
 use crate::cli::progress::percent;
 use crate::cli::say;
 use caustique::camera::Camera;
@@ -46,6 +46,8 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
         if effect.present {
             (effect.energy, effect.error_if_off) = (Some(weight.energy), Some(weight.error_if_off));
             effect.seconds_per_iteration = weight.saved;
+            let whole = wishes.choice.and_then(Choice::trial).map(|trial| trial.seconds_per_iteration);
+            effect.time = weight.saved.zip(whole).map(|(saved, whole)| (saved / whole).min(1.0));
         }
     }
     plan
@@ -72,15 +74,19 @@ pub fn why(choice: &Choice) -> String {
 /// Whether the method can do without what media scatter, or finds it.
 ///
 /// # Errors
-/// Media scatter, and the method gathers photons on surfaces only.
+/// Media scatter, and the method gathers photons on surfaces only, or photons of caustics alone.
 pub fn check_media(args: &RenderArgs, scene: &Scene) -> Result<()> {
     let method = args.method.chosen();
-    if !scene.survey.scattering() || !matches!(method, render::Method::Pm | render::Method::Bpm) {
-        return Ok(());
-    }
-    let cause = format!("--method {} does not render media that scatter light", method.name());
-    let error = Error::new(Kind::Usage, args.scene.path.display(), cause);
-    Err(error.hint("choose --method sppm, cppm, vcm, bdpt or path"))
+    let (option, hint) = match method {
+        _ if !scene.survey.scattering() => return Ok(()),
+        render::Method::Pm | render::Method::Bpm => {
+            (format!("--method {}", method.name()), "choose --method sppm, cppm, vcm, bdpt or path")
+        }
+        _ if args.indirect == Some(Indirect::Paths) => ("--indirect paths".into(), "leave --indirect paths out"),
+        _ => return Ok(()),
+    };
+    let cause = format!("{option} does not render media that scatter light");
+    Err(Error::new(Kind::Usage, args.scene.path.display(), cause).hint(hint))
 }
 
 /// Prints what the plan warns of.

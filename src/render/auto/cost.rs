@@ -2,7 +2,9 @@
 //! on their ratios.
 
 use super::Way;
+use crate::plan::{ClassSet, PathClass};
 use crate::render::method::Method;
+use crate::render::output::Present;
 use crate::render::settings::Settings;
 use crate::transport::{Indirect, Lengths};
 
@@ -44,8 +46,8 @@ fn eye_paths(settings: &Settings) -> f64 {
 pub(super) struct Cost {
     /// Mean numbers of vertices of paths.
     pub lengths: Lengths,
-    /// There are media that scatter.
-    pub scattering: bool,
+    /// What there is.
+    pub present: Present,
 }
 
 impl Cost {
@@ -53,9 +55,18 @@ impl Cost {
     pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
         let Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open, merged } = self.lengths;
         let paths = pixels * eye_paths(settings);
-        let photons = f64::from(settings.photons);
+        // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
+        let unwanted = way.method.gathers() && settings.of_photons(self.present).is_empty();
+        let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
+        let classes = settings.classes & self.present.classes();
+        let eye = if scattered_wanted(classes, false) { eye } else { eye_to_broad };
+        let light = if scattered_wanted(classes, true) { light } else { light_to_broad };
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
-        let gather = GATHER + if way.method == Method::Cppm { COUNTING } else { 0.0 };
+        let gather = match way.method {
+            _ if unwanted => 0.0,
+            Method::Cppm => GATHER + COUNTING,
+            _ => GATHER,
+        };
         let seconds = match (way.method, way.indirect) {
             (Method::Path, _) => pixels * (EYE_PATH + eye * EYE_VERTEX),
             (method, Indirect::Photons) if method.gathers() => {
@@ -67,6 +78,7 @@ impl Cost {
             }
             (method, _) => {
                 let merges = if method.has_bandwidths() { eye_open * LOOK + merged * MERGE } else { 0.0 };
+                let Lengths { eye, light, .. } = self.lengths;
                 let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
                 paths * (both + eye_open * light_open * CONNECTION + merges)
             }
@@ -76,40 +88,18 @@ impl Cost {
 
     fn media(&self, method: Method) -> f64 {
         match method {
-            _ if !self.scattering => 1.0,
+            _ if !self.present.volume => 1.0,
             Method::Path => MEDIA[0],
             method if method.gathers() => MEDIA[2],
             _ => MEDIA[1],
         }
     }
+}
 
-    /// Core-seconds of an iteration that go to photons, where they are gathered.
-    pub fn of_photons(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
-        let without = Settings { photons: 0, ..settings.clone() };
-        let paths = pixels * eye_paths(settings);
-        self.of(way, settings, pixels) - self.of(way, &without, pixels)
-            + self.media(way.method) * paths * self.lengths.eye_to_broad * GATHER
-    }
-
-    /// Core-seconds of an iteration that indirect light takes, and caustics, where one can be done without the other.
-    pub fn parts(&self, way: Way, settings: &Settings, pixels: f64) -> [Option<f64>; 2] {
-        let Lengths { eye, eye_to_broad, .. } = self.lengths;
-        let beyond = (eye - eye_to_broad).max(0.0);
-        let media = self.media(way.method);
-        let all = self.of(way, settings, pixels);
-        match (way.method, way.indirect) {
-            (Method::Path, _) => [Some(media * pixels * beyond * EYE_VERTEX), None],
-            // Without caustics there would be no photons.
-            (method, Indirect::Paths) if method.gathers() => {
-                let alone = Way { method: Method::Path, ..way };
-                let paths = self.of(alone, settings, pixels) / self.media(alone.method);
-                let eyes = eye_paths(settings);
-                [
-                    Some(media * eyes * pixels * beyond * (EYE_VERTEX + GATHER)),
-                    Some(media * (all / media - eyes * paths)),
-                ]
-            }
-            _ => [None, None],
-        }
-    }
+/// Whether classes hold any of light that was scattered broadly, or in a medium, before it is where the eye looks; `anywhere`: also where the eye looks by narrow lobes.
+fn scattered_wanted(classes: ClassSet, anywhere: bool) -> bool {
+    use PathClass as C;
+    let seen = [C::Indirect, C::IndirectFocus, C::Volume];
+    let reflected = [C::ReflectedIndirect, C::ReflectedFocus];
+    seen.iter().chain(reflected.iter().filter(|_| anywhere)).any(|class| classes.has(*class))
 }

@@ -24,6 +24,7 @@ pub use weights::Weight;
 use super::control::{Clock, cpu_seconds};
 use super::guiding::ROUNDS;
 use super::method::Method;
+use super::output::Present;
 use super::session::{Session, Spent, Stage};
 use super::settings::Settings;
 use crate::camera::Camera;
@@ -151,7 +152,7 @@ pub fn choose(scene: &Scene, camera: &Camera, free: Free, make: impl Fn(Way) -> 
     }
     let cost = best.map_or(pilot.cost, |best| trials[best].cost);
     for weight in &mut weights {
-        weight.saved = weights::saved(scene, &cost, (way, &settings), weight.effect, pilot.pixels);
+        weight.saved = weights::saved(&cost, (way, &settings), weight.effect, pilot.pixels);
     }
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
@@ -175,7 +176,7 @@ fn counts(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Gu
         _ => footprint(camera, length),
     };
     let lengths = Lengths::new(&eye, &surroundings, seed, guide, reach);
-    Cost { lengths, scattering: scene.survey.scattering() }
+    Cost { lengths, present: Present::of(scene) }
 }
 
 /// What a pilot is of.

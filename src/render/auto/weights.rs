@@ -9,12 +9,11 @@ use super::{ITERATIONS, Way};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
-use crate::plan::{ClassSet, Effect, PathClass};
-use crate::render::output::Present;
+use crate::plan::{ClassSet, Effect};
+use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::transport::Indirect;
 
 /// Effects that have a part of the picture, in the order of [`parts()`].
 const WHOLE: [Effect; 5] = [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];
@@ -75,8 +74,7 @@ pub(super) fn weigh(
     };
     let mut weights = Vec::new();
     for effect in APART.into_iter().filter(|effect| present(*effect)) {
-        let alone: ClassSet = PathClass::ALL.into_iter().filter(|class| class.effect() == effect).collect();
-        let settings = Settings { classes: settings.classes & alone, ..settings.clone() };
+        let settings = Settings { classes: settings.classes & ClassSet::of(effect), ..settings.clone() };
         if settings.classes.is_empty() {
             continue;
         }
@@ -94,29 +92,18 @@ pub(super) fn weigh(
     weights
 }
 
-/// Core-seconds of an iteration that leaving an effect out would save, where that is counted.
-pub(super) fn saved(
-    scene: &Scene,
-    cost: &Cost,
-    (way, settings): (Way, &Settings),
-    effect: Effect,
-    pixels: f64,
-) -> Option<f64> {
-    let [indirect, caustic] = cost.parts(way, settings, pixels);
-    match effect {
-        Effect::Indirect if indirect.is_some() => indirect,
-        Effect::Caustic if caustic.is_some() => caustic,
-        // Photons are for all of these, and are sent as long as any is there.
-        Effect::Indirect | Effect::Glossy | Effect::Caustic | Effect::Sds | Effect::Volume
-            if way.method.gathers() && way.indirect == Indirect::Photons =>
-        {
-            let left = Settings {
-                classes: settings.classes & ClassSet::without([effect].into_iter().collect()),
-                ..settings.clone()
-            };
-            let [now, then] = [settings, &left].map(|settings| settings.of_photons(Present::of(scene)).is_empty());
-            Some(if then && !now { cost.of_photons(way, settings, pixels) } else { 0.0 })
-        }
-        _ => None,
+/// Core-seconds of an iteration that leaving an effect out would save, where that is counted: what photons bring, and light that was scattered before.
+pub(super) fn saved(cost: &Cost, (way, settings): (Way, &Settings), effect: Effect, pixels: f64) -> Option<f64> {
+    let counted = match effect {
+        Effect::Indirect => way.method == Method::Path || way.method.gathers(),
+        Effect::Glossy | Effect::Caustic | Effect::Sds | Effect::Volume => way.method.gathers(),
+        _ => false,
+    };
+    if !counted {
+        return None;
     }
+    let classes = settings.classes & ClassSet::without([effect].into_iter().collect());
+    let left = Settings { classes, ..settings.clone() };
+    let [now, then] = [settings, &left].map(|settings| cost.of(way, settings, pixels));
+    Some((now - then).max(0.0))
 }
