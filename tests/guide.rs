@@ -272,8 +272,14 @@ fn room_with(radius: f32) -> Scene {
 }
 
 fn auto(scene: &Scene, threads: usize, iterations: u64) -> Choice {
+    auto_among(scene, threads, iterations, |_| true)
+}
+
+/// What is chosen among the ways that are allowed.
+fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Way) -> bool + Sync) -> Choice {
     let camera = scene.camera(&square(24)).expect("a camera");
-    let make = |way| Some(Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(way) });
+    let settings = |way| Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(way) };
+    let make = |way| allowed(way).then(|| settings(way));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let free = Free { photons: true, neighbours: true };
     pool.install(|| choose(scene, &camera, free, make)).expect("a choice")
@@ -362,13 +368,7 @@ fn only_what_is_called_for_is_tried() {
     let photons = |narrow_lobes| of_caustics.of_photons(Present { narrow_lobes, ..Present::default() });
     assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
     // Nothing but indirect light asks for photons, and nothing is counted of direct light.
-    let camera = scene.camera(&square(24)).expect("a camera");
-    let make = |way: Way| {
-        let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
-        (way.method != Method::Bdpt).then_some(settings)
-    };
-    let free = Free { photons: true, neighbours: true };
-    let choice = choose(&scene, &camera, free, make).expect("a choice");
+    let choice = auto_among(&scene, 2, 20_000, |way| way.method != Method::Bdpt);
     let saved = |effect: Effect| choice.weights.iter().find(|w| w.effect == effect).and_then(|w| w.saved);
     let whole = choice.trial().map(|trial| trial.seconds_per_iteration);
     assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);

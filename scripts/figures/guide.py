@@ -13,7 +13,7 @@ from _iteration import read
 from record import record
 
 # Photons of caustics alone do not do for media that scatter.
-SCENES = [scene for scene in auto.SCENES if scene not in ("fog", "godrays")]
+SCATTERING = ["fog", "godrays"]
 PLAIN = {
     "sppm": auto.options("sppm") + " --indirect paths",
     "all": auto.options("sppm"),
@@ -50,12 +50,22 @@ def caustics(scene):
     return {"errors": found, "reference": own}
 
 
+def cells(figures, columns, how):
+    """A cell for every column, a dash where there is no figure."""
+    width = how[: how.index(".")]
+    return "".join(f"{figures[name]:{how}}" if name in figures else f"{'-':{width}}" for name in columns)
+
+
 def main():
     rows = []
     print(f"{'scene':<10}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + "".join(f"{name + ' gains':>12}" for name in PLAIN) + "  mean ratios, guided")
-    for scene in SCENES:
-        data, _ = auto.measure(scene, RUNS)
-        runs = {name: [p for p in data["points"] if p["run"] == name] for name in RUNS}
+    for scene in auto.SCENES:
+        plain = [name for name in PLAIN if not (name == "sppm" and scene in SCATTERING)]
+        if not plain:
+            continue
+        wanted = {name: options for name, options in RUNS.items() if name.removesuffix(" guided") in plain}
+        data, _ = auto.measure(scene, wanted)
+        runs = {name: [p for p in data["points"] if p["run"] == name] for name in wanted}
         seconds = min(points[-1]["cpu_seconds"] for points in runs.values())
         means = {name: points[-1]["mean_ratio"] for name, points in runs.items()}
         row = {"scene": scene, "core_seconds": seconds, "mean_ratio": means}
@@ -65,17 +75,17 @@ def main():
                 point[figure] -= own
             errors = {name: auto.at(points, figure, seconds) for name, points in runs.items()}
             row[figure] = errors
-            gains = [errors[name] / errors[f"{name} guided"] for name in PLAIN]
-            line = f"{scene:<10}{figure:<16}" + "".join(f"{error:>13.2g}" for error in errors.values())
-            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + "  " + " ".join(f"{means[name + ' guided']:.4f}" for name in PLAIN), flush=True)
+            gains = {name: errors[name] / errors[f"{name} guided"] for name in plain}
+            line = f"{scene:<10}{figure:<16}" + cells(errors, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
+            print(line + "  " + " ".join(f"{means[name + ' guided']:.4f}" for name in plain), flush=True)
         if scene in auto.GUIDED:
             row["caustics"] = caustics(scene)
             errors = row["caustics"]["errors"]
             mean = {name: sum(each) / len(each) for name, each in errors.items()}
-            gains = [mean[name] / mean[f"{name} guided"] for name in PLAIN]
-            line = f"{scene:<10}{'layer Caustic':<16}" + "".join(f"{mean[name]:>13.2g}" for name in RUNS)
+            gains = {name: mean[name] / mean[f"{name} guided"] for name in PLAIN}
+            line = f"{scene:<10}{'layer Caustic':<16}" + cells(mean, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
             rest = "".join(f"  {name} {error:.2g}" for name, error in mean.items() if name not in RUNS)
-            print(line + "".join(f"{gain:>12.2f}" for gain in gains) + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
+            print(line + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
         rows.append(row)
     record("guide", {"seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE, "scenes": rows})
 

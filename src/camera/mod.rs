@@ -70,16 +70,12 @@ impl Camera {
         }
     }
 
-    /// The same view on a film of `factor` times as many pixels a side, at least one.
-    pub fn resized(&self, factor: f64) -> Camera {
-        let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
-        Camera { width: scaled(self.width), height: scaled(self.height), ..*self }
-    }
-
-    /// A sample of this camera's pixels, `factor` times as many a side and spread evenly over the film: each sees as much as a pixel does here. What light
+    /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film: each sees as much as a pixel does here. What light
     /// paths send to the film is taken from all around it: as much noise as if there were all pixels and as many light paths.
     pub fn sparse(&self, factor: f64) -> Camera {
-        Camera { covered: self.covered * factor.min(1.0) as f32, ..self.resized(factor) }
+        let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
+        let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
+        Camera { width, height, covered, ..*self }
     }
 
     /// The point of the film, in pixels, for a point of the unit square in pixel `(x, y)`.

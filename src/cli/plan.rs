@@ -70,11 +70,10 @@ fn report(args: &PlanArgs) -> Result<()> {
     let classes = args.scene.switches().classes();
     let (time, iterations) = (args.time, args.iterations.or(args.time.is_none().then_some(DEFAULT_ITERATIONS)));
     // As a render does that combines levels.
-    let (width, height) = camera.size();
     let make = |way| {
-        let settings = Settings { max_depth, classes, time, iterations, ..Settings::of(way) };
-        let photons = settings.usual_photons(u64::from(width) * u64::from(height));
-        let settings = Settings { photons, ..settings };
+        let usual = Settings::of(way);
+        let photons = usual.usual_photons(camera.size());
+        let settings = Settings { max_depth, classes, time, iterations, photons, ..usual };
         (settings.levels.count > 1).then_some(settings)
     };
     let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();

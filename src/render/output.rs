@@ -36,11 +36,15 @@ impl Present {
 
     /// Classes of light paths that there can be.
     pub fn classes(self) -> ClassSet {
-        let narrow = [Effect::Glossy, Effect::Caustic, Effect::Sds];
-        let absent = narrow.into_iter().filter(|_| !self.narrow_lobes);
-        let absent = absent.chain((!self.volume).then_some(Effect::Volume));
-        let focused = if self.narrow_lobes { ClassSet::NONE } else { ClassSet::one(PathClass::IndirectFocus) };
-        ClassSet::without(absent.collect()) & focused.complement()
+        let mut absent = ClassSet::NONE;
+        if !self.volume {
+            absent = absent.and(ClassSet::of(Effect::Volume));
+        }
+        if !self.narrow_lobes {
+            let narrow = [Effect::Glossy, Effect::Caustic, Effect::Sds].map(ClassSet::of);
+            absent = narrow.into_iter().fold(absent, ClassSet::and).and(ClassSet::one(PathClass::IndirectFocus));
+        }
+        absent.complement()
     }
 }
 

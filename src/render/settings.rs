@@ -179,11 +179,11 @@ impl Settings {
         }
     }
 
-    /// Light paths of an iteration of a picture of so many pixels where no number is asked for. Where they bring caustics alone, eye paths bring the rest and are what most of the error
+    /// Light paths of an iteration of a picture of that size where no number is asked for. Where they bring caustics alone, eye paths bring the rest and are what most of the error
     /// is left by: guided ones, which meet glass at once and take several times as long, are no more than those.
-    pub fn usual_photons(&self, pixels: u64) -> u32 {
+    pub fn usual_photons(&self, (width, height): (u32, u32)) -> u32 {
         let usual = self.method.photons();
-        if self.guided && self.indirect == Indirect::Paths { pixels.min(u64::from(usual)) as u32 } else { usual }
+        if self.guided && self.indirect == Indirect::Paths { usual.min(width.saturating_mul(height)) } else { usual }
     }
 
     /// How it looks for light.

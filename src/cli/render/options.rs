@@ -423,9 +423,8 @@ impl RenderArgs {
     }
 
     /// The settings for a picture of that size: what the number of light paths follows from where none is asked for.
-    pub fn sized(&self, settings: Settings, (width, height): (u32, u32)) -> Settings {
-        let pixels = u64::from(width) * u64::from(height);
-        Settings { photons: self.photons.unwrap_or(settings.usual_photons(pixels)), ..settings }
+    pub fn sized(&self, settings: Settings, size: (u32, u32)) -> Settings {
+        Settings { photons: self.photons.unwrap_or(settings.usual_photons(size)), ..settings }
     }
 
     /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out. Where auto balances light paths it starts from the usual number.

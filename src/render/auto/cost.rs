@@ -36,6 +36,12 @@ pub(in crate::render) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VER
 /// and paths that are longer.
 const MEDIA: [f64; 3] = [2.8, 3.2, 2.0];
 
+/// Light that was scattered broadly, or in a medium, before it is where the eye looks; and where the eye looks by narrow lobes.
+const SCATTERED: ClassSet = ClassSet::one(PathClass::Indirect)
+    .and(ClassSet::one(PathClass::IndirectFocus))
+    .and(ClassSet::one(PathClass::Volume));
+const REFLECTED: ClassSet = ClassSet::one(PathClass::ReflectedIndirect).and(ClassSet::one(PathClass::ReflectedFocus));
+
 /// Eye paths of a pixel in an iteration.
 fn eye_paths(settings: &Settings) -> f64 {
     if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 }
@@ -58,9 +64,9 @@ impl Cost {
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
         let unwanted = way.method.gathers() && settings.of_photons(self.present).is_empty();
         let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
-        let classes = settings.classes & self.present.classes();
-        let eye = if scattered_wanted(classes, false) { eye } else { eye_to_broad };
-        let light = if scattered_wanted(classes, true) { light } else { light_to_broad };
+        let wanted = |classes: ClassSet| !(settings.classes & self.present.classes() & classes).is_empty();
+        let eye_alone = if wanted(SCATTERED) { eye } else { eye_to_broad };
+        let light_alone = if wanted(SCATTERED.and(REFLECTED)) { light } else { light_to_broad };
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
         let gather = match way.method {
             _ if unwanted => 0.0,
@@ -68,17 +74,17 @@ impl Cost {
             _ => GATHER,
         };
         let seconds = match (way.method, way.indirect) {
-            (Method::Path, _) => pixels * (EYE_PATH + eye * EYE_VERTEX),
+            (Method::Path, _) => pixels * (EYE_PATH + eye_alone * EYE_VERTEX),
             (method, Indirect::Photons) if method.gathers() => {
-                paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + gather)) + photons * (start + light * LIGHT_VERTEX)
+                paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + gather))
+                    + photons * (start + light_alone * LIGHT_VERTEX)
             }
             (method, Indirect::Paths) if method.gathers() => {
-                paths * (EYE_PATH + eye * EYE_VERTEX + eye_open * gather)
+                paths * (EYE_PATH + eye_alone * EYE_VERTEX + eye_open * gather)
                     + photons * (start + light_to_broad * LIGHT_VERTEX)
             }
             (method, _) => {
                 let merges = if method.has_bandwidths() { eye_open * LOOK + merged * MERGE } else { 0.0 };
-                let Lengths { eye, light, .. } = self.lengths;
                 let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
                 paths * (both + eye_open * light_open * CONNECTION + merges)
             }
@@ -94,12 +100,4 @@ impl Cost {
             _ => MEDIA[1],
         }
     }
-}
-
-/// Whether classes hold any of light that was scattered broadly, or in a medium, before it is where the eye looks; `anywhere`: also where the eye looks by narrow lobes.
-fn scattered_wanted(classes: ClassSet, anywhere: bool) -> bool {
-    use PathClass as C;
-    let seen = [C::Indirect, C::IndirectFocus, C::Volume];
-    let reflected = [C::ReflectedIndirect, C::ReflectedFocus];
-    seen.iter().chain(reflected.iter().filter(|_| anywhere)).any(|class| classes.has(*class))
 }

@@ -7,6 +7,7 @@ use super::trial::{DARK, mean};
 use crate::estimator::Pixel;
 use crate::math::DVec3;
 use crate::stat::Welford;
+use std::ops::{AddAssign, Div};
 
 /// Pixels of a pilot's picture along a block's side.
 const SIDE: usize = 4;
@@ -22,32 +23,25 @@ pub(super) struct Caustics {
     iterations: f64,
 }
 
-/// The block of every pixel of a picture so wide, row by row.
-fn blocks(width: usize) -> impl Fn(usize) -> usize {
-    let row = width.div_ceil(SIDE);
-    move |index| (index / width / SIDE) * row + (index % width) / SIDE
-}
-
-/// Means over the blocks of something that pixels have.
-fn means<T: Copy + std::ops::AddAssign + std::ops::Div<f64, Output = T>>(
-    pixels: impl ExactSizeIterator<Item = T>,
-    width: usize,
-    zero: T,
-) -> Vec<T> {
-    let (block, count) = (blocks(width), pixels.len());
-    let mut sums = vec![(zero, 0.0); if count == 0 { 0 } else { block(count - 1).max(block(width - 1)) + 1 }];
+/// Means over the blocks, row by row, of something that the pixels of a picture so wide have.
+fn means<T>(pixels: impl ExactSizeIterator<Item = T>, width: usize) -> Vec<T>
+where
+    T: Copy + Default + AddAssign + Div<f64, Output = T>,
+{
+    let (columns, rows) = (width.div_ceil(SIDE), (pixels.len() / width).div_ceil(SIDE));
+    let mut sums = vec![(T::default(), 0.0); columns * rows];
     for (index, value) in pixels.enumerate() {
-        let (sum, pixels) = &mut sums[block(index)];
+        let (sum, count) = &mut sums[index / width / SIDE * columns + index % width / SIDE];
         *sum += value;
-        *pixels += 1.0;
+        *count += 1.0;
     }
-    sums.into_iter().map(|(sum, pixels)| sum / f64::max(pixels, 1.0)).collect()
+    sums.into_iter().map(|(sum, count)| sum / count).collect()
 }
 
 impl Caustics {
     /// Adds what an iteration has brought to the pixels of a picture so wide.
     pub fn add(&mut self, pixels: &[Pixel], width: usize) {
-        let now = means(pixels.iter().map(|pixel| pixel.parts.caustic), width, DVec3::ZERO);
+        let now = means(pixels.iter().map(|pixel| pixel.parts.caustic), width);
         self.blocks.resize(now.len(), Welford::default());
         self.before.resize(now.len(), DVec3::ZERO);
         self.iterations += 1.0;
@@ -63,7 +57,7 @@ impl Caustics {
             let block = &caustics.blocks[block];
             (mean(block.mean), mean(block.variance_of_mean(caustics.iterations)))
         };
-        let values = means(values.iter().copied(), width, 0.0);
+        let values = means(values.iter().copied(), width);
         let error = |(index, value): (usize, f64)| {
             let ((own, own_noise), (all, noise)) = (of(self, index), of(complete, index));
             let (lacks, noise) = (all - own, own_noise + noise);
@@ -119,11 +113,11 @@ mod tests {
     /// Blocks at the borders are smaller, pictures of a pixel are a block, those of none have none.
     #[test]
     fn blocks_cover_pictures_of_any_size() {
-        let sizes = |width: usize, height: usize| means(vec![1.0; width * height].into_iter(), width, 0.0);
+        let sizes = |width: usize, height: usize| means(vec![1.0; width * height].into_iter(), width);
         assert_eq!(sizes(9, 5), vec![1.0; 6]);
         assert_eq!(sizes(1, 1), vec![1.0]);
-        assert_eq!(means(std::iter::empty::<f64>(), 1, 0.0), Vec::<f64>::new());
-        let ramp = means((0..8 * 4).map(|i| f64::from(i % 8)), 8, 0.0);
+        assert_eq!(means(std::iter::empty::<f64>(), 1), Vec::<f64>::new());
+        let ramp = means((0..8 * 4).map(|i| f64::from(i % 8)), 8);
         assert_eq!(ramp, [1.5, 5.5]);
     }
 }

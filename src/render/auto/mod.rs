@@ -35,6 +35,7 @@ use crate::plan::Presence;
 use crate::scene::Scene;
 use crate::transport::{Eye, Indirect, Lengths, Surroundings};
 use cost::Cost;
+use missing::Caustics;
 
 /// Share of the render's cost that the pilot may take.
 const SHARE: f64 = 0.05;
@@ -269,7 +270,7 @@ impl<'a> Pilot<'a> {
         let photons = (few * spare).clamp(few, trial::PHOTONS.1);
         let plan = trial::Plan { photons, budget: (1.0 - SHARE) * self.budget, free, pixels };
         let mut values = Vec::new();
-        let mut trials: Vec<Trial> = ways
+        let (mut trials, found): (Vec<Trial>, Vec<Caustics>) = ways
             .iter()
             .map(|(way, settings)| {
                 let once = cost.of(*way, &trial::settings(settings, photons), small_pixels);
@@ -279,19 +280,20 @@ impl<'a> Pilot<'a> {
                 let cost_with = |guide: Option<&Guide>| guide.map_or(cost, guided);
                 Trial::new(scene, &small, (*way, settings), cost_with, (&plan, iterations), &mut values)
             })
-            .collect();
+            .unzip();
         rule_out(&mut trials);
-        add_missing(&mut trials, &values, small.size().0 as usize);
+        add_missing(&mut trials, &found, (&values, small.size().0 as usize));
         (trials, "least expected error".into())
     }
 }
 
-/// Adds what connections leave out of what merging finds. `values` are what the pixels of the pilot's picture are worth, which is so wide.
-fn add_missing(trials: &mut [Trial], values: &[f64], width: usize) {
-    let merging = trials.iter().position(|trial| trial.way.method == Method::Vcm);
-    let Some(complete) = merging.map(|merging| std::mem::take(&mut trials[merging].found)) else { return };
-    for trial in trials.iter_mut().filter(|trial| matches!(trial.way.method, Method::Path | Method::Bdpt)) {
-        trial.expected += trial.found.missing(&complete, values, width);
+/// Adds what connections leave out of what merging finds: `found` has the caustics of each. `values` are what the pixels of the pilot's picture are worth, which is so wide.
+fn add_missing(trials: &mut [Trial], found: &[Caustics], (values, width): (&[f64], usize)) {
+    let Some(merging) = trials.iter().position(|trial| trial.way.method == Method::Vcm) else { return };
+    for (trial, own) in trials.iter_mut().zip(found) {
+        if matches!(trial.way.method, Method::Path | Method::Bdpt) {
+            trial.expected += own.missing(&found[merging], values, width);
+        }
     }
 }
 

@@ -25,7 +25,7 @@ const COUNTED: f64 = 0.7;
 pub(super) const DARK: f64 = 0.01;
 
 /// A candidate and how it did.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Trial {
     /// The candidate.
     pub way: Way,
@@ -39,8 +39,6 @@ pub struct Trial {
     pub expected: f64,
     /// What suits it.
     pub balance: Balance,
-    /// Its caustics.
-    pub(super) found: Caustics,
 }
 
 /// Settings of a trial: those of the render with a share of its photons, and all levels, which tell the bias.
@@ -176,7 +174,7 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
 
 impl Trial {
     /// Tries a way on a small picture for some iterations. `values`: what its pixels are worth, told by the first trial. `cost_with` counts work with
-    /// the guide that the trial has learnt, if any.
+    /// the guide that the trial has learnt, if any. Returns what it has found of the caustics, too.
     pub(super) fn new(
         scene: &Scene,
         small: &Camera,
@@ -184,7 +182,7 @@ impl Trial {
         cost_with: impl Fn(Option<&Guide>) -> Cost,
         (plan, iterations): (&Plan, u64),
         values: &mut Vec<f64>,
-    ) -> Trial {
+    ) -> (Trial, Caustics) {
         let trial = settings(of, plan.photons);
         let stage = Stage::new(scene, small, &trial);
         let mut session = Session::new(&stage);
@@ -237,14 +235,14 @@ impl Trial {
         balance.apply(&mut balanced);
         let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
-        Trial {
+        let trial = Trial {
             way,
             caustics: sums.caustics / sums.light.max(f64::MIN_POSITIVE),
             seconds_per_iteration,
             cost,
             expected: expected(balance, n),
             balance,
-            found,
-        }
+        };
+        (trial, found)
     }
 }

@@ -102,8 +102,7 @@ pub(super) fn saved(cost: &Cost, (way, settings): (Way, &Settings), effect: Effe
     if !counted {
         return None;
     }
-    let classes = settings.classes & ClassSet::without([effect].into_iter().collect());
-    let left = Settings { classes, ..settings.clone() };
+    let left = Settings { classes: settings.classes & ClassSet::of(effect).complement(), ..settings.clone() };
     let [now, then] = [settings, &left].map(|settings| cost.of(way, settings, pixels));
     Some((now - then).max(0.0))
 }
