@@ -36,6 +36,11 @@ impl<'a> Stage<'a> {
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
+
+    /// Width and height of the picture (pixels).
+    pub fn size(&self) -> (u32, u32) {
+        self.camera.size()
+    }
 }
 
 /// Time that a render has taken: its own, not that of others between its iterations.

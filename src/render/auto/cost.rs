@@ -2,11 +2,16 @@
 //! on their ratios.
 
 use super::Way;
+use crate::camera::Camera;
+use crate::estimator::InitialBandwidth;
+use crate::estimator::bandwidth::footprint;
+use crate::light::Guide;
 use crate::plan::{ClassSet, PathClass};
 use crate::render::method::Method;
 use crate::render::output::Present;
 use crate::render::settings::Settings;
-use crate::transport::{Indirect, Lengths};
+use crate::scene::Scene;
+use crate::transport::{Eye, Indirect, Lengths, Surroundings};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
 const EYE_PATH: f64 = 0.43e-6;
@@ -57,6 +62,19 @@ pub(super) struct Cost {
 }
 
 impl Cost {
+    /// Counts what paths of a view meet; light paths are guided if there is a guide.
+    pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
+        let surroundings = Surroundings::new(scene, camera.position());
+        let Settings { max_depth, seed, classes, .. } = *settings;
+        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons, classes };
+        let reach = |length: f32| match settings.initial {
+            InitialBandwidth::Fixed(radius) => radius,
+            _ => footprint(camera, length),
+        };
+        let lengths = Lengths::new(&eye, &surroundings, seed, guide, reach);
+        Cost { lengths, present: Present::of(scene) }
+    }
+
     /// Core-seconds of an iteration of a picture of so many pixels.
     pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
         let Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open, merged } = self.lengths;

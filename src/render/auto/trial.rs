@@ -5,7 +5,6 @@ use super::cost::Cost;
 use super::missing::Caustics;
 use super::tail::Tail;
 use super::{Balance, Free, Way};
-use crate::camera::Camera;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::Guide;
 use crate::math::DVec3;
@@ -13,7 +12,6 @@ use crate::photon::MAX_NEIGHBOURS;
 use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::{Levels, Settings, Shard};
-use crate::scene::Scene;
 use crate::transport::MAX_LEVELS;
 
 /// Light paths of a trial over those of the render, at least and at most. As many neighbours are then found in as many times the area.
@@ -172,32 +170,73 @@ fn split(variance: &[f64; MAX_LEVELS]) -> (f64, f64) {
     (own - photons, photons)
 }
 
-impl Trial {
-    /// Tries a way on a small picture for some iterations. `values`: what its pixels are worth, told by the first trial. `cost_with` counts work with
-    /// the guide that the trial has learnt, if any. Returns what it has found of the caustics, too.
-    pub(super) fn new(
-        scene: &Scene,
-        small: &Camera,
-        (way, of): (Way, &Settings),
+/// A candidate being tried.
+pub(super) struct Running<'a> {
+    way: Way,
+    /// Settings of the render.
+    of: &'a Settings,
+    stage: &'a Stage<'a>,
+    session: Session<'a>,
+    cost: Cost,
+    /// Counted core-seconds of an iteration, and of all so far with what came before them.
+    once: f64,
+    spent: f64,
+    found: Caustics,
+    iterations: u64,
+}
+
+impl<'a> Running<'a> {
+    /// An iteration takes `once` (counted core-seconds), what comes before them as much as `setup` of them. `cost_with` counts work with the guide that is learnt
+    /// here, if any.
+    pub fn new(
+        stage: &'a Stage<'a>,
+        (way, of): &'a (Way, Settings),
+        (once, setup): (f64, f64),
         cost_with: impl Fn(Option<&Guide>) -> Cost,
-        (plan, iterations): (&Plan, u64),
-        values: &mut Vec<f64>,
-    ) -> (Trial, Caustics) {
-        let trial = settings(of, plan.photons);
-        let stage = Stage::new(scene, small, &trial);
-        let mut session = Session::new(&stage);
-        let mut found = Caustics::default();
-        for _ in 0..iterations {
-            session.step();
-            found.add(session.pixels(), small.size().0 as usize);
-        }
-        let levels = stage.settings().levels;
-        if values.is_empty() {
-            *values = self::values(session.pixels(), small.size(), levels);
-        }
-        let sums = Sums::of(session.pixels(), levels, values);
+    ) -> Running<'a> {
+        let session = Session::new(stage);
         let cost = cost_with(session.guide());
-        let (done, pixels) = (iterations as f64, sums.pixels.max(1.0));
+        let (found, spent) = (Caustics::default(), setup * once);
+        Running { way: *way, of, stage, session, cost, once, spent, found, iterations: 0 }
+    }
+
+    /// Adds as many iterations as so many core-seconds allow, up to at least and at most so many in all.
+    pub fn advance(&mut self, seconds: f64, (least, most): (u64, u64)) {
+        let to = (self.iterations + (seconds / self.once) as u64).clamp(least, most);
+        while self.iterations < to {
+            self.session.step();
+            self.found.add(self.session.pixels(), self.width());
+            self.iterations += 1;
+            self.spent += self.once;
+        }
+    }
+
+    /// Counted core-seconds so far.
+    pub fn spent(&self) -> f64 {
+        self.spent
+    }
+
+    /// Pixels of a row.
+    pub fn width(&self) -> usize {
+        self.stage.size().0 as usize
+    }
+
+    /// What it has found of the caustics so far.
+    pub fn found(&self) -> &Caustics {
+        &self.found
+    }
+
+    /// What its pixels are worth.
+    pub fn values(&self) -> Vec<f64> {
+        values(self.session.pixels(), self.stage.size(), self.stage.settings().levels)
+    }
+
+    /// How it has done so far, relative to what pixels are worth.
+    pub fn trial(&self, plan: &Plan, values: &[f64]) -> Trial {
+        let (way, of, cost) = (self.way, self.of, self.cost);
+        let levels = self.stage.settings().levels;
+        let sums = Sums::of(self.session.pixels(), levels, values);
+        let (done, pixels) = (self.iterations as f64, sums.pixels.max(1.0));
         let relative = |sum: f64| sum / pixels;
         let gathers = of.method.gathers();
         let variance = relative(sums.variance[levels.own()]);
@@ -235,14 +274,13 @@ impl Trial {
         balance.apply(&mut balanced);
         let seconds_per_iteration = cost.of(way, &balanced, plan.pixels);
         let n = plan.budget / seconds_per_iteration / done;
-        let trial = Trial {
+        Trial {
             way,
             caustics: sums.caustics / sums.light.max(f64::MIN_POSITIVE),
             seconds_per_iteration,
             cost,
             expected: expected(balance, n),
             balance,
-        };
-        (trial, found)
+        }
     }
 }

@@ -3,9 +3,10 @@
 //! The additive parts of the picture are told apart by any render. Two effects share a part with others, and pictures of their classes alone tell them: what
 //! narrow lobes show, and caustics seen in mirrors and glass.
 
+use super::Way;
+use super::contest::ITERATIONS;
 use super::cost::Cost;
 use super::trial::{DARK, mean, values};
-use super::{ITERATIONS, Way};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;

@@ -1,0 +1,180 @@
+//! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
+
+use super::contest;
+use super::cost::Cost;
+use super::trial::{self, Plan, Running, Trial};
+use super::weights::{self, Weight};
+use super::{Free, Way};
+use crate::camera::Camera;
+use crate::estimator::InitialBandwidth;
+use crate::light::Guide;
+use crate::plan::Presence;
+use crate::render::guiding::ROUNDS;
+use crate::render::method::Method;
+use crate::render::session::Stage;
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use crate::transport::Indirect;
+
+/// Share of the render's cost that the pilot may take.
+const SHARE: f64 = 0.05;
+/// Share of that which may go to weighing the effects.
+const WEIGHING: f64 = 0.2;
+/// Pixels of the pilot's picture.
+const PIXELS: (f64, f64) = (768.0, 4096.0);
+/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of any.
+const CORES: f64 = 2.0;
+/// What a render until an error is reached is taken for (core-seconds).
+const UNLIMITED: f64 = 1000.0;
+
+fn focuses(scene: &Scene) -> bool {
+    !scene.lights.targets().spheres().is_empty()
+}
+
+/// The ways worth trying in a scene; `gathering` is the method where photons bring all light.
+fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
+    let focusing = focuses(scene);
+    let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering());
+    let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
+    let mut ways = vec![plain(gathering)];
+    if focusing {
+        // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and guided paths take longer.
+        if !scattering {
+            ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
+        }
+        ways.push(plain(Method::Vcm));
+    }
+    // What photons alone find, these leave out.
+    if !(focusing && sizeless) {
+        ways.extend([plain(Method::Path), plain(Method::Bdpt)]);
+    }
+    ways
+}
+
+/// The candidates that other wishes leave, with their settings.
+fn ways(scene: &Scene, make: &impl Fn(Way) -> Option<Settings>) -> Vec<(Way, Settings)> {
+    // Bandwidths that shrink only where photons do not look uniform are better ones. Of several levels each would shrink on its own, and the combiner has
+    // learnt on levels that keep their ratios.
+    let counted = make(Way { method: Method::Cppm, ..Way::UNTRIED }).is_some_and(|settings| settings.levels.count == 1);
+    let gathering = if counted { Method::Cppm } else { Method::Sppm };
+    candidates(scene, gathering).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect()
+}
+
+/// What a trial takes before it begins, in iterations of it.
+fn setup((way, settings): &(Way, Settings)) -> f64 {
+    // Learning a guide takes about as much as an iteration every other round; initial bandwidths by neighbours need photons and eye paths.
+    let learning = if way.guided { ROUNDS as f64 / 2.0 } else { 0.0 };
+    let bandwidths = way.method.gathers() && matches!(settings.initial, InitialBandwidth::Nearest(_));
+    learning + if bandwidths { 1.0 } else { 0.0 }
+}
+
+/// What a pilot is of.
+pub(super) struct Pilot<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    /// Settings of [`Way::UNTRIED`].
+    untried: &'a Settings,
+    pub cost: Cost,
+    /// Pixels of the whole picture.
+    pub pixels: f64,
+    /// What the render may take (core-seconds).
+    budget: f64,
+}
+
+impl<'a> Pilot<'a> {
+    pub fn new(scene: &'a Scene, camera: &'a Camera, untried: &'a Settings) -> Pilot<'a> {
+        let (width, height) = camera.size();
+        let pixels = f64::from(width) * f64::from(height);
+        let cost = Cost::count(scene, camera, untried, None);
+        let budget = match (untried.iterations, untried.time) {
+            (Some(n), time) => {
+                let work = n as f64 * cost.of(Way::UNTRIED, untried, pixels);
+                time.map_or(work, |seconds| work.min(seconds * CORES))
+            }
+            (None, Some(seconds)) => seconds * CORES,
+            (None, None) => UNLIMITED,
+        };
+        Pilot { scene, camera, untried, cost, pixels, budget }
+    }
+
+    /// Pixels of the smallest picture that says anything.
+    fn least(&self) -> f64 {
+        PIXELS.0.min(self.pixels)
+    }
+
+    /// Core-seconds that weighing the effects takes.
+    fn weighing_cost(&self) -> f64 {
+        let settings = trial::settings(self.untried, trial::PHOTONS.0);
+        (weights::PICTURES as u64 * contest::ITERATIONS.0) as f64 * self.cost.of(Way::UNTRIED, &settings, self.least())
+    }
+
+    /// What effects of light mean to the picture; nothing where the render is too short.
+    pub fn weigh(&self) -> Vec<Weight> {
+        if self.weighing_cost() > WEIGHING * SHARE * self.budget {
+            return Vec::new();
+        }
+        let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
+        let presence = Presence::of(self.scene, self.camera);
+        let settings = trial::settings(self.untried, trial::PHOTONS.0);
+        weights::weigh(self.scene, &small, &settings, |effect| !presence.because(effect).is_empty())
+    }
+
+    /// Tries what there is, if the effects are weighed for what is left after that; returns the trials and why one of them is to be taken, or none.
+    pub fn try_all(
+        &self,
+        weighs: bool,
+        free: Free,
+        make: &impl Fn(Way) -> Option<Settings>,
+    ) -> (Vec<Trial>, &'static str) {
+        let Pilot { scene, camera, untried, cost, pixels, budget } = *self;
+        let ways = ways(scene, make);
+        if ways.len() < 2 {
+            return (Vec::new(), "the one way that these options leave");
+        }
+        let allowed = SHARE * budget - if weighs { self.weighing_cost() } else { 0.0 };
+        let Some((small, photons)) = self.size(&ways, allowed) else {
+            return (Vec::new(), "the render is too short to try others");
+        };
+        let (width, height) = small.size();
+        let plan = Plan { photons, budget: (1.0 - SHARE) * budget, free, pixels };
+        let stages: Vec<Stage<'_>> =
+            ways.iter().map(|(_, settings)| Stage::new(scene, &small, &trial::settings(settings, photons))).collect();
+        let cost_with =
+            |guide: Option<&Guide>| guide.map_or(cost, |guide| Cost::count(scene, camera, untried, Some(guide)));
+        let mut running: Vec<Running<'_>> = stages
+            .iter()
+            .zip(&ways)
+            .map(|(stage, tried @ (way, _))| {
+                let once = cost.of(*way, stage.settings(), f64::from(width) * f64::from(height));
+                Running::new(stage, tried, (once, setup(tried)), cost_with)
+            })
+            .collect();
+        (contest::hold(&mut running, &plan, allowed), "least expected error")
+    }
+
+    /// The picture that is tried and the share of the render's light paths, where a few iterations of all `ways` take half of what is allowed; `None` where that is
+    /// too little.
+    fn size(&self, ways: &[(Way, Settings)], allowed: f64) -> Option<(Camera, f64)> {
+        let trial_cost = |pixels: f64, photons: f64| -> f64 {
+            let each = |tried @ (way, settings): &(Way, Settings)| {
+                let once = self.cost.of(*way, &trial::settings(settings, photons), pixels);
+                (contest::ITERATIONS.0 as f64 + setup(tried)) * once
+            };
+            ways.iter().map(each).sum()
+        };
+        let (least, few) = (self.least(), trial::PHOTONS.0);
+        if trial_cost(least, few) > allowed {
+            return None;
+        }
+        // The cost grows linearly with pixels.
+        let allowed = 0.5 * allowed;
+        let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
+        let most = least + (allowed - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
+        let factor = (most.clamp(least, PIXELS.1.max(least)) / self.pixels).sqrt().min(1.0);
+        let small = self.camera.sparse(factor);
+        let (width, height) = small.size();
+        // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
+        let spare = allowed / trial_cost(f64::from(width) * f64::from(height), few);
+        Some((small, (few * spare).clamp(few, trial::PHOTONS.1)))
+    }
+}
