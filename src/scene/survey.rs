@@ -7,8 +7,7 @@ use crate::material::{Alpha, Materials, MediumParameters};
 /// Kinds of things present in a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Survey {
-    /// Some material has alpha cut-outs or blending.
-    pub alpha: bool,
+    alpha: bool,
     /// Some mesh bounds a solid that light enters.
     pub solids: bool,
     /// Rays may cross boundaries that do not scatter: index-matched solids, or solids inside others.
@@ -28,6 +27,12 @@ pub struct Survey {
 const COMPLETE: bool = !cfg!(feature = "bare");
 
 impl Survey {
+    /// Some material has alpha cut-outs or blending.
+    #[inline(always)]
+    pub fn alpha(&self) -> bool {
+        COMPLETE && self.alpha
+    }
+
     /// Something absorbs or scatters between surfaces.
     #[inline(always)]
     pub fn media(&self) -> bool {
@@ -49,7 +54,13 @@ impl Survey {
     /// What the scene calls for and the program lacks.
     pub(super) fn lacking(&self, materials: &Materials, lenses: bool) -> Option<&'static str> {
         let textures = !materials.textures.is_empty();
-        let all = [(self.media, "media"), (self.dispersion, "dispersion"), (textures, "textures"), (lenses, "lenses")];
+        let all = [
+            (self.alpha, "alpha"),
+            (self.media, "media"),
+            (self.dispersion, "dispersion"),
+            (textures, "textures"),
+            (lenses, "lenses"),
+        ];
         all.into_iter().find(|(called_for, _)| !COMPLETE && *called_for).map(|(_, name)| name)
     }
 

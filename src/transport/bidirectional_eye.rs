@@ -5,6 +5,7 @@ use super::bidirectional_light::{add, scatter};
 use super::eye::{Eye, EyeMeasure, Features, FirstHit};
 use super::mis::{self, End, MisState, Ratios};
 use super::photon_merge::{MergePhoton, merge_photons};
+use super::segment::token;
 use super::shares::{connected, shares, wanted};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
@@ -122,7 +123,7 @@ impl<R: Record> EyeWalk<'_, R> {
         if !is_lit(value) {
             return;
         }
-        let way = vertex.way(scene, light.wi, light.target, draws.token(Purpose::ShadowAlpha), false);
+        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha), false);
         if !is_lit(way.left) {
             return;
         }

@@ -5,6 +5,7 @@ use super::eye::EyeMeasure;
 use super::light::LightPass;
 use super::mis::{self, MisState, Ratios};
 use super::photon_merge::MergePhoton;
+use super::segment::token;
 use super::shares::{shares, wanted};
 use super::site::{MediumVertex, Site};
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
@@ -110,7 +111,8 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if !is_lit(value) {
             return;
         }
-        let way = vertex.way(eye.scene, sample.wi, Some(sample.lens), draws.token(Purpose::ShadowAlpha), false);
+        let way =
+            vertex.way(eye.scene, sample.wi, Some(sample.lens), token(eye.scene, draws, Purpose::ShadowAlpha), false);
         if !is_lit(way.left) {
             return;
         }

@@ -17,7 +17,7 @@ use super::bandwidths::{Bandwidths, Counter, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::interior::Interior;
-use super::segment::Known;
+use super::segment::{Known, token};
 use super::shares::leads;
 use super::site::MediumVertex;
 use super::site::Site;
@@ -471,7 +471,7 @@ impl Eye<'_> {
                 origin: start.origin,
                 direction: start.direction,
                 tmax: f32::INFINITY,
-                token: stream.vertex(0).token(Purpose::Alpha),
+                token: token(self.scene, stream.vertex(0), Purpose::Alpha),
             })
         };
         self.scene.tracer.intersect8(ray, |k, hit| hits[k] = Some(hit));

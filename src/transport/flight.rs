@@ -19,11 +19,11 @@ use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::spectrum::Wavelength;
 
-fn arrival(scene: &Scene, span: &Span<'_>, collision: Collision) -> MediumArrival {
+fn arrival(scene: &Scene, span: &Span, collision: Collision) -> MediumArrival {
     let p = span.origin + span.direction * collision.distance;
     MediumArrival {
         p,
-        medium: *span.medium,
+        medium: span.medium,
         interior: span.interior,
         weight: span.left * collision.weight,
         distance: span.before + collision.distance,
@@ -47,8 +47,8 @@ pub(super) struct Fly<'a> {
 
 impl Through for Fly<'_> {
     #[inline]
-    fn pass(&mut self, span: &Span<'_>) -> Passage {
-        let medium = span.medium;
+    fn pass(&mut self, span: &Span) -> Passage {
+        let medium = &span.medium;
         if !medium.scatters() {
             return Passage::Left(medium.transmittance(span.distance));
         }
@@ -85,7 +85,7 @@ pub(super) struct Split<'a, V> {
 impl<V> Split<'_, V> {
     /// The way as seen from the point of a light to which next-event estimation goes, if that is near or shines on little of it.
     #[inline]
-    fn lamp(&self, span: &Span<'_>, draws: &Draws) -> Option<Equiangular> {
+    fn lamp(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
         let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let (lamp, cone) = self.scene.lights.point(choice, point)?;
         let lit = match cone {
@@ -100,7 +100,7 @@ impl<V> Split<'_, V> {
 
     /// A vertex on the way; see [`MediumVertex`] for `opacity` and `next_event`.
     #[inline]
-    fn vertex(&self, span: &Span<'_>, at: Collision, draws: Draws, opacity: f32, next_event: f32) -> MediumVertex {
+    fn vertex(&self, span: &Span, at: Collision, draws: Draws, opacity: f32, next_event: f32) -> MediumVertex {
         let met = arrival(self.scene, span, at);
         let arriving = self.throughput * met.weight;
         MediumVertex {
@@ -122,7 +122,7 @@ impl<V> Split<'_, V> {
 
 impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
     #[inline]
-    fn pass(&mut self, span: &Span<'_>) -> Passage {
+    fn pass(&mut self, span: &Span) -> Passage {
         let left = span.medium.transmittance(span.distance);
         if !span.medium.scatters() {
             return Passage::Left(left);

@@ -6,6 +6,7 @@ use crate::geometry::Surface;
 use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
+use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
@@ -71,9 +72,9 @@ pub enum End {
 }
 
 /// A part of a ray's way that lies in one medium.
-pub(super) struct Span<'s> {
+pub(super) struct Span {
     /// The medium.
-    pub medium: &'s MediumParameters,
+    pub medium: MediumParameters,
     /// The solids here.
     pub interior: Interior,
     /// Where it begins.
@@ -92,7 +93,7 @@ pub(super) struct Span<'s> {
     pub beyond: Option<FirstHit>,
 }
 
-impl Span<'_> {
+impl Span {
     /// What a vertex in here shows as a first hit: the object that holds the medium, or what lies behind a medium that fills the scene.
     pub fn first_hit(&self, scene: &Scene, p: Vec3) -> Option<FirstHit> {
         match self.interior.host(scene) {
@@ -105,7 +106,7 @@ impl Span<'_> {
 /// What media do to a ray.
 pub(super) trait Through {
     /// On its way through `span`.
-    fn pass(&mut self, span: &Span<'_>) -> Passage;
+    fn pass(&mut self, span: &Span) -> Passage;
 }
 
 /// Outcome of [`Through::pass`].
@@ -121,9 +122,16 @@ pub(super) struct Attenuate;
 
 impl Through for Attenuate {
     #[inline]
-    fn pass(&mut self, span: &Span<'_>) -> Passage {
+    fn pass(&mut self, span: &Span) -> Passage {
         Passage::Left(span.medium.transmittance(span.distance))
     }
+}
+
+/// Out of the way of rays that meet no medium: they stay in registers, for what is told here of one is a copy.
+#[cold]
+#[inline(never)]
+fn pass(through: &mut impl Through, span: &Span) -> Passage {
+    through.pass(span)
 }
 
 /// What a surface hit by a ray is.
@@ -160,6 +168,12 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     Boundary::Scattering(eta, Some(crossing))
 }
 
+/// What decides where a ray passes what is there in part only; nothing is drawn where all is there.
+#[inline(always)]
+pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
+    if scene.survey.alpha() { draws.token(purpose) } else { 0 }
+}
+
 /// Follows a ray from inside `interior` to the next surface that scatters; media on the way attenuate.
 #[inline(always)]
 pub fn next_surface(
@@ -194,35 +208,29 @@ pub(super) fn next_vertex(
             Known::Hit(hit) if crossed == 0 => Some(*hit),
             _ => scene.tracer.intersect(&ray),
         };
-        // Twice the same, so that a surface is in registers where there are no media.
-        let mut pass = |t: f32, beyond: Option<FirstHit>| {
-            let medium = if scene.survey.media() { interior.medium(scene) } else { None };
-            let Some(medium) = &medium else { return Passage::Left(Rgb::ONE) };
-            let (origin, left) = (ray.origin, transmittance);
-            through.pass(&Span {
-                medium,
-                interior,
-                origin,
-                direction,
-                distance: t,
-                before: distance,
-                left,
-                crossed,
-                beyond,
-            })
-        };
+        let (origin, before, left) = (ray.origin, distance, transmittance);
+        let medium = if scene.survey.media() { interior.medium(scene) } else { None };
         let Some(hit) = met else {
-            return match pass(f32::INFINITY, None) {
-                Passage::Left(left) => End::Escaped(transmittance * left),
-                Passage::Ended(arrival) => End::Medium(arrival),
-            };
+            if let Some(medium) = medium {
+                let (distance, beyond) = (f32::INFINITY, None);
+                let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
+                match pass(through, &span) {
+                    Passage::Left(left) => transmittance *= left,
+                    Passage::Ended(arrival) => return End::Medium(arrival),
+                }
+            }
+            return End::Escaped(transmittance);
         };
         let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
             return End::Lost;
         };
-        match pass(hit.t, Some(FirstHit { p: surface.p, instance: surface.instance })) {
-            Passage::Left(left) => transmittance *= left,
-            Passage::Ended(arrival) => return End::Medium(arrival),
+        if let Some(medium) = medium {
+            let (distance, beyond) = (hit.t, Some(FirstHit { p: surface.p, instance: surface.instance }));
+            let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
+            match pass(through, &span) {
+                Passage::Left(left) => transmittance *= left,
+                Passage::Ended(arrival) => return End::Medium(arrival),
+            }
         }
         distance += hit.t;
         match boundary(scene, &surface, &interior, direction) {
@@ -254,14 +262,19 @@ impl Way {
     /// Goes on through `distance` of what fills the space.
     #[inline]
     fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
-        if scene.survey.media()
-            && let Some(medium) = interior.medium(scene)
-        {
-            self.left *= medium.transmittance(distance);
-            if scene.survey.scattering() {
-                self.flight = self.flight.through(&medium, distance, starts, ends);
-            }
+        if scene.survey.media() {
+            *self = self.through(scene, interior, distance, starts, ends);
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> Way {
+        let Some(medium) = interior.medium(scene) else { return self };
+        let left = self.left * medium.transmittance(distance);
+        let scatters = scene.survey.scattering();
+        let flight = if scatters { self.flight.through(&medium, distance, starts, ends) } else { self.flight };
+        Way { left, flight }
     }
 }
 

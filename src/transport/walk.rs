@@ -3,7 +3,7 @@
 
 use super::flight::{Fly, Split};
 use super::interior::Interior;
-use super::segment::{Arrival, Attenuate, End, Known, next_vertex};
+use super::segment::{Arrival, Attenuate, End, Known, next_vertex, token};
 use super::site::{MediumVertex, Site};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
@@ -207,7 +207,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
     let mut wavelength = None;
     for depth in 1..=max_depth {
         let last = stream.vertex(depth - 1);
-        let token = last.token(Purpose::Alpha);
+        let token = token(scene, last, Purpose::Alpha);
         let met = std::mem::replace(&mut known, &Known::Unknown);
         let mut flight = Flight::FREE;
         let end = if !MEDIA {
