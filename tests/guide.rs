@@ -290,7 +290,7 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(W
 fn the_choice_does_not_depend_on_threads() {
     let scene = glass_room();
     let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
-    assert_eq!(one.trials.len(), 5, "{}", one.because);
+    assert_eq!(one.trials.len(), 5, "{:?}", one.because);
     assert_eq!(one.way, three.way);
     for (a, b) in one.trials.iter().zip(&three.trials) {
         println!("{}: {:.5}", a.way.name(), a.expected.sqrt());

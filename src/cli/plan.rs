@@ -151,6 +151,12 @@ fn text(plan: &Plan) -> String {
         text += &because.join(&format!("\n{:indent$}", ""));
         text.push('\n');
     }
+    text += &match plan.left_out_at_most {
+        Some(error) => {
+            format!("nothing is left out that the scene calls for (error by it: at most {})\n", percent(error))
+        }
+        None => "light is left out that the scene calls for (nothing bounds the error by it)\n".into(),
+    };
     for warning in &plan.warnings {
         text += &format!("warning: {warning}\n");
     }

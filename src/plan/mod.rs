@@ -57,6 +57,9 @@ pub struct Plan {
     pub because: String,
     /// All effects, in their order.
     pub effects: Vec<EffectPlan>,
+    /// Bound on the relative error (the root of relMSE) by light that the scene calls for and is left out: none where some is, for nothing bounds that
+    /// ([`EffectPlan::error_if_off`] tells what a pilot has seen of it).
+    pub left_out_at_most: Option<f64>,
     /// What is missing from the picture and what may be a mistake in the scene, each with a remedy. What reading the scene has found is in
     /// [`Scene::warnings`].
     pub warnings: Vec<String>,
@@ -104,6 +107,7 @@ impl Plan {
             }
         };
         let effects: Vec<EffectPlan> = Effect::ALL.into_iter().map(plan).collect();
+        let complete = asked.max_depth.is_none() && effects.iter().all(|effect| effect.simulated || !effect.present);
         let mut warnings = Vec::new();
         for EffectPlan { effect, because, present, .. } in &effects {
             let (name, off) = (effect.name(), asked.switches.off.has(*effect));
@@ -121,6 +125,7 @@ impl Plan {
             method: asked.method.into(),
             because: asked.because.into(),
             effects,
+            left_out_at_most: complete.then_some(0.0),
             warnings,
         }
     }

@@ -1,10 +1,10 @@
 //! Which effects are there, and because of what.
 
-use super::{floor, plan};
+use super::{floor, plan, plan_by};
 use crate::support::scenes::{add, glass, matte, mirror, point_light, quad, sphere};
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::plan::{Effect, Plan};
+use caustique::plan::{Effect, Plan, Search};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 
 fn present(plan: &Plan) -> String {
@@ -52,6 +52,9 @@ fn effects_are_there_for_reasons() {
         (Some("photons"), Some("photons"))
     );
     assert!(everything.effect(Effect::Dispersion).simulated);
+    // Photons find it all; connections do not find what a lamp without size throws through glass, and nothing bounds that.
+    assert_eq!(everything.left_out_at_most, Some(0.0));
+    assert_eq!(plan_by(scene.clone(), Search::Connections).left_out_at_most, None);
     // Without light nothing is lit.
     scene.lights.clear();
     scene.materials[1].emission = Rgb::ZERO;

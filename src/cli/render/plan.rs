@@ -55,7 +55,8 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
 
 /// Why auto has chosen what it has.
 pub fn why(choice: &Choice) -> String {
-    let Some(trial) = choice.trial() else { return format!("auto: {}, for {}", choice.way.name(), choice.because) };
+    let because = choice.because.map(|because| format!(", for {because}")).unwrap_or_default();
+    let Some(trial) = choice.trial() else { return format!("auto: {}{because}", choice.way.name()) };
     let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.way != trial.way).collect();
     others.sort_by(|a, b| a.expected.total_cmp(&b.expected));
     let error = |trial: &Trial| {
@@ -68,7 +69,7 @@ pub fn why(choice: &Choice) -> String {
         InitialBandwidth::Nearest(k) => format!(" with {} light paths and {k} neighbours", settings.photons),
         _ => String::new(),
     };
-    format!("auto: {name}{with} is expected to reach an error of {} ({})", error(trial), others.join("; "))
+    format!("auto: {name}{with} is expected to reach an error of {} ({}){because}", error(trial), others.join("; "))
 }
 
 /// Whether the method can do without what media scatter, or finds it.

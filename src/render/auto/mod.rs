@@ -35,6 +35,7 @@ use pilot::Pilot;
 
 /// Squared errors whose ratio is nearer to one cannot be told apart by a pilot.
 const APART: f64 = 0.75;
+const PREFERRED: &str = "connections are expected to leave little less, and miss light that merging finds";
 
 /// A way to render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,8 +83,8 @@ pub struct Choice {
     pub chosen: Option<usize>,
     /// What effects of light mean to the picture; none where the render is too short.
     pub weights: Vec<Weight>,
-    /// Why.
-    pub because: &'static str,
+    /// Why nothing was tried, or why another way was taken than that of the least expected error.
+    pub because: Option<&'static str>,
     /// Time that it took.
     pub spent: Spent,
 }
@@ -115,8 +116,7 @@ pub fn choose(scene: &Scene, camera: &Camera, free: Free, make: impl Fn(Way) -> 
     let expected: Vec<(Method, f64)> = trials.iter().map(|trial| (trial.way.method, trial.expected)).collect();
     let best = best(&expected);
     let preferred = best.is_some_and(|best| expected.iter().any(|other| other.1 < expected[best].1));
-    let because =
-        if preferred { "as little error as a pilot can tell, and no light is hard to find for it" } else { because };
+    let because = preferred.then_some(PREFERRED).or(because);
     let way = best.map_or(Way::UNTRIED, |best| trials[best].way);
     let mut settings = make(way)?;
     if let Some(best) = best {

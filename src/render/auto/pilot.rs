@@ -119,21 +119,21 @@ impl<'a> Pilot<'a> {
         weights::weigh(self.scene, &small, &settings, |effect| !presence.because(effect).is_empty())
     }
 
-    /// Tries what there is, if the effects are weighed for what is left after that; returns the trials and why one of them is to be taken, or none.
+    /// Tries what there is, if the effects are weighed for what is left after that; returns the trials, or why there are none.
     pub fn try_all(
         &self,
         weighs: bool,
         free: Free,
         make: &impl Fn(Way) -> Option<Settings>,
-    ) -> (Vec<Trial>, &'static str) {
+    ) -> (Vec<Trial>, Option<&'static str>) {
         let Pilot { scene, camera, untried, cost, pixels, budget } = *self;
         let ways = ways(scene, make);
         if ways.len() < 2 {
-            return (Vec::new(), "the one way that these options leave");
+            return (Vec::new(), Some("the one way that these options leave"));
         }
         let allowed = SHARE * budget - if weighs { self.weighing_cost() } else { 0.0 };
         let Some((small, photons)) = self.size(&ways, allowed) else {
-            return (Vec::new(), "the render is too short to try others");
+            return (Vec::new(), Some("the render is too short to try others"));
         };
         let (width, height) = small.size();
         let plan = Plan { photons, budget: (1.0 - SHARE) * budget, free, pixels };
@@ -149,7 +149,7 @@ impl<'a> Pilot<'a> {
                 Running::new(stage, tried, (once, setup(tried)), cost_with)
             })
             .collect();
-        (contest::hold(&mut running, &plan, allowed), "least expected error")
+        (contest::hold(&mut running, &plan, allowed), None)
     }
 
     /// The picture that is tried and the share of the render's light paths, where a few iterations of all `ways` take half of what is allowed; `None` where that is
