@@ -394,12 +394,12 @@ def sky(color=None, file=None, strength=1.0):
     return world
 
 
-def camera(at, to, lens=35.0, fstop=None, focus=None):
-    """Look from `at` to `to` through a lens (mm on 36 mm film); `fstop` opens it, focused at the point `focus`."""
-    eye = bpy.data.cameras.new("Camera")
-    body = bpy.data.objects.new("Camera", eye)
+def camera(at, to, lens=35.0, fstop=None, focus=None, name="Camera"):
+    """Look from `at` to `to` through a lens (mm on 36 mm film); `fstop` opens it, focused at the point `focus`. The first one is the scene's."""
+    eye = bpy.data.cameras.new(name)
+    body = bpy.data.objects.new(name, eye)
     bpy.context.scene.collection.objects.link(body)
-    bpy.context.scene.camera = body
+    bpy.context.scene.camera = bpy.context.scene.camera or body
     eye.lens, eye.clip_start = lens, 0.01
     body.location = at
     body.rotation_euler = (Vector(to) - Vector(at)).to_track_quat("-Z", "Y").to_euler()

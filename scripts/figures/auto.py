@@ -29,14 +29,14 @@ GUIDED = ["stadium"]
 SURELY = {"blocks": "bdpt", "fog": "sppm", "godrays": "sppm", "interior": "bdpt", "torus": "vcm", "slide": "sppm"}
 
 
-def guided(scene, reference):
-    """Makes a reference by guided vcm, if there is none, and another one; returns its error in relMSE."""
+def guided(scene, reference, view=()):
+    """Makes a reference by guided vcm, if there is none, and another one; returns its error in relMSE. `view`: options of the camera."""
     other = reference.with_name(f"{reference.stem}-other.exr")
     for seed, path in enumerate((reference, other), 77):
         if not path.exists():
             command = [BIN, "render", ROOT / "scenes" / f"{scene}.glb", "-o", path, "--progress", "none", "--layers", "beauty"]
             command += ["--method", "vcm", "--guide", "on", "--levels", "1", "--no-combine", "--width", str(WIDTH)]
-            subprocess.run(command + ["--time", str(REFERENCE), "--seed", str(seed)], check=True, stderr=subprocess.DEVNULL)
+            subprocess.run(command + [*view, "--time", str(REFERENCE), "--seed", str(seed)], check=True, stderr=subprocess.DEVNULL)
     return read("compare", other, reference)["relmse"] / 2
 
 
@@ -45,17 +45,19 @@ def options(method):
     return f"--method {method} --no-combine" + ("" if method in ("path", "bdpt") else " --levels 1")
 
 
-def measure(scene, runs):
-    """Runs by name, with options, against a reference; returns what points.json says, and what auto has chosen."""
-    folder = OUT / scene
+def measure(scene, runs, camera=None):
+    """Runs by name, with options, against a reference; returns what points.json says, and what auto has chosen. `camera`: another than the scene's first."""
+    view = ["--camera", camera] if camera else []
+    stem = f"{scene}-{camera.lower().replace(' ', '-')}" if camera else scene
+    folder = OUT / stem
     OUT.mkdir(parents=True, exist_ok=True)
-    reference = OUT / f"{scene}-{WIDTH}-{REFERENCE:g}s.exr"
+    reference = OUT / f"{stem}-{WIDTH}-{REFERENCE:g}s.exr"
     command = [BIN, "converge", ROOT / "scenes" / f"{scene}.glb", "-o", folder, "--progress", "none"]
-    command += ["--width", str(WIDTH), "--time", str(SECONDS), "--seed", "1"]
+    command += [*view, "--width", str(WIDTH), "--time", str(SECONDS), "--seed", "1"]
     for name, chosen in runs.items():
         command += ["--run", f"{name}: {chosen}"]
     if scene in GUIDED:
-        command += ["--reference", reference, "--reference-error", str(guided(scene, reference))]
+        command += ["--reference", reference, "--reference-error", str(guided(scene, reference, view))]
     elif reference.exists():
         command += ["--reference", reference]
     else:

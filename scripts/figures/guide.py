@@ -14,6 +14,8 @@ from record import record
 
 # Photons of caustics alone do not do for media that scatter.
 SCATTERING = ["fog", "godrays"]
+# Other cameras to look through, where what only guided light paths find fills the picture.
+CLOSE = {"stadium": ["Close up"]}
 PLAIN = {
     "sppm": auto.options("sppm") + " --indirect paths",
     "all": auto.options("sppm"),
@@ -58,32 +60,34 @@ def cells(figures, columns, how):
 
 def main():
     rows = []
-    print(f"{'scene':<10}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + "".join(f"{name + ' gains':>12}" for name in PLAIN) + "  mean ratios, guided")
-    for scene in auto.SCENES:
+    print(f"{'scene':<18}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + "".join(f"{name + ' gains':>12}" for name in PLAIN) + "  mean ratios, guided")
+    views = [(scene, camera) for scene in auto.SCENES for camera in (None, *CLOSE.get(scene, []))]
+    for scene, camera in views:
         plain = [name for name in PLAIN if not (name == "sppm" and scene in SCATTERING)]
         if not plain:
             continue
         wanted = {name: options for name, options in RUNS.items() if name.removesuffix(" guided") in plain}
-        data, _ = auto.measure(scene, wanted)
+        data, _ = auto.measure(scene, wanted, camera)
         runs = {name: [p for p in data["points"] if p["run"] == name] for name in wanted}
         seconds = min(points[-1]["cpu_seconds"] for points in runs.values())
         means = {name: points[-1]["mean_ratio"] for name, points in runs.items()}
-        row = {"scene": scene, "core_seconds": seconds, "mean_ratio": means}
+        name = f"{scene}, {camera.lower()}" if camera else scene
+        row = {"scene": name, "core_seconds": seconds, "mean_ratio": means}
         for figure in ("relmse", "relmse_trimmed"):
             own = data["reference"]["error"].get(figure) or 0.0
             for point in data["points"]:
                 point[figure] -= own
             errors = {name: auto.at(points, figure, seconds) for name, points in runs.items()}
             row[figure] = errors
-            gains = {name: errors[name] / errors[f"{name} guided"] for name in plain}
-            line = f"{scene:<10}{figure:<16}" + cells(errors, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
-            print(line + "  " + " ".join(f"{means[name + ' guided']:.4f}" for name in plain), flush=True)
-        if scene in auto.GUIDED:
+            gains = {run: errors[run] / errors[f"{run} guided"] for run in plain}
+            line = f"{name:<18}{figure:<16}" + cells(errors, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
+            print(line + "  " + " ".join(f"{means[run + ' guided']:.4f}" for run in plain), flush=True)
+        if scene in auto.GUIDED and not camera:
             row["caustics"] = caustics(scene)
             errors = row["caustics"]["errors"]
             mean = {name: sum(each) / len(each) for name, each in errors.items()}
             gains = {name: mean[name] / mean[f"{name} guided"] for name in PLAIN}
-            line = f"{scene:<10}{'layer Caustic':<16}" + cells(mean, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
+            line = f"{name:<18}{'layer Caustic':<16}" + cells(mean, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
             rest = "".join(f"  {name} {error:.2g}" for name, error in mean.items() if name not in RUNS)
             print(line + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
         rows.append(row)

@@ -23,6 +23,7 @@ fn the_plan_of_a_scene() {
   environment     all paths     the environment
   alpha           -             nothing in the scene calls for it
   textures        -             nothing in the scene calls for it
+light is left out that the scene calls for (nothing bounds the error by it)
 warning: --method bdpt does not find all light of the effect 'sds'
 warning: --effects +alpha: nothing in the scene calls for it
 "#;
