@@ -78,12 +78,12 @@ else
     without 'cargo fmt' 'rustfmt is not installed: rustup component add rustfmt'
 fi
 part 'cargo build' cargo build --release --workspace
-tests 'cargo test' cargo test --release --workspace --no-fail-fast
 if cargo clippy --version >/dev/null 2>&1; then
     CLIPPY_CONF_DIR="$ROOT/scripts" part 'cargo clippy' cargo clippy --release --workspace --all-targets -- -D warnings
 else
     without 'cargo clippy' 'clippy is not installed: rustup component add clippy'
 fi
 RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --release --workspace --no-deps
+tests 'cargo test' cargo test --release --workspace --no-fail-fast
 tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
 tests 'Python with Blender' .venv-bpy/bin/python -m unittest discover -s tests/python -p 'blender_*.py'

@@ -1,10 +1,10 @@
 //! Choosing how to render: a short pilot tries every candidate on a small picture of the same view, and takes the one that is expected to come
 //! closest within what the render may cost.
 //!
-//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`Lengths`]) times constants (`cost`). So the same arguments give the
-//! same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances: noise falls as
-//! 1/n where paths are whole, and as n^-alpha where photons are gathered; the squared bias there as the area n^-(1 - alpha) to an exponent that levels
-//! tell (`bias`) \[Knaus and Zwicker 2011\]. Light that connections hardly ever find is told by merging (`missing`).
+//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times constants (`cost`). So the
+//! same arguments give the same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances:
+//! noise falls as 1/n where paths are whole, and as n^-alpha where photons are gathered; the squared bias there as the area n^-(1 - alpha) to an
+//! exponent that levels tell (`bias`) \[Knaus and Zwicker 2011\]. Light that connections hardly ever find is told by merging (`missing`).
 //!
 //! Where photons are gathered the pilot also balances: noise that bandwidths can smooth against the bias they bring, and light paths against eye paths
 //! ([`Balance`]).
