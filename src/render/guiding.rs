@@ -6,7 +6,8 @@
 //!
 //! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once learnt, does not leave less, there is none.
 
-use super::auto::cost::GUIDED_START;
+use super::auto::Way;
+use super::cost::{Cost, GUIDED_START};
 use super::settings::Settings;
 use super::sppm::chunks;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
@@ -35,7 +36,7 @@ const NEIGHBOURS: usize = 16;
 /// Added to a pixel's squared value: the relative error of [`super::Rendered::relative_error`].
 const DARK: f32 = 0.01;
 
-/// A guide that leaves more than this of the error that unguided light paths leave is not worth what its starts cost.
+/// A guide that leaves more than this of what unguided light paths leave of squared error, times what an iteration costs, is no gain.
 const WORTH: f64 = 0.9;
 
 /// A photon and the component of the guide that has made it.
@@ -74,12 +75,22 @@ pub(super) fn learnt(
         let error = error(eye, seed, round, &maps, guide.cells());
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
-        if round + 1 == ROUNDS && error.ratio() > WORTH {
+        if round + 1 == ROUNDS && error.ratio() * dearer(eye, settings, &guide) > WORTH {
             return None;
         }
         guide.learn(&error.of_cells, &paths, &work);
     }
     Some(guide)
+}
+
+/// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once, and are longer.
+fn dearer(eye: &Eye<'_>, settings: &Settings, guide: &Guide) -> f64 {
+    let (width, height) = eye.camera.size();
+    let cost = |guide: Option<&Guide>| {
+        let way = Way { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
+        Cost::count(eye.scene, eye.camera, settings, guide).of(way, settings, f64::from(width) * f64::from(height))
+    };
+    cost(Some(guide)) / cost(None)
 }
 
 /// Light paths of a cell.

@@ -4,6 +4,7 @@ pub mod auto;
 mod bidirectional;
 mod choice;
 mod control;
+mod cost;
 mod counting;
 mod drive;
 mod guiding;

@@ -180,9 +180,14 @@ class EveryScene(unittest.TestCase):
         self.assertEqual(kinds, {"point", "spot", "directional"})
 
     @each_scene
-    def test_one_camera_with_a_view(self, name, document, buffer):
-        self.assertEqual(len(document["cameras"]), 1)
-        self.assertTrue(0.1 < document["cameras"][0]["perspective"]["yfov"] < 2)
+    def test_cameras_with_a_view(self, name, document, buffer):
+        cameras = document["cameras"]
+        others = {"stadium": ["Close up"]}.get(name, [])
+        self.assertEqual([camera.get("name") for camera in cameras[1:]], others)
+        placed = [node["camera"] for node in document["nodes"] if "camera" in node]
+        self.assertEqual(sorted(placed), list(range(len(cameras))))
+        for camera in cameras:
+            self.assertTrue(0.1 < camera["perspective"]["yfov"] < 2, camera)
 
     def test_gems_disperse(self):
         document, _ = glb.read(os.path.join(SCENES, "gems.glb"))

@@ -51,6 +51,12 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
+    for run in &runs {
+        plan::check_media(&run.args, &scene).map_err(|mut error| {
+            error.place = format!("--run \"{}\"", run.entry.name);
+            error
+        })?;
+    }
     let (runs, choices) = choose_all(args, runs, (&scene, &camera));
     memory::check_all(runs.iter().map(|run| &run.entry.settings), camera.size())?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();

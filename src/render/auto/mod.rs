@@ -1,7 +1,7 @@
 //! Choosing how to render: a short pilot tries every candidate on a small picture of the same view, and takes the one that is expected to come
 //! closest within what the render may cost.
 //!
-//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times constants (`cost`). So the
+//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times constants (`super::cost`). So the
 //! same arguments give the same choice on any machine and any number of threads. What a candidate is expected to reach comes from its own variances:
 //! noise falls as 1/n where paths are whole, and as n^-alpha where photons are gathered; the squared bias there as the area n^-(1 - alpha) to an
 //! exponent that levels tell (`bias`) \[Knaus and Zwicker 2011\]. Light that connections hardly ever find is told by merging (`missing`).
@@ -12,7 +12,6 @@
 mod balance;
 mod bias;
 mod contest;
-pub(super) mod cost;
 mod missing;
 mod pilot;
 mod tail;
@@ -24,13 +23,13 @@ pub use trial::Trial;
 pub use weights::Weight;
 
 use super::control::{Clock, cpu_seconds};
+use super::cost::Cost;
 use super::method::Method;
 use super::session::{Session, Spent, Stage};
 use super::settings::Settings;
 use crate::camera::Camera;
 use crate::scene::Scene;
 use crate::transport::Indirect;
-use cost::Cost;
 use pilot::Pilot;
 
 /// Squared errors whose ratio is nearer to one cannot be told apart by a pilot.

@@ -1,7 +1,6 @@
 //! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
 
 use super::contest;
-use super::cost::Cost;
 use super::trial::{self, Plan, Running, Trial};
 use super::weights::{self, Weight};
 use super::{Free, Way};
@@ -9,6 +8,7 @@ use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::light::Guide;
 use crate::plan::Presence;
+use crate::render::cost::Cost;
 use crate::render::guiding::ROUNDS;
 use crate::render::method::Method;
 use crate::render::session::Stage;

@@ -1,7 +1,6 @@
 //! One candidate tried on a small picture.
 
 use super::bias::{Bias, Differences};
-use super::cost::Cost;
 use super::missing::Caustics;
 use super::tail::Tail;
 use super::{Balance, Free, Way};
@@ -9,6 +8,7 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::Guide;
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
+use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::{Levels, Settings, Shard};

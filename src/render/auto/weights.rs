@@ -5,12 +5,12 @@
 
 use super::Way;
 use super::contest::ITERATIONS;
-use super::cost::Cost;
 use super::trial::{DARK, mean, values};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
 use crate::plan::{ClassSet, Effect};
+use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;

@@ -1,15 +1,15 @@
 //! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh cost`); choices depend
 //! on their ratios.
 
-use super::Way;
+use super::auto::Way;
+use super::method::Method;
+use super::output::Present;
+use super::settings::Settings;
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
 use crate::plan::{ClassSet, PathClass};
-use crate::render::method::Method;
-use crate::render::output::Present;
-use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::{Eye, Indirect, Lengths, Surroundings};
 
@@ -36,7 +36,7 @@ const MERGE: f64 = 0.058e-6;
 /// What counting photons adds to gathering them.
 const COUNTING: f64 = 0.13e-6;
 /// What the start of a guided light path costs, in vertices of one.
-pub(in crate::render) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
+pub(super) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
 /// Times as much where media scatter, of path tracing, where both paths are kept, and where photons are gathered: vertices on the way, which are not counted,
 /// and paths that are longer.
 const MEDIA: [f64; 3] = [2.8, 3.2, 2.0];
