@@ -296,8 +296,7 @@ fn scattering_media_and_the_methods_that_refuse_them() {
     assert_eq!((outcome.code, outcome.stderr.as_str(), folder.files().len()), (Some(2), error, 0));
     let converge = "converge scene.glb -o out --width 32 --height 24 --iterations 1 --methods";
     let outcome = folder.run(&format!("{converge} sppm,pm"));
-    let error =
-        "--run \"pm\": --method pm does not render media that scatter light\nhint: choose --method sppm, cppm, vcm, bdpt or path\n";
+    let error = "--run \"pm\": --method pm does not render media that scatter light\nhint: choose --method sppm, cppm, vcm, bdpt or path\n";
     assert_eq!((outcome.code, outcome.stderr.as_str(), folder.files().len()), (Some(2), error, 0));
     for method in ["sppm --photons 100", "cppm --photons 100", "vcm", "bdpt", "path"] {
         let outcome = folder.run(&format!("{render} {method}"));
