@@ -6,10 +6,11 @@ mod support;
 
 use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::light::{Guide, Region};
-use caustique::math::{DVec3, Vec3};
-use caustique::plan::{Effect, PathClass};
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::medium::MediumParameters;
+use caustique::plan::{ClassSet, Effect, PathClass};
 use caustique::random::Domain;
-use caustique::render::auto::{Choice, Free, Way, choose};
+use caustique::render::auto::{Choice, Free, Way, Weight, choose};
 use caustique::render::output::Present;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
@@ -261,13 +262,19 @@ fn glass_room() -> Scene {
     room_with(0.4)
 }
 
-/// A ball of glass of a radius under a lamp.
-fn room_with(radius: f32) -> Scene {
+/// Grey walls and a camera between them.
+fn room() -> Description {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    description
+}
+
+/// A ball of glass of a radius under a lamp.
+fn room_with(radius: f32) -> Scene {
+    let mut description = room();
     add(&mut description, "lamp", quad(Vec3::new(-0.2, 1.98, -0.2), Vec3::X * 0.4, Vec3::Z * 0.4), matte(0.0, 20.0));
     add(&mut description, "ball", sphere(Vec3::new(0.0, 0.45, 0.0), radius, 64), glass(1.5));
-    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     build(description)
 }
 
@@ -282,7 +289,7 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(W
     let make = |way| allowed(way).then(|| settings(way));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let free = Free { photons: true, neighbours: true };
-    pool.install(|| choose(scene, &camera, free, make)).expect("a choice")
+    pool.install(|| choose((scene, &camera), free, make, || false)).expect("a choice")
 }
 
 /// The same arguments, the same choice and the same expectations to the last bit, on any number of threads.
@@ -330,6 +337,59 @@ fn effects_are_weighed() {
     }
 }
 
+/// What is switched off is weighed as if it were not: that is what the picture lacks. Media have a part of the light where they scatter; those that only absorb
+/// take of all others, and are not weighed.
+#[test]
+fn what_is_left_out_is_weighed_too() {
+    let weights = |scene: &Scene, off: ClassSet| {
+        let camera = scene.camera(&square(24)).expect("a camera");
+        let make = |way| {
+            let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
+            (way == Way::UNTRIED).then(|| Settings { classes: off.complement(), ..settings })
+        };
+        let free = Free { photons: false, neighbours: false };
+        choose((scene, &camera), free, make, || false).expect("a choice").weights
+    };
+    let of = |effect: Effect, weights: &[Weight]| weights.iter().find(|w| w.effect == effect).copied();
+    let scene = glass_room();
+    let [whole, off] = [ClassSet::NONE, ClassSet::of(Effect::Indirect)]
+        .map(|off| of(Effect::Indirect, &weights(&scene, off)).expect("indirect light"));
+    println!("{whole:?}, switched off {off:?}");
+    assert!(whole.energy > 0.05 && whole.error_if_off > 0.05);
+    assert_eq!((off.energy, off.error_if_off), (whole.energy, whole.error_if_off));
+    assert!(off.saved > Some(0.0));
+    for scattering in [0.0, 0.3] {
+        let (sigma_a, sigma_s) = (Rgb::splat(0.3), Rgb::splat(scattering));
+        let mut description = Description { medium: Some(MediumParameters { sigma_a, sigma_s, g: 0.0 }), ..room() };
+        description.lights.push(point_light(DVec3::new(0.5, 1.5, 0.5), 3.0));
+        let volume = of(Effect::Volume, &weights(&build(description), ClassSet::NONE));
+        println!("scattering {scattering}: {volume:?}");
+        assert_eq!(volume.is_some_and(|w| w.energy > 0.01 && w.error_if_off > 0.01), scattering > 0.0);
+        assert_eq!(volume.is_none(), scattering == 0.0);
+    }
+}
+
+/// Once it is asked to stop, a pilot does no more than the few iterations that all ways begin with.
+#[test]
+fn a_pilot_can_be_stopped() {
+    let scene = glass_room();
+    let camera = scene.camera(&square(24)).expect("a camera");
+    let asked = |answer: bool| {
+        let times = std::cell::Cell::new(0);
+        let make = |way| Some(Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) });
+        let stop = || {
+            times.set(times.get() + 1);
+            answer
+        };
+        let choice = choose((&scene, &camera), Free { photons: true, neighbours: true }, make, stop);
+        assert!(choice.is_some_and(|choice| choice.trials.len() == 5));
+        times.get()
+    };
+    let (stopped, whole) = (asked(true), asked(false));
+    println!("asked {stopped} times where the answer is to stop, {whole} times where it is not");
+    assert!(stopped <= 10 && whole > 40);
+}
+
 /// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor the light: what guided ones find tells.
 #[test]
 fn rare_caustics_are_left_to_guided_light_paths() {
@@ -354,10 +414,8 @@ fn rare_caustics_are_left_to_guided_light_paths() {
 /// What a scene does not call for is not tried, and a short render tries nothing.
 #[test]
 fn only_what_is_called_for_is_tried() {
-    let mut description = Description::default();
-    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
+    let mut description = room();
     description.lights.push(point_light(DVec3::new(0.0, 1.5, 0.0), 1.0));
-    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
     let scene = build(description);
     let matte_only = auto(&scene, 2, 20_000);
     let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.way.method).collect();

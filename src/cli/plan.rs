@@ -3,7 +3,7 @@
 use super::number::{positive, threads};
 use super::progress::percent;
 use super::render::Method;
-use super::render::plan::{Wishes, plan};
+use super::render::plan::{Wishes, check_media, plan};
 use super::scene::{self, SceneArgs};
 use super::{print, print_json};
 use caustique::error::Result;
@@ -65,6 +65,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     let loaded = scene::read(&args.scene, rayon::current_num_threads())?;
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = loaded.scene.camera(&view)?;
+    check_media(&args.scene.path, args.method, None, &loaded.scene)?;
     let free = Free { photons: false, neighbours: false };
     let max_depth = args.max_depth.unwrap_or(u32::MAX);
     let classes = args.scene.switches().classes();
@@ -76,7 +77,8 @@ fn report(args: &PlanArgs) -> Result<()> {
         let settings = Settings { max_depth, classes, time, iterations, photons, ..usual };
         (settings.levels.count > 1).then_some(settings)
     };
-    let choice = (args.method == Method::Auto).then(|| choose(&loaded.scene, &camera, free, make)).flatten();
+    let choice =
+        (args.method == Method::Auto).then(|| choose((&loaded.scene, &camera), free, make, || false)).flatten();
     let switches = args.scene.switches();
     let wishes = Wishes { method: args.method, choice: choice.as_ref(), max_depth: args.max_depth, switches };
     let mut plan = plan(&wishes, &loaded.scene, &camera, &loaded.removed);
@@ -85,7 +87,11 @@ fn report(args: &PlanArgs) -> Result<()> {
     if args.json {
         print_json(&json!(plan))?
     } else {
-        print(&text(&plan))?
+        let mut text = text(&plan);
+        if args.method == Method::Auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
+            text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
+        }
+        print(&text)?
     }
     if args.scene.strict && !of_scene.is_empty() {
         return Err(scene::forbidden(&args.scene, of_scene.len()));

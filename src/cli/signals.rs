@@ -2,6 +2,7 @@
 
 use caustique::error::{Error, Kind, Result};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -20,6 +21,18 @@ impl Interrupt {
                 .map_err(|error| Error::new(Kind::Io, "signals", error))?;
         }
         Ok(Interrupt(asked))
+    }
+
+    /// Ends a run that was interrupted while it decided how to render.
+    ///
+    /// # Errors
+    /// A signal came.
+    pub fn before_the_first_iteration(&self, output: &Path) -> Result<()> {
+        if !self.asked() {
+            return Ok(());
+        }
+        let cause = "interrupted before the first iteration; nothing is written";
+        Err(Error::new(Kind::Interrupted, output.display(), cause))
     }
 
     /// Whether a signal came.

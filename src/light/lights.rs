@@ -97,6 +97,16 @@ pub struct Lights {
     targets: Targets,
 }
 
+/// What a triangle that does not look the same all over emits at a point; out of the way of lamps that do.
+#[cold]
+#[inline(never)]
+fn uneven(shapes: &Shapes, materials: &Materials, (instance, primitive): (u32, u32), b: Vec2) -> Option<Rgb> {
+    let light = shapes.surface(instance, primitive, [b.x, b.y])?;
+    let material = &materials.list[light.material as usize];
+    // A cut-out part gives no light: rays pass it, so samples must, too.
+    Some(material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures))
+}
+
 impl Lights {
     /// The emissive triangles of the shapes, then `others` (points, spots, suns), then the sky's environment.
     pub fn new(shapes: &Shapes, materials: &Materials, others: Vec<Emitter>, sky: Sky) -> Lights {
@@ -280,14 +290,7 @@ impl Lights {
                 if cos == 0.0 || (cos < 0.0 && !two_sided) {
                     return None;
                 }
-                let radiance = if *plain {
-                    *radiance
-                } else {
-                    let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
-                    let material = &materials.list[light.material as usize];
-                    // A cut-out part gives no light: rays pass it, so samples must, too.
-                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures)
-                };
+                let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 let arrival_pdf_a = Self::lambertian(cos.abs(), *two_sided) / distance2;
                 let target = Some(spawn(at, ng, -wi));
@@ -451,22 +454,20 @@ impl Lights {
         let emitter = &self.emitters[index];
         // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine at the light.
         let (origin, d, flux, [direct, onward, cos]) = match emitter {
-            Emitter::Triangle { instance, primitive, area, two_sided, .. } => {
+            Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
                 let b = warp::triangle_uniform(point);
-                let light = shapes.surface(*instance, *primitive, [b.x, b.y])?;
+                let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
                 let back = *two_sided && rest < 0.5;
-                let frame = Frame::from_normal(if back { -light.ng } else { light.ng });
+                let frame = Frame::from_normal(if back { -ng } else { ng });
                 let d = frame.to_world(warp::hemisphere_cosine(direction));
-                let material = &materials.list[light.material as usize];
-                let radiance =
-                    material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures);
-                let cos = light.ng.dot(d).abs();
+                let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
+                let cos = ng.dot(d).abs();
                 // Along the surface nothing leaves it, and densities over the cosine would not be numbers.
                 if cos < LEAST_COSINE {
                     return None;
                 }
                 let flux = radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 });
-                (light.spawn(d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
+                (spawn(at, ng, d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
             }
             Emitter::Point { p, intensity } => {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])

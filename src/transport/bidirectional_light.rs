@@ -83,7 +83,7 @@ struct LightWalk<'a, 's, R> {
 }
 
 impl<R: Record> LightWalk<'_, '_, R> {
-    #[inline]
+    #[inline(always)]
     fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
             self.beam = self.beam.then(Event::by(scattered.lobe, self.lobes));

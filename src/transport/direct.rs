@@ -75,7 +75,7 @@ fn second_strategy(scene: &Scene, vertex: &impl Site, set: LobeSet) -> Rgb {
     let draws = vertex.draws();
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
     let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
-    let interior = vertex.interiors()[usize::from(sample.transmitted)];
+    let interior = *vertex.interiors()[usize::from(sample.transmitted)];
     let origin = vertex.spawn(sample.wi);
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
     let mut light = Rgb::ZERO;

@@ -281,7 +281,7 @@ impl Way {
 /// What is left of light between `origin` and the point `tmax` away along the unit `direction`: zero if anything scatters
 /// there, else absorption and tints.
 #[inline]
-pub fn transmittance(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, interior: Interior, token: u32) -> Rgb {
+pub fn transmittance(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, interior: &Interior, token: u32) -> Rgb {
     way(scene, origin, direction, tmax, interior, token, [false; 2]).left
 }
 
@@ -292,7 +292,7 @@ pub fn way(
     origin: Vec3,
     direction: Vec3,
     tmax: f32,
-    interior: Interior,
+    interior: &Interior,
     token: u32,
     in_medium: [bool; 2],
 ) -> Way {
@@ -303,10 +303,10 @@ pub fn way(
         if scene.tracer.occluded(&ray) {
             return Way::BLOCKED;
         }
-        way.pass(scene, &interior, tmax, starts, ends);
+        way.pass(scene, interior, tmax, starts, ends);
         return way;
     }
-    let mut interior = interior;
+    let mut interior = *interior;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some(hit) = scene.tracer.intersect(&ray) else {
             way.pass(scene, &interior, ray.tmax, starts, ends);

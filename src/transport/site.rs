@@ -85,7 +85,7 @@ pub trait Site {
     /// Where a ray towards `w` starts.
     fn spawn(&self, w: Vec3) -> Vec3;
     /// The solids on the side of `wo`, and behind.
-    fn interiors(&self) -> [Interior; 2];
+    fn interiors(&self) -> [&Interior; 2];
     /// Whether `w` is on the other side than `wo`.
     fn crosses(&self, w: Vec3) -> bool;
     /// As what receives light straight from lights.
@@ -193,8 +193,8 @@ impl Site for Vertex<'_, '_> {
     }
 
     #[inline]
-    fn interiors(&self) -> [Interior; 2] {
-        [self.interior, self.interior_behind]
+    fn interiors(&self) -> [&Interior; 2] {
+        [&self.interior, &self.interior_behind]
     }
 
     #[inline]
@@ -283,8 +283,8 @@ impl Site for MediumVertex {
     }
 
     #[inline]
-    fn interiors(&self) -> [Interior; 2] {
-        [self.met.interior; 2]
+    fn interiors(&self) -> [&Interior; 2] {
+        [&self.met.interior; 2]
     }
 
     #[inline]

@@ -294,6 +294,11 @@ fn scattering_media_and_the_methods_that_refuse_them() {
     let error =
         "scene.glb: --indirect paths does not render media that scatter light\nhint: leave --indirect paths out\n";
     assert_eq!((outcome.code, outcome.stderr.as_str(), folder.files().len()), (Some(2), error, 0));
+    for method in ["pm", "bpm"] {
+        let outcome = folder.run(&format!("plan scene.glb --method {method}"));
+        let error = format!("scene.glb: --method {method} does not render media that scatter light\n");
+        assert!(outcome.code == Some(2) && outcome.stderr.starts_with(&error), "{}", outcome.stderr);
+    }
     let converge = "converge scene.glb -o out --width 32 --height 24 --iterations 1 --methods";
     let outcome = folder.run(&format!("{converge} sppm,pm"));
     let error = "--run \"pm\": --method pm does not render media that scatter light\nhint: choose --method sppm, cppm, vcm, bdpt or path\n";

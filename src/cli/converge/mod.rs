@@ -52,12 +52,14 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
     for run in &runs {
-        plan::check_media(&run.args, &scene).map_err(|mut error| {
+        plan::check_media(&args.scene.path, run.args.method, run.args.indirect, &scene).map_err(|mut error| {
             error.place = format!("--run \"{}\"", run.entry.name);
             error
         })?;
     }
-    let (runs, choices) = choose_all(args, runs, (&scene, &camera));
+    let interrupt = Interrupt::listen()?;
+    let (runs, choices) = choose_all(args, runs, (&scene, &camera), &interrupt);
+    interrupt.before_the_first_iteration(&args.output)?;
     memory::check_all(runs.iter().map(|run| &run.entry.settings), camera.size())?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
@@ -65,7 +67,6 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let (entries, mut combiners) = open(args, runs, &choices, (&scene, &camera), &removed)?;
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
-    let interrupt = Interrupt::listen()?;
     let reference = reference::get(args, source, (&scene, &camera), &interrupt, &mut notes)?;
     let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
     let mut reporter = Reporter::new(args.progress);
@@ -134,14 +135,16 @@ fn choose_all(
     args: &ConvergeArgs,
     mut runs: Vec<Run>,
     (scene, camera): (&Scene, &Camera),
+    interrupt: &Interrupt,
 ) -> (Vec<Run>, Vec<Option<Choice>>) {
     let choose_one = |run: &mut Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
         run.entry.settings = run.args.sized(run.entry.settings.clone(), camera.size());
         let make = |way| run.args.allowed(way, camera.size()).map(limits);
-        let chosen =
-            (run.args.method == Method::Auto).then(|| choose(scene, camera, run.args.free(), make)).flatten()?;
+        let chosen = (run.args.method == Method::Auto)
+            .then(|| choose((scene, camera), run.args.free(), make, || interrupt.asked()))
+            .flatten()?;
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
         Some(chosen)

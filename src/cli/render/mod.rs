@@ -49,19 +49,20 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let Loaded { scene, removed } = scene::read(&args.scene, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.view())?;
-    plan::check_media(args, &scene)?;
+    plan::check_media(&args.scene.path, args.method, args.indirect, &scene)?;
     let settings = &args.sized(settings.clone(), camera.size());
     let present = Present::of(&scene);
     self::selection(args, settings, present)?;
     // Before anything is tried, which takes time.
     memory::check(settings, camera.size(), channels(settings, present))?;
-    let choice = auto(args, &scene, &camera, present);
+    let interrupt = Interrupt::listen()?;
+    let choice = auto(args, (&scene, &camera), present, &interrupt);
+    interrupt.before_the_first_iteration(&args.output)?;
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
     memory::check(settings, camera.size(), channels(settings, present))?;
-    let plan = plan::plan(&plan::Wishes::of(args, choice.as_ref()), &scene, &camera, &removed);
+    let mut plan = plan::plan(&plan::Wishes::of(args, choice.as_ref()), &scene, &camera, &removed);
     let mut network = network(args, settings.levels.count)?;
     let talk = args.progress.for_people();
-    let interrupt = Interrupt::listen()?;
     if let Some(choice) = choice.as_ref().filter(|_| talk) {
         say(&format!("method: {}", plan::why(choice)));
     }
@@ -97,6 +98,8 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
         set = selection.apply(set)?;
     }
 
+    // As `caustique plan` tells it.
+    plan.warnings.splice(0..0, scene.warnings.iter().cloned());
     header.insert("plan".into(), json!(plan));
     let name = combined.as_ref().and(network.as_ref()).map(|network| (network.name.as_str(), combining));
     complete(&mut header, args, &scene, combined, cpu_seconds() - cpu_start);
@@ -125,10 +128,15 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
 }
 
 /// What auto chooses, where it is to: among ways whose pictures have the layers asked for.
-fn auto(args: &RenderArgs, scene: &Scene, camera: &Camera, present: Present) -> Option<Choice> {
+fn auto(
+    args: &RenderArgs,
+    (scene, camera): (&Scene, &Camera),
+    present: Present,
+    interrupt: &Interrupt,
+) -> Option<Choice> {
     let layers = |settings: &Settings| selection(args, settings, present).is_ok();
     let make = |way| args.allowed(way, camera.size()).filter(layers);
-    (args.method == Method::Auto).then(|| choose(scene, camera, args.free(), make)).flatten()
+    (args.method == Method::Auto).then(|| choose((scene, camera), args.free(), make, || interrupt.asked())).flatten()
 }
 
 /// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.

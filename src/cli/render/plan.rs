@@ -47,7 +47,8 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
             (effect.energy, effect.error_if_off) = (Some(weight.energy), Some(weight.error_if_off));
             effect.seconds_per_iteration = weight.saved;
             let whole = wishes.choice.and_then(Choice::trial).map(|trial| trial.seconds_per_iteration);
-            effect.time = weight.saved.zip(whole).map(|(saved, whole)| (saved / whole).min(1.0));
+            let simulated = effect.simulated;
+            effect.time = weight.saved.filter(|_| simulated).zip(whole).map(|(saved, whole)| (saved / whole).min(1.0));
         }
     }
     plan
@@ -76,18 +77,18 @@ pub fn why(choice: &Choice) -> String {
 ///
 /// # Errors
 /// Media scatter, and the method gathers photons on surfaces only, or photons of caustics alone.
-pub fn check_media(args: &RenderArgs, scene: &Scene) -> Result<()> {
-    let method = args.method.chosen();
+pub fn check_media(file: &Path, method: Method, indirect: Option<Indirect>, scene: &Scene) -> Result<()> {
+    let method = method.chosen();
     let (option, hint) = match method {
         _ if !scene.survey.scattering() => return Ok(()),
         render::Method::Pm | render::Method::Bpm => {
             (format!("--method {}", method.name()), "choose --method sppm, cppm, vcm, bdpt or path")
         }
-        _ if args.indirect == Some(Indirect::Paths) => ("--indirect paths".into(), "leave --indirect paths out"),
+        _ if indirect == Some(Indirect::Paths) => ("--indirect paths".into(), "leave --indirect paths out"),
         _ => return Ok(()),
     };
     let cause = format!("{option} does not render media that scatter light");
-    Err(Error::new(Kind::Usage, args.scene.path.display(), cause).hint(hint))
+    Err(Error::new(Kind::Usage, file.display(), cause).hint(hint))
 }
 
 /// Prints what the plan warns of.

@@ -15,10 +15,11 @@ const FOUND: f64 = 0.7;
 /// The same for one that sends photons, of the caustics that guided ones find: those of either kind are a few bright discs where they are rare.
 const SENT: f64 = 0.25;
 
-/// Lets candidates run for so many core-seconds at most and tells how they did. What is clear after the first iterations costs no more.
-pub(super) fn hold(running: &mut [Running<'_>], plan: &Plan, allowed: f64) -> Vec<Trial> {
+/// Lets candidates run for so many core-seconds at most and tells how they did. What is clear after the first iterations costs no more. Those are all there are once
+/// `stop` holds.
+pub(super) fn hold(running: &mut [Running<'_>], plan: &Plan, allowed: f64, stop: &dyn Fn() -> bool) -> Vec<Trial> {
     let share = FIRST * allowed / running.len() as f64;
-    running.iter_mut().for_each(|running| running.advance(share, ITERATIONS));
+    running.iter_mut().for_each(|running| running.advance(share, ITERATIONS, stop));
     let values = running[0].values();
     let trials = compare(running, plan, &values);
     let least = trials.iter().map(|trial| trial.expected).fold(f64::INFINITY, f64::min);
@@ -32,7 +33,7 @@ pub(super) fn hold(running: &mut [Running<'_>], plan: &Plan, allowed: f64) -> Ve
         return trials;
     }
     let share = (allowed - spent).max(0.0) / open.len() as f64;
-    open.iter_mut().for_each(|running| running.advance(share, ITERATIONS));
+    open.iter_mut().for_each(|running| running.advance(share, ITERATIONS, stop));
     compare(running, plan, &values)
 }
 

@@ -105,13 +105,19 @@ fn best(expected: &[(Method, f64)]) -> Option<usize> {
     merging.filter(alike).or(Some(least))
 }
 
-/// Tries the candidates and takes the best. `make` gives the settings of a way, `None` where other wishes rule it out.
-pub fn choose(scene: &Scene, camera: &Camera, free: Free, make: impl Fn(Way) -> Option<Settings>) -> Option<Choice> {
+/// Tries the candidates and takes the best. `make` gives the settings of a way, `None` where other wishes rule it out. Once `stop` holds, what is tried ends as soon
+/// as it can, and the choice is worth nothing.
+pub fn choose(
+    (scene, camera): (&Scene, &Camera),
+    free: Free,
+    make: impl Fn(Way) -> Option<Settings>,
+    stop: impl Fn() -> bool,
+) -> Option<Choice> {
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let untried = make(Way::UNTRIED)?;
     let pilot = Pilot::new(scene, camera, &untried);
     let mut weights = pilot.weigh();
-    let (trials, because) = pilot.try_all(!weights.is_empty(), free, &make);
+    let (trials, because) = pilot.try_all(!weights.is_empty(), free, &make, &stop);
     let expected: Vec<(Method, f64)> = trials.iter().map(|trial| (trial.way.method, trial.expected)).collect();
     let best = best(&expected);
     let preferred = best.is_some_and(|best| expected.iter().any(|other| other.1 < expected[best].1));

@@ -22,7 +22,8 @@ const SHARE: f64 = 0.05;
 const WEIGHING: f64 = 0.2;
 /// Pixels of the pilot's picture.
 const PIXELS: (f64, f64) = (768.0, 4096.0);
-/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of any.
+/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of it. One core takes twice
+/// that share.
 const CORES: f64 = 2.0;
 /// What a render until an error is reached is taken for (core-seconds).
 const UNLIMITED: f64 = 1000.0;
@@ -104,7 +105,7 @@ impl<'a> Pilot<'a> {
 
     /// Core-seconds that weighing the effects takes.
     fn weighing_cost(&self) -> f64 {
-        let settings = trial::settings(self.untried, trial::PHOTONS.0);
+        let settings = weights::settings(self.untried, trial::PHOTONS.0);
         (weights::PICTURES as u64 * contest::ITERATIONS.0) as f64 * self.cost.of(Way::UNTRIED, &settings, self.least())
     }
 
@@ -115,7 +116,7 @@ impl<'a> Pilot<'a> {
         }
         let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
         let presence = Presence::of(self.scene, self.camera);
-        let settings = trial::settings(self.untried, trial::PHOTONS.0);
+        let settings = weights::settings(self.untried, trial::PHOTONS.0);
         weights::weigh(self.scene, &small, &settings, |effect| !presence.because(effect).is_empty())
     }
 
@@ -125,6 +126,7 @@ impl<'a> Pilot<'a> {
         weighs: bool,
         free: Free,
         make: &impl Fn(Way) -> Option<Settings>,
+        stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
         let Pilot { scene, camera, untried, cost, pixels, budget } = *self;
         let ways = ways(scene, make);
@@ -149,7 +151,7 @@ impl<'a> Pilot<'a> {
                 Running::new(stage, tried, (once, setup(tried)), cost_with)
             })
             .collect();
-        (contest::hold(&mut running, &plan, allowed), None)
+        (contest::hold(&mut running, &plan, allowed, stop), None)
     }
 
     /// The picture that is tried and the share of the render's light paths, where a few iterations of all `ways` take half of what is allowed; `None` where that is

@@ -200,10 +200,10 @@ impl<'a> Running<'a> {
         Running { way: *way, of, stage, session, cost, once, spent, found, iterations: 0 }
     }
 
-    /// Adds as many iterations as so many core-seconds allow, up to at least and at most so many in all.
-    pub fn advance(&mut self, seconds: f64, (least, most): (u64, u64)) {
+    /// Adds as many iterations as so many core-seconds allow, up to at least and at most so many in all; no more than the least once `stop` holds.
+    pub fn advance(&mut self, seconds: f64, (least, most): (u64, u64), stop: &dyn Fn() -> bool) {
         let to = (self.iterations + (seconds / self.once) as u64).clamp(least, most);
-        while self.iterations < to {
+        while self.iterations < to && !(self.iterations >= least && stop()) {
             self.session.step();
             self.found.add(self.session.pixels(), self.width());
             self.iterations += 1;

@@ -5,7 +5,7 @@
 
 use super::Way;
 use super::contest::ITERATIONS;
-use super::trial::{DARK, mean, values};
+use super::trial::{self, DARK, mean, values};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
@@ -53,7 +53,14 @@ fn parts(pixel: &Pixel) -> [DVec3; 5] {
     [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume].map(|part| part / n)
 }
 
-/// Weighs the effects of light on a small picture by the settings of a trial that finds all of them. `present`: effects that the scene calls for.
+/// All classes of light paths are weighed, those too that are switched off: what that leaves out is told.
+pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
+    Settings { classes: ClassSet::ALL, ..trial::settings(of, photons) }
+}
+
+/// Weighs the effects of light on a small picture by [`settings`] of a way that finds all of them. `present`: effects that the scene calls for.
+///
+/// Media that absorb and do not scatter have no part of the light of their own: they are not weighed, nor what else is a property of the scene.
 pub(super) fn weigh(
     scene: &Scene,
     camera: &Camera,
@@ -87,7 +94,8 @@ pub(super) fn weigh(
             }
         }
     }
-    for (k, effect) in WHOLE.into_iter().enumerate().filter(|(_, effect)| present(*effect)) {
+    let apart = |effect: Effect| effect != Effect::Volume || scene.survey.scattering();
+    for (k, effect) in WHOLE.into_iter().enumerate().filter(|(_, effect)| present(*effect) && apart(*effect)) {
         weights.push(weight(effect, &mut whole.iter().map(|parts| parts[k])));
     }
     weights
@@ -103,7 +111,9 @@ pub(super) fn saved(cost: &Cost, (way, settings): (Way, &Settings), effect: Effe
     if !counted {
         return None;
     }
-    let left = Settings { classes: settings.classes & ClassSet::of(effect).complement(), ..settings.clone() };
-    let [now, then] = [settings, &left].map(|settings| cost.of(way, settings, pixels));
-    Some((now - then).max(0.0))
+    // Of an effect that is left out: what it would cost.
+    let of = ClassSet::of(effect);
+    let [with, without] = [settings.classes.and(of), settings.classes & of.complement()]
+        .map(|classes| cost.of(way, &Settings { classes, ..settings.clone() }, pixels));
+    Some((with - without).max(0.0))
 }
