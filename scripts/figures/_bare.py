@@ -2,12 +2,11 @@
 stretch of iterations that a render's history tells apart the fastest of all runs counts; the ratio is that of their sums."""
 
 import os
-import subprocess
 import tempfile
 from pathlib import Path
 
-from _iteration import WHOLE, read
-from record import ROOT, record
+from _iteration import WHOLE, history, read
+from record import record
 
 BARE = os.environ["BARE_BIN"]
 ROUNDS = int(os.environ.get("ROUNDS", "8"))
@@ -19,10 +18,8 @@ METHODS = {"sppm": 5, "path": 8, "vcm": 3}
 
 def stretches(program, scene, method, file):
     """Core-seconds between the entries of a render's history."""
-    command = [program, "render", ROOT / "scenes" / f"{scene}.glb", "-o", file, "--method", method, "--width", str(WIDTH), "--threads", "1", "--no-combine"]
-    command += ["--iterations", str(METHODS[method]), "--progress", "none"] + ([] if method == "path" else ["--levels", "1"])
-    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
-    times = [entry["cpu_seconds"] for entry in read("info", file)["history"]]
+    options = ["--method", method, "--width", str(WIDTH), "--threads", "1"] + ([] if method == "path" else ["--levels", "1"])
+    times = [entry["cpu_seconds"] for entry in history(program, scene, options, METHODS[method], file)]
     return [after - before for before, after in zip(times, times[1:])]
 
 

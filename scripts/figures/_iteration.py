@@ -1,4 +1,4 @@
-"""What an iteration takes, from a render's own history."""
+"""What iterations take, from a render's own history."""
 
 import json
 import os
@@ -15,10 +15,14 @@ def read(*arguments):
     return json.loads(done.stdout)
 
 
-def iteration(program, scene, options, iterations, file):
-    """Core-seconds of an iteration after the first, which is cold. Renders without combiner to a file."""
+def history(program, scene, options, iterations, file):
+    """Renders without combiner to a file; returns the entries of its history."""
     command = [program, "render", ROOT / "scenes" / f"{scene}.glb", "-o", file, "--iterations", str(iterations), "--no-combine", "--progress", "none"]
     subprocess.run(command + options, check=True, stderr=subprocess.DEVNULL)
-    history = read("info", file)["history"]
-    first, last = history[0], history[-1]
+    return read("info", file)["history"]
+
+
+def iteration(program, scene, options, iterations, file):
+    """Core-seconds of an iteration after the first, which is cold."""
+    first, *_, last = history(program, scene, options, iterations, file)
     return (last["cpu_seconds"] - first["cpu_seconds"]) / (last["iterations"] - first["iterations"])

@@ -34,7 +34,7 @@ pub use light::{Emitted, EqualFlux, LightPass, Photons, light_path};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;
 pub use probe::{GatherPoint, Probe};
-pub use segment::{Arrival, End, Known, MediumArrival, Way, next_surface, transmittance, way};
+pub use segment::{Arrival, End, Known, MediumArrival, Way, next_surface, way};
 pub use site::{MediumVertex, Site, lit_side};
 pub use volume::Volume;
 pub use walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};

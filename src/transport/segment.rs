@@ -278,14 +278,8 @@ impl Way {
     }
 }
 
-/// What is left of light between `origin` and the point `tmax` away along the unit `direction`: zero if anything scatters
-/// there, else absorption and tints.
-#[inline]
-pub fn transmittance(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, interior: &Interior, token: u32) -> Rgb {
-    way(scene, origin, direction, tmax, interior, token, [false; 2]).left
-}
-
-/// [`transmittance`], and the densities of flight; `in_medium`: whether the way starts and ends at a vertex of a medium.
+/// What is left of light between `origin` and the point `tmax` away along the unit `direction` (zero if anything scatters there, else absorption and tints), and the
+/// densities of flight; `in_medium`: whether the way starts and ends at a vertex of a medium.
 #[inline]
 pub fn way(
     scene: &Scene,

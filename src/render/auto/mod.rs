@@ -34,6 +34,7 @@ use pilot::Pilot;
 
 /// Squared errors whose ratio is nearer to one cannot be told apart by a pilot.
 const APART: f64 = 0.75;
+/// Why merging was taken before connections.
 const PREFERRED: &str = "connections are expected to leave little less, and miss light that merging finds";
 
 /// A way to render.
