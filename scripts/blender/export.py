@@ -67,8 +67,7 @@ def write(path, scene=None):
     _finish_nodes(document, scene, warn)
     _finish_lamps(document)
     said = lighting.world_extras(scene, path, warn)
-    if said:
-        document["scenes"][document.get("scene", 0)].setdefault("extras", {}).setdefault("caustique", {}).update(said)
+    document["scenes"][document.get("scene", 0)].setdefault("extras", {}).setdefault("caustique", {}).update(said)
     used = {name for part in document.get("materials", []) for name in part.get("extensions", {})}
     document["extensionsUsed"] = sorted(used | set(document.get("extensionsUsed", [])))
     if not document["extensionsUsed"]:

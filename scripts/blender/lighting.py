@@ -129,27 +129,26 @@ def camera_extras(thing, warn):
 
 
 def world_extras(scene, path, warn):
-    """`extras.caustique` of the scene: `environment` and `medium`. Images are put beside the .glb at `path`."""
-    world = scene.world
+    """`extras.caustique` of the scene: `environment`, also where it is black, and `medium`. Images are put beside the .glb at `path`."""
+    world, said = scene.world, {"environment": {"color": [0.0, 0.0, 0.0]}}
     if world is None:
-        return {}
-    where, said = f'world "{world.name}"', {}
+        return said
+    where = f'world "{world.name}"'
     output = output_of(nodes_of(world))
     if output is None:
-        colour = list(world.color) if nodes_of(world) is None else []
-        return {"environment": {"color": colour}} if any(colour) else {}
+        if nodes_of(world) is None:
+            said["environment"]["color"] = list(world.color)
+        return said
     inside = medium(source(output.inputs["Volume"]), where, warn)
     if inside is not None:
         said["medium"] = inside
     shader = source(output.inputs["Surface"])
     if shader is None:
         return said
-    environment = _background(shader, path)
-    if environment is None:
-        environment = _baked(scene, path)
-        warn(where, f"its nodes are baked to {environment['file']}")
-    if environment.get("file") or any(environment["color"]):
-        said["environment"] = environment
+    said["environment"] = _background(shader, path)
+    if said["environment"] is None:
+        said["environment"] = _baked(scene, path)
+        warn(where, f"its nodes are baked to {said['environment']['file']}")
     return said
 
 

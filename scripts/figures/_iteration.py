@@ -22,7 +22,13 @@ def history(program, scene, options, iterations, file):
     return read("info", file)["history"]
 
 
-def iteration(program, scene, options, iterations, file):
-    """Core-seconds of an iteration after the first, which is cold."""
-    first, *_, last = history(program, scene, options, iterations, file)
-    return (last["cpu_seconds"] - first["cpu_seconds"]) / (last["iterations"] - first["iterations"])
+def stretches(program, scene, options, iterations, file):
+    """Core-seconds on one thread between the entries of a render's history: of iterations after the first, which is cold, told apart at 1, 2, 3, 5, 8."""
+    times = [entry["cpu_seconds"] for entry in history(program, scene, [*options, "--threads", "1"], iterations, file)]
+    return [after - before for before, after in zip(times, times[1:])]
+
+
+def fastest(runs, iterations):
+    """Core-seconds of an iteration from the stretches of some runs. Two threads of a core share its caches, and what else goes on on a machine only ever adds to a run's
+    time: so of every stretch the fastest of all runs counts."""
+    return sum(map(min, zip(*runs))) / (iterations - 1)

@@ -2,23 +2,24 @@
 """What every effect costs: core-seconds of an iteration with everything and without one effect that the scene calls for, and the error (root of relMSE) of
 leaving it out.
 
-sppm with one level; renders take turns, medians are told. CAUSTIQUE_BIN is the program. SCENES, ROUNDS (3), ITERATIONS (6) and WIDTH (320) shorten a trial.
+sppm with one level, on one thread; renders take turns, and the fastest stretches of all rounds count. CAUSTIQUE_BIN is the program. SCENES, ROUNDS (4), ITERATIONS (5) and
+WIDTH (320) shorten a trial. The last lines are a table for the README.
 """
 
 import math
 import os
-import statistics
 import tempfile
 from pathlib import Path
 
-from _iteration import WHOLE, iteration, read
+from _iteration import WHOLE, fastest, read, stretches
 from record import ROOT, record
 
-ROUNDS = int(os.environ.get("ROUNDS", "3"))
-ITERATIONS = int(os.environ.get("ITERATIONS", "6"))
+ROUNDS = int(os.environ.get("ROUNDS", "4"))
+ITERATIONS = int(os.environ.get("ITERATIONS", "5"))
 WIDTH = os.environ.get("WIDTH", "320")
 ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))
 SCENES = os.environ["SCENES"].split(",") if "SCENES" in os.environ else ALL
+EFFECTS = "emission direct indirect glossy caustic sds volume dispersion depth_of_field environment alpha textures".split()
 OPTIONS = ["--method", "sppm", "--levels", "1", "--width", WIDTH]
 
 
@@ -27,13 +28,25 @@ def measure(scene, folder):
     plan = read("plan", ROOT / "scenes" / f"{scene}.glb", "--method", "sppm")
     present = [effect["name"] for effect in plan["effects"] if effect["simulated"]]
     runs = {None: OPTIONS} | {name: OPTIONS + ["--effects", f"-{name}"] for name in present}
-    seconds = {name: [] for name in runs}
-    for _ in range(ROUNDS):
-        for name, options in runs.items():
-            seconds[name].append(iteration(WHOLE, scene, options, ITERATIONS, folder / f"{name}.exr"))
-    middle = {name: statistics.median(each) for name, each in seconds.items()}
+    rounds = {name: [] for name in runs}
+    for turn in range(ROUNDS):
+        # None is always the first.
+        for name, options in list(runs.items())[:: 1 if turn % 2 == 0 else -1]:
+            rounds[name].append(stretches(WHOLE, scene, options, ITERATIONS, folder / f"{name}.exr"))
+    seconds = {name: fastest(each, ITERATIONS) for name, each in rounds.items()}
     errors = {name: math.sqrt(read("compare", folder / f"{name}.exr", folder / "None.exr")["relmse_trimmed"]) for name in present}
-    return middle.pop(None), {name: {"seconds_without": middle[name], "error": errors[name]} for name in present}
+    return seconds.pop(None), {name: {"seconds_without": seconds[name], "error": errors[name]} for name in present}
+
+
+def table(rows):
+    """Seconds with everything and without each effect, and the error of that in percent, as Markdown."""
+    names = [name for name in EFFECTS if any(name in row["effects"] for row in rows)]
+    lines = ["| scene | all | " + " | ".join(f"`{name}`" for name in names) + " |", "| --- " * (len(names) + 2) + "|"]
+    for row in rows:
+        told = [row["effects"].get(name) for name in names]
+        cells = [f"{e['seconds_without']:.3f}, {100 * e['error']:.2g}" if e else "" for e in told]
+        lines.append(f"| {row['scene']} | {row['seconds']:.3f} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def main():
@@ -46,6 +59,7 @@ def main():
         for name, effect in effects.items():
             saved = 1 - effect["seconds_without"] / whole
             print(f"    -{name:<16} {effect['seconds_without']:.3f} ({100 * saved:+.0f} % saved), error {100 * effect['error']:.0f} %", flush=True)
+    print(table(rows))
     record("effects", {"rounds": ROUNDS, "iterations": ITERATIONS, "width": int(WIDTH), "scenes": rows})
 
 

@@ -78,6 +78,11 @@ impl Camera {
         Camera { width, height, covered, ..*self }
     }
 
+    /// The same without its lens: all is sharp.
+    pub fn pinhole(&self) -> Camera {
+        Camera { lens_radius: 0.0, focus_distance: 1.0, ..*self }
+    }
+
     /// The point of the film, in pixels, for a point of the unit square in pixel `(x, y)`.
     #[inline]
     pub fn film(&self, (x, y): (u32, u32), u: Vec2) -> Vec2 {

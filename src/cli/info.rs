@@ -99,7 +99,6 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
 
 fn scene_object(path: &Path, scene: &Scene) -> Value {
     let shapes = &scene.shapes;
-    let placed: usize = shapes.instances.iter().map(|i| shapes.meshes[i.mesh as usize].triangles.len()).sum();
     let stored: usize = shapes.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let materials: Vec<&str> = scene.materials.list.iter().map(|m| m.name.as_str()).collect();
     let cameras: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
@@ -114,7 +113,7 @@ fn scene_object(path: &Path, scene: &Scene) -> Value {
         "objects": scene.objects,
         "meshes": shapes.meshes.len(),
         "instances": shapes.instances.len(),
-        "triangles": placed,
+        "triangles": shapes.triangles(),
         "triangles_stored": stored,
         "materials": materials,
         "textures": scene.materials.textures.len(),

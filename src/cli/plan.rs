@@ -1,17 +1,13 @@
 //! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
 
-use super::number::{positive, threads};
+use super::number::threads;
 use super::progress::percent;
-use super::render::Method;
 use super::render::plan::{Wishes, check_media, plan};
-use super::scene::{self, SceneArgs};
-use super::{print, print_json};
+use super::render::{Job, Method};
+use super::{print, print_json, scene};
 use caustique::error::Result;
 use caustique::plan::{EffectPlan, Plan};
-use caustique::render::auto::{Free, choose};
-use caustique::render::{DEFAULT_ITERATIONS, Settings};
-use caustique::scene::{MAX_SIZE, View};
-use clap::value_parser;
+use caustique::render::auto::choose;
 use serde_json::json;
 
 /// Say which effects a scene calls for, which will be simulated, and why.
@@ -22,31 +18,7 @@ use serde_json::json;
 #[command(next_line_help = true)]
 pub struct PlanArgs {
     #[command(flatten)]
-    scene: SceneArgs,
-
-    /// How light is found
-    #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
-    method: Method,
-    /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
-    max_depth: Option<u32>,
-
-    /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
-    #[arg(long, value_name = "W", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
-    width: Option<u32>,
-    /// Height in pixels; without a width the camera's aspect is kept
-    #[arg(long, value_name = "H", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
-    height: Option<u32>,
-    /// Camera by name [default: the scene's first]
-    #[arg(long, value_name = "NAME", help_heading = "Picture")]
-    camera: Option<String>,
-
-    /// Of a render of so many iterations [default: 64, if there is no time]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "When to stop")]
-    iterations: Option<u64>,
-    /// Of a render of so many seconds
-    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
-    time: Option<f64>,
+    job: Job,
 
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
@@ -62,25 +34,16 @@ pub fn run(args: &PlanArgs) -> Result<()> {
 }
 
 fn report(args: &PlanArgs) -> Result<()> {
-    let loaded = scene::read(&args.scene, rayon::current_num_threads())?;
-    let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
-    let camera = loaded.scene.camera(&view)?;
-    check_media(&args.scene.path, args.method, None, &loaded.scene)?;
-    let free = Free { photons: false, neighbours: false };
-    let max_depth = args.max_depth.unwrap_or(u32::MAX);
-    let classes = args.scene.switches().classes();
-    let (time, iterations) = (args.time, args.iterations.or(args.time.is_none().then_some(DEFAULT_ITERATIONS)));
-    // As a render does that combines levels.
-    let make = |way| {
-        let usual = Settings::of(way);
-        let photons = usual.usual_photons(camera.size());
-        let settings = Settings { max_depth, classes, time, iterations, photons, ..usual };
-        (settings.levels.count > 1).then_some(settings)
-    };
+    let job = &args.job;
+    // Options that contradict each other are errors here, too.
+    job.settings()?;
+    let loaded = scene::read(&job.scene, rayon::current_num_threads())?;
+    let camera = loaded.scene.camera(&job.view())?;
+    check_media(job, &loaded.scene)?;
+    let make = |way| job.allowed(way, camera.size());
     let choice =
-        (args.method == Method::Auto).then(|| choose((&loaded.scene, &camera), free, make, || false)).flatten();
-    let switches = args.scene.switches();
-    let wishes = Wishes { method: args.method, choice: choice.as_ref(), max_depth: args.max_depth, switches };
+        (job.method == Method::Auto).then(|| choose((&loaded.scene, &camera), job.free(), make, || false)).flatten();
+    let wishes = Wishes::of(job, choice.as_ref());
     let mut plan = plan(&wishes, &loaded.scene, &camera, &loaded.removed);
     let of_scene = &loaded.scene.warnings;
     plan.warnings.splice(0..0, of_scene.iter().cloned());
@@ -88,13 +51,13 @@ fn report(args: &PlanArgs) -> Result<()> {
         print_json(&json!(plan))?
     } else {
         let mut text = text(&plan);
-        if args.method == Method::Auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
+        if job.method == Method::Auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
             text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
         }
         print(&text)?
     }
-    if args.scene.strict && !of_scene.is_empty() {
-        return Err(scene::forbidden(&args.scene, of_scene.len()));
+    if job.scene.strict && !of_scene.is_empty() {
+        return Err(scene::forbidden(&job.scene, of_scene.len()));
     }
     Ok(())
 }
@@ -175,7 +138,7 @@ mod tests {
     use crate::cli::render::plan::plan;
     use caustique::plan::switch::Removed;
     use caustique::plan::{Effect, Switches};
-    use caustique::scene::{Description, Scene};
+    use caustique::scene::{Description, Scene, View};
 
     /// Columns of figures are there when something has measured them, with a dash where it has not.
     #[test]

@@ -114,6 +114,7 @@ fn environment(description: &mut Description, args: &SceneArgs) -> Result<()> {
             EnvironmentChoice::File(path) => environment_file::read(path, &mut description.warnings)?,
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.world_unsaid = false;
     }
     let given = [("--env-rotation", args.env_rotation), ("--env-strength", args.env_strength)];
     let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };

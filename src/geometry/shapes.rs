@@ -21,6 +21,11 @@ impl Shapes {
         Shapes { meshes, instances, corners }
     }
 
+    /// Number of triangles standing in the scene.
+    pub fn triangles(&self) -> usize {
+        self.instances.iter().map(|instance| self.meshes[instance.mesh as usize].triangles.len()).sum()
+    }
+
     /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of it at once, so that the
     /// processor waits once. Returns something that depends on it.
     #[inline]

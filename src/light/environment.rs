@@ -3,6 +3,7 @@
 use super::cdf::Cdf;
 use crate::math::{Rgb, Vec2, Vec3, luminance, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::Arc;
 
 /// An environment light.
 #[derive(Clone, Debug)]
@@ -10,7 +11,7 @@ pub enum Environment {
     /// The same radiance from everywhere.
     Uniform(Rgb),
     /// An image.
-    Image(ImageEnvironment),
+    Image(Arc<ImageEnvironment>),
 }
 
 /// A latitude-longitude image (rows from the top, u = 1/2 + atan2(z, x) / 2 pi), importance-sampled by luminance.
@@ -175,7 +176,7 @@ mod tests {
         for x in 0..w {
             texels[15 * w + x] = [0.0; 3];
         }
-        Environment::Image(ImageEnvironment::new(w, h, texels, rotation).unwrap())
+        Environment::Image(Arc::new(ImageEnvironment::new(w, h, texels, rotation).unwrap()))
     }
 
     /// The estimate of the total irradiation by importance sampling equals uniform sampling's, and the density of each sample
@@ -218,7 +219,7 @@ mod tests {
         let at = |rotation: f32| {
             let image = ImageEnvironment::new(w, h, texels.clone(), rotation).unwrap();
             [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Z]
-                .map(|d| Environment::Image(image.clone()).radiance(d).x > 0.1)
+                .map(|d| Environment::Image(Arc::new(image.clone())).radiance(d).x > 0.1)
         };
         assert_eq!(at(0.0), [true, false, false, false, false]);
         // Seen from +Y with X to the right, counter-clockwise by a quarter turns +X to -Z.

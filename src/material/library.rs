@@ -5,6 +5,7 @@ use crate::bsdf::DELTA_ALPHA;
 use crate::geometry::Surface;
 use crate::math::Rgb;
 use crate::texture::{Texture, TextureRef};
+use std::sync::Arc;
 
 /// Wider lobes focus no light and show no reflections.
 pub const WIDEST_ROUGHNESS: f32 = 0.45;
@@ -14,8 +15,8 @@ pub const WIDEST_ROUGHNESS: f32 = 0.45;
 pub struct Materials {
     /// Materials; texture indices in them are valid.
     pub list: Vec<Material>,
-    /// Textures.
-    pub textures: Vec<Texture>,
+    /// Textures; another scene may share them.
+    pub textures: Arc<[Texture]>,
 }
 
 impl Material {

@@ -1,12 +1,14 @@
-//! `--effects`: leaves effects that are properties of the scene out of its description, before anything is built of it.
+//! `--effects`: leaves effects that are properties of the scene out of its description, before anything is built of it, or out of the scene, to see what they mean to it.
 
 use super::effect::{Effect, EffectSet};
 use super::names::{cut_list, worn};
 use super::presence::{ENVIRONMENT, SPACE, property};
-use crate::material::{Alpha, Material};
+use crate::error::Result;
+use crate::material::{Alpha, Material, Materials};
 use crate::math::{Rgb, Vec4};
-use crate::scene::Description;
+use crate::scene::{Description, Scene};
 use crate::texture::{Texels, Texture, TextureRef};
+use std::sync::Arc;
 
 /// What called for effects that were left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,13 +31,13 @@ pub fn off(description: &mut Description, effects: EffectSet) -> Removed {
 fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
     let instances = description.instances.iter().map(|placed| (placed.material, placed.name.as_str()));
     let mut because = property(effect, &worn(&description.materials, instances));
-    let materials = &mut description.materials;
+    if let Some(left) = strip(effect, &mut description.materials, &description.textures) {
+        description.textures = left;
+    }
     match effect {
         Effect::Volume => {
             because.splice(0..0, description.medium.take().map(|_| SPACE.into()));
-            materials.iter_mut().for_each(|material| material.medium = None);
         }
-        Effect::Dispersion => materials.iter_mut().for_each(|material| material.dispersion = 0.0),
         Effect::DepthOfField => {
             for camera in description.cameras.iter_mut().filter(|camera| camera.aperture_radius > 0.0) {
                 camera.aperture_radius = 0.0;
@@ -43,15 +45,39 @@ fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
             }
         }
         Effect::Environment => because.extend(description.environment.take().map(|_| ENVIRONMENT.into())),
-        Effect::Alpha => materials.iter_mut().for_each(|material| material.alpha = Alpha::Opaque),
-        Effect::Textures => flatten_all(materials, &mut description.textures),
         _ => {}
     }
     cut_list(because)
 }
 
-/// Puts the mean of every texture in its place.
-fn flatten_all(materials: &mut [Material], textures: &mut Vec<Texture>) {
+/// The scene without an effect that is a property of it, as [`off`] leaves it out of its description; what is the same is shared. Lenses are the camera's
+/// ([`crate::camera::Camera::pinhole`]).
+///
+/// # Errors
+/// Without cut-outs shapes are committed to Embree again, which may be out of memory.
+pub fn without(scene: &Scene, effect: Effect) -> Result<Scene> {
+    let mut list = scene.materials.list.clone();
+    let shared = &scene.materials.textures;
+    let textures = strip(effect, &mut list, shared).map_or_else(|| Arc::clone(shared), Arc::from);
+    let medium = scene.medium.filter(|_| effect != Effect::Volume);
+    let environment = scene.lights.sky().environment.clone().filter(|_| effect != Effect::Environment);
+    scene.dressed(Materials { list, textures }, medium, environment)
+}
+
+/// Takes an effect out of materials; the textures that are left, where those change.
+fn strip(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Option<Vec<Texture>> {
+    match effect {
+        Effect::Volume => materials.iter_mut().for_each(|material| material.medium = None),
+        Effect::Dispersion => materials.iter_mut().for_each(|material| material.dispersion = 0.0),
+        Effect::Alpha => materials.iter_mut().for_each(|material| material.alpha = Alpha::Opaque),
+        Effect::Textures => return Some(flatten_all(materials, textures)),
+        _ => {}
+    }
+    None
+}
+
+/// Puts the mean of every texture in its place; the textures that cut-outs need.
+fn flatten_all(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture> {
     let means: Vec<Vec4> = textures.iter().map(Texture::mean).collect();
     // Cut-outs are another effect: what they need of textures stays.
     let mut kept = Vec::new();
@@ -69,7 +95,7 @@ fn flatten_all(materials: &mut [Material], textures: &mut Vec<Texture>) {
         );
         material.base_color_texture = mask;
     }
-    *textures = kept;
+    kept
 }
 
 /// White with the texture's alpha.

@@ -9,38 +9,47 @@ use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
-use crate::plan::{ClassSet, PathClass};
+use crate::plan::{ClassSet, Effect, PathClass};
 use crate::scene::Scene;
 use crate::transport::{Eye, Indirect, Lengths, Surroundings};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
-const EYE_PATH: f64 = 0.43e-6;
+const EYE_PATH: f64 = 0.135e-6;
 /// A vertex of an eye path with its light sample.
-const EYE_VERTEX: f64 = 0.63e-6;
+const EYE_VERTEX: f64 = 0.83e-6;
+/// Of that, direct light at the first that has broad lobes.
+const DIRECT: f64 = 0.2e-6;
 /// Photons gathered at a vertex.
-const GATHER: f64 = 0.07e-6;
+const GATHER: f64 = 0.047e-6;
 /// The start of a light path.
-const LIGHT_PATH: f64 = 0.06e-6;
+const LIGHT_PATH: f64 = 0.17e-6;
 /// What guiding adds to that.
-const GUIDE: f64 = 0.09e-6;
-/// A vertex of a light path, its photon, and its share of the map.
-const LIGHT_VERTEX: f64 = 0.84e-6;
+const GUIDE: f64 = 0.11e-6;
+/// A vertex of a light path, its photon, and its share of the map; in a medium much the same.
+const LIGHT_VERTEX: f64 = 0.7e-6;
 /// A vertex of either path where both are kept and their MIS weights with them.
-const TWO_WAY_VERTEX: f64 = 0.65e-6;
+const TWO_WAY_VERTEX: f64 = 0.78e-6;
 /// A connection of two vertices.
-const CONNECTION: f64 = 0.62e-6;
+const CONNECTION: f64 = 0.51e-6;
 /// A vertex where photons to merge with are looked for.
-const LOOK: f64 = 0.1e-6;
+const LOOK: f64 = 0.155e-6;
 /// A photon that is merged.
-const MERGE: f64 = 0.058e-6;
+const MERGE: f64 = 0.039e-6;
 /// What counting photons adds to gathering them.
-const COUNTING: f64 = 0.13e-6;
+const COUNTING: f64 = 0.04e-6;
+/// A vertex in a medium of an eye path; of either path where both are kept; a point that an eye path looks at on its way through a medium, with the photons around it.
+const EYE_MEDIUM: f64 = 0.89e-6;
+const TWO_WAY_MEDIUM: f64 = 1.05e-6;
+const ON_THE_WAY: f64 = 1.04e-6;
+/// Times as much more a vertex takes whose material has textures.
+const TEXTURED: f64 = 0.4;
+/// Times as long where colours refract differently.
+const DISPERSION: f64 = 1.1;
+/// Rays take the longer the more triangles there are: these were fitted for so many, and their power is.
+const TRIANGLES: f64 = 50_000.0;
+const POWER: f64 = 0.1;
 /// What the start of a guided light path costs, in vertices of one.
 pub(super) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
-/// Times as much where media scatter, of path tracing, where both paths are kept, and where photons are gathered: vertices on the way, which are not counted,
-/// and paths that are longer.
-const MEDIA: [f64; 3] = [2.8, 3.2, 2.0];
-
 /// Light that was scattered broadly, or in a medium, before it is where the eye looks; and where the eye looks by narrow lobes.
 const SCATTERED: ClassSet = ClassSet::one(PathClass::Indirect)
     .and(ClassSet::one(PathClass::IndirectFocus))
@@ -59,6 +68,8 @@ pub(super) struct Cost {
     pub lengths: Lengths,
     /// What there is.
     pub present: Present,
+    /// Times as long as in a scene of [`TRIANGLES`] without dispersion.
+    factor: f64,
 }
 
 impl Cost {
@@ -72,50 +83,53 @@ impl Cost {
             _ => footprint(camera, length),
         };
         let lengths = Lengths::new(&eye, &surroundings, seed, guide, reach);
-        Cost { lengths, present: Present::of(scene) }
+        let triangles = scene.shapes.triangles().max(1) as f64;
+        let dispersion = if scene.survey.dispersion() { DISPERSION } else { 1.0 };
+        Cost { lengths, present: Present::of(scene), factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
     }
 
     /// Core-seconds of an iteration of a picture of so many pixels.
     pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
-        let Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open, merged } = self.lengths;
+        let Lengths { eye, eye_to_broad, light, light_to_broad, merged, textured, .. } = self.lengths;
+        let Lengths { eye_media, light_media, on_the_way, eye_open, light_open, .. } = self.lengths;
         let paths = pixels * eye_paths(settings);
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
         let unwanted = way.method.gathers() && settings.of_photons(self.present).is_empty();
         let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
         let wanted = |classes: ClassSet| !(settings.classes & self.present.classes() & classes).is_empty();
-        let eye_alone = if wanted(SCATTERED) { eye } else { eye_to_broad };
-        let light_alone = if wanted(SCATTERED.and(REFLECTED)) { light } else { light_to_broad };
+        let (eye_alone, eye_media_alone) = if wanted(SCATTERED) { (eye, eye_media) } else { (eye_to_broad, 0.0) };
+        let scattered = wanted(SCATTERED.and(REFLECTED));
+        let (light_alone, light_media_alone) = if scattered { (light, light_media) } else { (light_to_broad, 0.0) };
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
+        let [eye_vertex, light_vertex, two_way_vertex] =
+            [EYE_VERTEX, LIGHT_VERTEX, TWO_WAY_VERTEX].map(|vertex| vertex * (1.0 + TEXTURED * textured));
         let gather = match way.method {
             _ if unwanted => 0.0,
             Method::Cppm => GATHER + COUNTING,
             _ => GATHER,
         };
-        let seconds = match (way.method, way.indirect) {
-            (Method::Path, _) => pixels * (EYE_PATH + eye_alone * EYE_VERTEX),
+        let all = match (way.method, way.indirect) {
+            (Method::Path, _) => pixels * (EYE_PATH + eye_alone * eye_vertex + eye_media_alone * EYE_MEDIUM),
             (method, Indirect::Photons) if method.gathers() => {
-                paths * (EYE_PATH + eye_to_broad * (EYE_VERTEX + gather))
-                    + photons * (start + light_alone * LIGHT_VERTEX)
+                paths * (EYE_PATH + eye_to_broad * (eye_vertex + gather) + on_the_way * ON_THE_WAY)
+                    + photons * (start + light_alone * light_vertex + light_media_alone * LIGHT_VERTEX)
             }
             (method, Indirect::Paths) if method.gathers() => {
-                paths * (EYE_PATH + eye_alone * EYE_VERTEX + eye_open * gather)
-                    + photons * (start + light_to_broad * LIGHT_VERTEX)
+                paths * (EYE_PATH + eye_alone * eye_vertex + eye_open * gather)
+                    + photons * (start + light_to_broad * light_vertex)
             }
             (method, _) => {
-                let merges = if method.has_bandwidths() { eye_open * LOOK + merged * MERGE } else { 0.0 };
-                let both = EYE_PATH + start + (eye + light) * TWO_WAY_VERTEX;
-                paths * (both + eye_open * light_open * CONNECTION + merges)
+                // Without light that was scattered before, few pairs are left.
+                let (from_eye, from_light) = match wanted(SCATTERED) {
+                    true => (eye_open + eye_media, light_open + light_media),
+                    false => (eye_to_broad, light_to_broad),
+                };
+                let merges = if method.has_bandwidths() { from_eye * LOOK + merged * MERGE } else { 0.0 };
+                let vertices = (eye + light) * two_way_vertex + (eye_media + light_media) * TWO_WAY_MEDIUM;
+                paths * (EYE_PATH + start + vertices + from_eye * from_light * CONNECTION + merges)
             }
         };
-        seconds * self.media(way.method)
-    }
-
-    fn media(&self, method: Method) -> f64 {
-        match method {
-            _ if !self.present.volume => 1.0,
-            Method::Path => MEDIA[0],
-            method if method.gathers() => MEDIA[2],
-            _ => MEDIA[1],
-        }
+        let left_out = if wanted(ClassSet::of(Effect::Direct)) { 0.0 } else { paths * eye_to_broad.min(1.0) * DIRECT };
+        (all - left_out).max(0.0) * self.factor
     }
 }

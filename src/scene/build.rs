@@ -5,7 +5,7 @@ use super::{Scene, Survey};
 use crate::error::{Error, Kind, Result};
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
-use crate::material::{Alpha, Material, Materials, Scattering};
+use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::trace::{AlphaTest, Tracer};
 use std::sync::Arc;
@@ -47,10 +47,8 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
 
     let shapes = Arc::new(place(&mut description, origin));
-    let materials = Arc::new(Materials { list: description.materials, textures: description.textures });
-    let cutout: Vec<bool> =
-        shapes.instances.iter().map(|i| materials.list[i.material as usize].alpha != Alpha::Opaque).collect();
-    let tracer = Tracer::build(&shapes, &cutout, &alpha_test(&shapes, &materials), threads)?;
+    let materials = Arc::new(Materials { list: description.materials, textures: description.textures.into() });
+    let tracer = tracer(&shapes, &materials, threads)?;
 
     let sky = Sky {
         center: (center - origin).as_vec3(),
@@ -103,11 +101,53 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         lights,
         light_names,
         guessed_units: description.guessed_units,
+        world_unsaid: description.world_unsaid,
         cameras: description.cameras,
         medium: description.medium,
         scattering,
         survey,
         warnings,
+    })
+}
+
+/// Other materials on the shapes of a scene, another medium and environment around them.
+///
+/// # Errors
+/// Embree is out of memory.
+pub(super) fn dress(
+    scene: &Scene,
+    materials: Materials,
+    medium: Option<MediumParameters>,
+    environment: Option<Environment>,
+) -> Result<Scene> {
+    let (shapes, materials) = (Arc::clone(&scene.shapes), Arc::new(materials));
+    // Embree asks about cut-outs the materials that it was given.
+    let cut = |materials: &Materials| materials.list.iter().map(|material| material.alpha).collect::<Vec<Alpha>>();
+    let tracer = match cut(&materials) == cut(&scene.materials) {
+        true => scene.tracer.clone(),
+        false => tracer(&shapes, &materials, rayon::current_num_threads())?,
+    };
+    let lamps = scene.lights.emitters().iter();
+    let lamps = lamps.filter(|lamp| !matches!(lamp, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
+    let sky = Sky { environment, ..scene.lights.sky().clone() };
+    let lights = Lights::new(&shapes, &materials, lamps.collect(), sky);
+    Ok(Scene {
+        source: scene.source.clone(),
+        origin: scene.origin,
+        objects: scene.objects.clone(),
+        first_lamp: scene.first_lamp,
+        tracer,
+        light_names: scene.light_names.clone(),
+        guessed_units: scene.guessed_units.clone(),
+        world_unsaid: scene.world_unsaid,
+        cameras: scene.cameras.clone(),
+        medium,
+        scattering: Scattering::new(&materials.list),
+        survey: Survey::new(&shapes, &materials, &lights, medium),
+        warnings: Vec::new(),
+        shapes,
+        materials,
+        lights,
     })
 }
 
@@ -169,6 +209,13 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
 }
 
+/// Commits shapes to Embree, with the cut-outs of what they wear.
+fn tracer(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<Tracer> {
+    let cut = |instance: &Instance| materials.list[instance.material as usize].alpha != Alpha::Opaque;
+    let cutout: Vec<bool> = shapes.instances.iter().map(cut).collect();
+    Tracer::build(shapes, &cutout, &alpha_test(shapes, materials), threads)
+}
+
 fn alpha_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> AlphaTest {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
@@ -200,7 +247,7 @@ fn environment(described: Option<description::EnvironmentDescription>) -> Option
                 *texel = texel.map(|x| x * described.strength);
             }
             ImageEnvironment::new(width as usize, height as usize, texels, described.rotation_deg.to_radians())
-                .map(Environment::Image)
+                .map(|image| Environment::Image(Arc::new(image)))
         }
     }
 }

@@ -29,6 +29,8 @@ pub struct Description {
     pub guessed_units: Option<GuessedUnits>,
     /// Light from infinity.
     pub environment: Option<EnvironmentDescription>,
+    /// The file's writer leaves light from infinity out, and nothing in the file says that there is none.
+    pub world_unsaid: bool,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
     /// Whatever was ignored or approximated, one sentence each: `material "glass": ...`.

@@ -13,7 +13,7 @@ pub use view::{MAX_SIZE, View};
 
 use crate::error::Result;
 use crate::geometry::Shapes;
-use crate::light::{Emitter, Lights};
+use crate::light::{Emitter, Environment, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::DVec3;
 use crate::trace::Tracer;
@@ -43,6 +43,8 @@ pub struct Scene {
     pub light_names: Vec<String>,
     /// In what units the numbers of punctual lights were taken, where that is a guess.
     pub guessed_units: Option<GuessedUnits>,
+    /// Light from infinity may be missing: the file's writer leaves it out, and nothing there says that there is none.
+    pub world_unsaid: bool,
     /// Cameras as described, in the file's order.
     pub cameras: Vec<CameraDescription>,
     /// The medium that fills the space.
@@ -62,6 +64,19 @@ impl Scene {
     /// Embree is missing, or out of memory.
     pub fn build(description: Description, threads: usize) -> Result<Scene> {
         build::build(description, threads)
+    }
+
+    /// The same shapes and lamps with other materials, in another medium and environment.
+    ///
+    /// # Errors
+    /// Embree is out of memory.
+    pub fn dressed(
+        &self,
+        materials: Materials,
+        medium: Option<MediumParameters>,
+        environment: Option<Environment>,
+    ) -> Result<Scene> {
+        build::dress(self, materials, medium, environment)
     }
 
     /// A light by name, for messages: `light "Sun"`, `object "Panel"` for the triangles of one that glows.

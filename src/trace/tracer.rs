@@ -52,7 +52,8 @@ pub type AlphaTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 /// through an instance's own tree, whose box overlaps its neighbours'.
 const MOST_COPIED: usize = 1 << 17;
 
-/// Geometry committed to Embree.
+/// Geometry committed to Embree; clones share it.
+#[derive(Clone)]
 pub struct Tracer {
     scene: embree::Scene,
 }

@@ -3,12 +3,14 @@
 use super::eye::Eye;
 use super::interior::Surroundings;
 use super::light::LightPass;
+use super::site::MediumVertex;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Guide;
 use crate::math::Vec3;
 use crate::photon::{Located, PhotonMap, same_surface};
 use crate::random::{Domain, Stream};
+use crate::scene::Scene;
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -20,9 +22,9 @@ const CHUNK: usize = 256;
 /// Mean numbers of vertices of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lengths {
-    /// Of an eye path that goes on whatever the lobes.
+    /// Of an eye path that goes on whatever the lobes; on surfaces, as all that follow.
     pub eye: f64,
-    /// Of one that ends at broad lobes.
+    /// Of one that ends at broad lobes and goes straight through media.
     pub eye_to_broad: f64,
     /// Of a light path that goes on whatever the lobes.
     pub light: f64,
@@ -32,6 +34,15 @@ pub struct Lengths {
     pub eye_open: f64,
     /// The same of a light path.
     pub light_open: f64,
+    /// Vertices in media that scatter: of an eye path and of a light path that go on whatever the lobes, and of an eye path that ends at broad lobes and passes through media, looking
+    /// at points on its way.
+    pub eye_media: f64,
+    /// The same of a light path.
+    pub light_media: f64,
+    /// Points that an eye path which ends at broad lobes looks at on its straight way through media.
+    pub on_the_way: f64,
+    /// Share of the vertices on surfaces whose material has textures.
+    pub textured: f64,
     /// Vertices of light paths that one of the eye merges with, where there are as many light paths as pixels.
     pub merged: f64,
 }
@@ -57,32 +68,59 @@ impl Located for Open {
     }
 }
 
-/// Counts vertices, those up to the first with broad lobes, and lists those that are no perfect mirrors or clear glass.
-struct Count {
+/// Counts vertices, those up to the first with broad lobes, and lists those that are no perfect mirrors or clear glass. `THROUGH`: goes straight through media.
+struct Count<'a, const THROUGH: bool> {
+    scene: &'a Scene,
     all: u32,
     to_broad: u32,
+    media: u32,
+    media_to_broad: u32,
+    textured: u32,
     open: Vec<Open>,
     narrow: bool,
     /// Length of the path up to the first of the listed ones.
     length: f32,
 }
 
-impl Count {
-    fn new() -> Count {
-        Count { all: 0, to_broad: 0, open: Vec::new(), narrow: true, length: 0.0 }
+impl<const THROUGH: bool> Count<'_, THROUGH> {
+    fn new(scene: &Scene) -> Count<'_, THROUGH> {
+        let open = Vec::new();
+        Count { scene, all: 0, to_broad: 0, media: 0, media_to_broad: 0, textured: 0, open, narrow: true, length: 0.0 }
     }
 
-    /// Vertices, those up to the first with broad lobes, and those that are listed.
-    fn counts(&self) -> [f64; 3] {
-        [f64::from(self.all), f64::from(self.to_broad), self.open.len() as f64]
+    /// Vertices, those up to the first with broad lobes, those that are listed, those in media and those of them up to the first with broad lobes, and those with textures.
+    fn counts(&self) -> [f64; 6] {
+        [self.all, self.to_broad, self.open.len() as u32, self.media, self.media_to_broad, self.textured].map(f64::from)
+    }
+
+    fn is_textured(&self, material: u32) -> bool {
+        self.scene.materials.list[material as usize].textures().next().is_some()
+    }
+
+    fn passed(&mut self) {
+        self.media += 1;
+        self.media_to_broad += u32::from(self.narrow);
     }
 }
 
-impl<'a> Visitor<'a> for Count {
+impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
+    const SPLITS: bool = THROUGH;
+
+    fn medium(&mut self, _: &MediumVertex, _: Option<Scattered>) -> Next {
+        self.passed();
+        self.narrow &= THROUGH;
+        Next::Continue(LobeSet::ALL)
+    }
+
+    fn lit(&mut self, _: &MediumVertex, _: Option<Scattered>) {
+        self.passed();
+    }
+
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         self.narrow &= scattered.is_none_or(|s| !s.lobe.has(LobeSet::BROAD));
         self.all += 1;
         self.to_broad += u32::from(self.narrow);
+        self.textured += u32::from(self.is_textured(vertex.surface.material));
         if self.open.is_empty() {
             self.length += vertex.distance;
         }
@@ -107,29 +145,38 @@ impl Lengths {
         let pixels = u64::from(width) * u64::from(height);
         let lights = LightPass::new(seed, 0, Domain::GuideLight, PATHS, eye.max_depth).guided(guide);
         let from_light = |index: u32| {
-            let mut count = Count::new();
+            let mut count = Count::new(eye.scene);
             if let Some(emitted) = lights.emit(eye.scene, surroundings, index) {
                 let (start, stream) = (&emitted.start, emitted.stream);
                 walk(eye.scene, &Bump::new(), start, stream, Transport::Importance, eye.max_depth, &mut count);
             }
             count
         };
-        let from_eye = |index: u32| {
-            let mut count = Count::new();
+        let start = |index: u32| {
             let pixel = u64::from(index) * pixels / u64::from(PATHS);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
             let stream = Stream::new(seed, u64::MAX, Domain::GuideEye, u64::from(index));
-            let start = eye.start(at, stream);
+            (eye.start(at, stream), stream)
+        };
+        let from_eye = |index: u32| {
+            let (mut count, (start, stream)) = (Count::<false>::new(eye.scene), start(index));
             walk(eye.scene, &Bump::new(), &start, stream, Transport::Radiance, eye.max_depth, &mut count);
             count
         };
+        let through = |index: u32| {
+            let (mut count, (start, stream)) = (Count::<true>::new(eye.scene), start(index));
+            walk(eye.scene, &Bump::new(), &start, stream, Transport::Radiance, eye.max_depth, &mut count);
+            count.counts()
+        };
         let paths = || (0..PATHS).into_par_iter().with_min_len(CHUNK);
-        let light: Vec<Count> = paths().map(from_light).collect();
-        let eye: Vec<Count> = paths().map(from_eye).collect();
+        let light: Vec<Count<'_, false>> = paths().map(from_light).collect();
+        let through: Vec<[f64; 6]> =
+            if eye.scene.survey.scattering() { paths().map(through).collect() } else { Vec::new() };
+        let eye: Vec<Count<'_, false>> = paths().map(from_eye).collect();
         let map = PhotonMap::build(light.iter().flat_map(|count| &count.open).copied().collect());
         // As many as are there are found in an area that is larger by as much as these paths are fewer.
         let larger = pixels as f32 / PATHS as f32;
-        let merged = |count: &Count| {
+        let merged = |count: &Count<'_, false>| {
             let (mut merged, radius2) = (0u64, reach(count.length).powi(2) * larger);
             for open in &count.open {
                 map.within(open.p, radius2, |other, _| merged += u64::from(same_surface(other, open.ng)));
@@ -138,11 +185,29 @@ impl Lengths {
         };
         let merged: Vec<u64> = eye.par_iter().with_min_len(CHUNK).map(merged).collect();
         // Whole numbers: their sums do not depend on any order.
-        let mean =
-            |counts: &[Count], k: usize| counts.iter().map(|count| count.counts()[k]).sum::<f64>() / f64::from(PATHS);
-        let [[eye, eye_to_broad, eye_open], [light, light_to_broad, light_open]] =
-            [&eye, &light].map(|counts| [0, 1, 2].map(|k| mean(counts, k)));
+        let mean = |counts: &mut dyn Iterator<Item = [f64; 6]>| {
+            let sum = counts.fold([0.0; 6], |sum, counts| std::array::from_fn(|k| sum[k] + counts[k]));
+            sum.map(|sum| sum / f64::from(PATHS))
+        };
+        let [whole, light] = [&eye, &light].map(|counts| mean(&mut counts.iter().map(Count::counts)));
+        let straight = if through.is_empty() { whole } else { mean(&mut through.into_iter()) };
+        let [eye, _, eye_open, eye_media, _, eye_textured] = whole;
+        let [light, light_to_broad, light_open, light_media, _, light_textured] = light;
+        let [_, eye_to_broad, _, _, on_the_way, _] = straight;
+        let textured = (eye_textured + light_textured) / (eye + light).max(1.0);
         let merged = merged.iter().sum::<u64>() as f64 / f64::from(PATHS);
-        Lengths { eye, eye_to_broad, light, light_to_broad, eye_open, light_open, merged }
+        Lengths {
+            eye,
+            eye_to_broad,
+            light,
+            light_to_broad,
+            eye_open,
+            light_open,
+            eye_media,
+            light_media,
+            on_the_way,
+            textured,
+            merged,
+        }
     }
 }

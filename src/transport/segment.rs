@@ -105,6 +105,8 @@ impl Span {
 
 /// What media do to a ray.
 pub(super) trait Through {
+    /// There may be some.
+    const MEDIA: bool = true;
     /// On its way through `span`.
     fn pass(&mut self, span: &Span) -> Passage;
 }
@@ -124,6 +126,18 @@ impl Through for Attenuate {
     #[inline]
     fn pass(&mut self, span: &Span) -> Passage {
         Passage::Left(span.medium.transmittance(span.distance))
+    }
+}
+
+/// There are none.
+pub(super) struct Clear;
+
+impl Through for Clear {
+    const MEDIA: bool = false;
+
+    #[inline]
+    fn pass(&mut self, _: &Span) -> Passage {
+        Passage::Left(Rgb::ONE)
     }
 }
 
@@ -189,14 +203,14 @@ pub fn next_surface(
 
 /// Follows a ray from inside `interior` to the next surface that scatters, `through` whatever media.
 #[inline(always)]
-pub(super) fn next_vertex(
+pub(super) fn next_vertex<T: Through>(
     scene: &Scene,
     origin: Vec3,
     direction: Vec3,
     interior: Interior,
     token: u32,
     known: &Known,
-    through: &mut impl Through,
+    through: &mut T,
 ) -> End {
     let mut ray = Ray { origin, direction, tmax: f32::INFINITY, token };
     let mut interior = interior;
@@ -209,7 +223,7 @@ pub(super) fn next_vertex(
             _ => scene.tracer.intersect(&ray),
         };
         let (origin, before, left) = (ray.origin, distance, transmittance);
-        let medium = if scene.survey.media() { interior.medium(scene) } else { None };
+        let medium = if T::MEDIA && scene.survey.media() { interior.medium(scene) } else { None };
         let Some(hit) = met else {
             if let Some(medium) = medium {
                 let (distance, beyond) = (f32::INFINITY, None);

@@ -3,7 +3,7 @@
 
 use super::flight::{Fly, Split};
 use super::interior::Interior;
-use super::segment::{Arrival, Attenuate, End, Known, next_vertex, token};
+use super::segment::{Arrival, Attenuate, Clear, End, Known, next_vertex, token};
 use super::site::{MediumVertex, Site};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
@@ -161,19 +161,27 @@ pub fn walk<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    // Scenes without scattering media or dispersion walk as if there were none in the world.
+    // Scenes without media or dispersion walk as if there were none in the world.
     if scene.survey.dispersion() {
-        walk_aside::<V, true>(scene, arena, start, stream, transport, max_depth, visitor);
+        walk_aside::<V, DISPERSION>(scene, arena, start, stream, transport, max_depth, visitor);
     } else if scene.survey.scattering() {
-        walk_aside::<V, false>(scene, arena, start, stream, transport, max_depth, visitor);
+        walk_aside::<V, SCATTERING>(scene, arena, start, stream, transport, max_depth, visitor);
+    } else if scene.survey.media() {
+        walk_aside::<V, ABSORPTION>(scene, arena, start, stream, transport, max_depth, visitor);
     } else {
-        walk_in::<V, false, false>(scene, arena, start, stream, transport, max_depth, visitor);
+        walk_in::<V, NOTHING>(scene, arena, start, stream, transport, max_depth, visitor);
     }
 }
 
+/// What a scene has besides surfaces, each with all before it: nothing, media that absorb, media that scatter, solids that refract colours differently.
+const NOTHING: u8 = 0;
+const ABSORPTION: u8 = 1;
+const SCATTERING: u8 = 2;
+const DISPERSION: u8 = 3;
+
 /// Out of the way of the other, which is inlined.
 #[inline(never)]
-fn walk_aside<'a, V: Visitor<'a>, const DISPERSION: bool>(
+fn walk_aside<'a, V: Visitor<'a>, const BESIDES: u8>(
     scene: &'a Scene,
     arena: &'a Bump,
     start: &PathStart,
@@ -182,11 +190,11 @@ fn walk_aside<'a, V: Visitor<'a>, const DISPERSION: bool>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    walk_in::<V, true, DISPERSION>(scene, arena, start, stream, transport, max_depth, visitor);
+    walk_in::<V, BESIDES>(scene, arena, start, stream, transport, max_depth, visitor);
 }
 
 #[inline(always)]
-fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
+fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     scene: &'a Scene,
     arena: &'a Bump,
     start: &PathStart,
@@ -210,7 +218,9 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
         let token = token(scene, last, Purpose::Alpha);
         let met = std::mem::replace(&mut known, &Known::Unknown);
         let mut flight = Flight::FREE;
-        let end = if !MEDIA {
+        let end = if BESIDES < ABSORPTION {
+            next_vertex(scene, origin, direction, interior, token, met, &mut Clear)
+        } else if BESIDES < SCATTERING {
             next_vertex(scene, origin, direction, interior, token, met, &mut Attenuate)
         } else if V::SPLITS {
             let from = origin;
@@ -225,7 +235,9 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
             flight = fly.flight;
             end
         };
-        if MEDIA && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut scattered) {
+        if BESIDES >= SCATTERING
+            && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut scattered)
+        {
             scattered.pdf_w *= flight.forward;
         }
         let arrival = match end {
@@ -277,7 +289,7 @@ fn walk_in<'a, V: Visitor<'a>, const MEDIA: bool, const DISPERSION: bool>(
         };
         let Arrival { ref surface, mut eta, ref crossing, interior: here, transmittance, distance } = arrival;
         throughput *= transmittance;
-        if DISPERSION
+        if BESIDES >= DISPERSION
             && let Some(crossing) = crossing
             && crossing.disperses(scene)
         {

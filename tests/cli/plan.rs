@@ -116,6 +116,37 @@ fn classes_of_light_paths_are_left_out() {
     assert_eq!(asked.code, Some(2), "{}", asked.stderr);
 }
 
+/// The header of a render holds the plan that `plan` prints for the same options, with what a pilot has measured and all warnings; shards have the same.
+#[test]
+fn the_header_has_the_same_plan() {
+    let folder = Folder::new();
+    let options = "scene.glb --width 24 --height 24 --photons 1000 --levels 1 --no-combine --iterations 4000 --env 1,1,1 --seed 3 --effects +alpha";
+    let outcome = folder.run(&format!("plan {options} --json"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let plan = outcome.json();
+    let environment = plan["effects"].as_array().expect("a list").iter().find(|effect| effect["name"] == "environment");
+    for figure in ["energy", "seconds_per_iteration", "time", "error_if_off"] {
+        assert!(environment.is_some_and(|effect| effect[figure].is_number()), "{figure}: {environment:?}");
+    }
+    assert_eq!(plan["warnings"], json!(["--effects +alpha: nothing in the scene calls for it"]));
+    assert_eq!(folder.run(&format!("render {options} -o out.exr")).code, Some(0));
+    assert_eq!(folder.read("out.exr").1["plan"], plan);
+    // Shards decide alike.
+    let shards = ["0/2", "1/2"].map(|shard| folder.run(&format!("plan {options} --shard {shard} --json")).json());
+    assert_eq!(shards[0], shards[1]);
+}
+
+/// Options of a method are read as a render reads them.
+#[test]
+fn plans_take_the_options_of_renders() {
+    let folder = Folder::new();
+    let guided = folder.run("plan scene.glb --method sppm --indirect paths --guide on --knn 5 --json");
+    assert_eq!((guided.code, &guided.json()["method"]), (Some(0), &"sppm".into()), "{}", guided.stderr);
+    let contradiction = folder.run("plan scene.glb --method path --photons 5");
+    assert_eq!(contradiction.code, Some(2));
+    assert!(contradiction.stderr.contains("--photons has no effect with --method path"), "{}", contradiction.stderr);
+}
+
 /// A camera that is not there, and --strict.
 #[test]
 fn plans_fail_as_renders_do() {

@@ -158,6 +158,21 @@ fn environment_and_medium_of_the_scene() {
     );
 }
 
+/// Blender's exporter leaves the world out; ours says also that it is black.
+#[test]
+fn a_world_that_is_left_out() {
+    let mut file = Glb::new();
+    let told = |file: &Glb| (read(file).world_unsaid, read(file).environment.is_some());
+    assert_eq!(told(&file), (true, false));
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0, 0, 0]}}});
+    assert_eq!(told(&file), (false, false));
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0, 0.1, 0]}}});
+    assert_eq!(told(&file), (false, true));
+    let mut file = Glb::new();
+    file.json["asset"]["generator"] = "by hand".into();
+    assert_eq!(told(&file), (false, false));
+}
+
 /// OpenEXR and Radiance images, the first beside the scene file; what is negative or not finite is clamped and counted.
 #[test]
 fn environment_images() {

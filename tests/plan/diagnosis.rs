@@ -44,6 +44,20 @@ fn a_good_scene_is_passed_over() {
     silent(lit());
 }
 
+/// Lamps light the scene, but what shines from all around may have been left out by the program that wrote the file.
+#[test]
+fn an_environment_that_was_not_exported() {
+    let unsaid = |description: Description| Description { world_unsaid: true, ..description };
+    assert_eq!(
+        warning(unsaid(ball(glass(1.5)))),
+        "no environment: Blender's own exporter leaves the world out, so what it shines is missing; export with scripts/blender/export.py, \
+         or give it with --env (--env 0,0,0 if it is dark)"
+    );
+    let source = EnvironmentSource::Color(Rgb::ONE);
+    let environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+    silent(unsaid(Description { environment, ..lit() }));
+}
+
 #[test]
 fn thin_walls_that_were_meant_to_bend_light() {
     let thin = Material { thin: true, ..glass(1.5) };

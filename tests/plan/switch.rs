@@ -1,22 +1,27 @@
-//! A scene without an effect is rendered as the scene that never had it, to the last bit.
+//! A scene without an effect is rendered as the scene that never had it, to the last bit: whether it is left out of the description or of the scene.
 
 use super::floor;
 use crate::support::scenes::{add, build, glass, matte, point_light, quad, square};
+use caustique::camera::Camera;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::plan::{Effect, EffectSet, switch};
 use caustique::render::{Control, Settings, render};
-use caustique::scene::Description;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+use caustique::scene::{Description, Scene};
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 
 /// Its sums, pixel by pixel.
 fn picture(description: Description) -> String {
     let scene = build(description);
     let camera = scene.camera(&square(12)).expect("there is a camera");
+    picture_of(&scene, &camera)
+}
+
+fn picture_of(scene: &Scene, camera: &Camera) -> String {
     let settings = Settings { iterations: Some(2), photons: 500, ..Settings::default() };
-    let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-    let layers = rendered.layers(caustique::render::output::Present::of(&scene), |_| true).expect("there are layers");
+    let rendered = render(scene, camera, &settings, |_, _| Control::Continue);
+    let layers = rendered.layers(caustique::render::output::Present::of(scene), |_| true).expect("there are layers");
     layers
         .layers
         .iter()
@@ -39,6 +44,13 @@ fn scene(pane: Material) -> Description {
 fn check(effect: Effect, mut with: Description, without: Description, because: &str) {
     let plain = picture(without);
     assert!(picture(with.clone()) != plain, "{effect:?} makes no difference");
+    let scene = build(with.clone());
+    let camera = scene.camera(&square(12)).expect("there is a camera");
+    let left = match effect {
+        Effect::DepthOfField => picture_of(&scene, &camera.pinhole()),
+        _ => picture_of(&switch::without(&scene, effect).expect("it is built"), &camera),
+    };
+    assert!(left == plain, "{effect:?} left out of the scene");
     let removed = switch::off(&mut with, EffectSet::from_iter([effect]));
     assert!(picture(with) == plain, "{effect:?}");
     assert_eq!(removed.because(effect), [because]);

@@ -52,7 +52,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
     for run in &runs {
-        plan::check_media(&args.scene.path, run.args.method, run.args.indirect, &scene).map_err(|mut error| {
+        plan::check_media(&run.args, &scene).map_err(|mut error| {
             error.place = format!("--run \"{}\"", run.entry.name);
             error
         })?;

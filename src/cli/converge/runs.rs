@@ -1,7 +1,7 @@
 //! Runs from the words of the command line, read with the options of `caustique render`.
 
 use super::options::ConvergeArgs;
-use crate::cli::render::{Method, RenderArgs};
+use crate::cli::render::{Job, Method, RenderArgs};
 use crate::cli::usage;
 use caustique::error::{Error, Kind, Result};
 use caustique::render::Settings;
@@ -17,7 +17,7 @@ pub struct Run {
     /// What competes; its combiner is not known before its network is opened.
     pub entry: Entry,
     /// All options of a render with this method.
-    pub args: RenderArgs,
+    pub args: Job,
 }
 
 /// All runs that are asked for.
@@ -81,7 +81,7 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         ..render.settings()?
     };
     let entry = Entry { name: name.into(), options: options.into(), settings, combiner: None };
-    Ok(Run { entry, args: render })
+    Ok(Run { entry, args: render.job })
 }
 
 /// Errors: an option that is not about the method or the combiner of one run.

@@ -1,12 +1,14 @@
 //! `caustique render`: a scene in, an EXR and perhaps a PNG out.
 
+mod job;
 pub mod memory;
 mod options;
 pub mod plan;
 mod summary;
 mod techniques;
 
-pub use options::{Method, RenderArgs};
+pub use job::{Job, Method};
+pub use options::RenderArgs;
 
 use super::combine::{DEFAULT_MODEL, Named};
 use super::progress::Reporter;
@@ -46,11 +48,11 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
 fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Result<()> {
     let threads = rayon::current_num_threads();
-    let Loaded { scene, removed } = scene::read(&args.scene, threads)?;
-    scene::tell(&args.scene, &scene.warnings)?;
-    let camera = scene.camera(&args.view())?;
-    plan::check_media(&args.scene.path, args.method, args.indirect, &scene)?;
-    let settings = &args.sized(settings.clone(), camera.size());
+    let Loaded { scene, removed } = scene::read(&args.job.scene, threads)?;
+    scene::tell(&args.job.scene, &scene.warnings)?;
+    let camera = scene.camera(&args.job.view())?;
+    plan::check_media(&args.job, &scene)?;
+    let settings = &args.job.sized(settings.clone(), camera.size());
     let present = Present::of(&scene);
     self::selection(args, settings, present)?;
     // Before anything is tried, which takes time.
@@ -60,14 +62,14 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     interrupt.before_the_first_iteration(&args.output)?;
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
     memory::check(settings, camera.size(), channels(settings, present))?;
-    let mut plan = plan::plan(&plan::Wishes::of(args, choice.as_ref()), &scene, &camera, &removed);
-    let mut network = network(args, settings.levels.count)?;
+    let mut plan = plan::plan(&plan::Wishes::of(&args.job, choice.as_ref()), &scene, &camera, &removed);
+    let mut network = network(&args.job, settings.levels.count)?;
     let talk = args.progress.for_people();
     if let Some(choice) = choice.as_ref().filter(|_| talk) {
         say(&format!("method: {}", plan::why(choice)));
     }
     let mut reporter = Reporter::new(args.progress, settings);
-    plan::tell(&args.scene.path, &plan.warnings);
+    plan::tell(&args.job.scene.path, &plan.warnings);
     let mut rendered = caustique::render::render(&scene, &camera, settings, |progress, _| {
         reporter.report(progress);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
@@ -136,7 +138,9 @@ fn auto(
 ) -> Option<Choice> {
     let layers = |settings: &Settings| selection(args, settings, present).is_ok();
     let make = |way| args.allowed(way, camera.size()).filter(layers);
-    (args.method == Method::Auto).then(|| choose((scene, camera), args.free(), make, || interrupt.asked())).flatten()
+    (args.job.method == Method::Auto)
+        .then(|| choose((scene, camera), args.job.free(), make, || interrupt.asked()))
+        .flatten()
 }
 
 /// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
@@ -217,7 +221,7 @@ fn selection(args: &RenderArgs, settings: &Settings, present: Present) -> Result
 }
 
 /// The combiner, if it is to run.
-pub fn network(args: &RenderArgs, levels: usize) -> Result<Option<Named>> {
+pub fn network(args: &Job, levels: usize) -> Result<Option<Named>> {
     // A single level leaves nothing to combine.
     if args.no_combine || (levels == 1 && args.model.is_none()) {
         return Ok(None);

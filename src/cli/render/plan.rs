@@ -1,6 +1,6 @@
 //! The plan of a render: from the options to what the library plans, and its warnings told.
 
-use super::options::{Indirect, Method, RenderArgs};
+use super::job::{Indirect, Job, Method};
 use crate::cli::progress::percent;
 use crate::cli::say;
 use caustique::camera::Camera;
@@ -28,7 +28,7 @@ pub struct Wishes<'a> {
 
 impl<'a> Wishes<'a> {
     /// Those of a render.
-    pub fn of(args: &RenderArgs, choice: Option<&'a Choice>) -> Wishes<'a> {
+    pub fn of(args: &Job, choice: Option<&'a Choice>) -> Wishes<'a> {
         Wishes { method: args.method, choice, max_depth: args.max_depth, switches: args.scene.switches() }
     }
 }
@@ -44,7 +44,7 @@ pub fn plan(wishes: &Wishes, scene: &Scene, camera: &Camera, removed: &Removed) 
     for weight in wishes.choice.iter().flat_map(|choice| &choice.weights) {
         let effect = &mut plan.effects[weight.effect as usize];
         if effect.present {
-            (effect.energy, effect.error_if_off) = (Some(weight.energy), Some(weight.error_if_off));
+            (effect.energy, effect.error_if_off) = (weight.energy, weight.error_if_off);
             effect.seconds_per_iteration = weight.saved;
             let whole = wishes.choice.and_then(Choice::trial).map(|trial| trial.seconds_per_iteration);
             let simulated = effect.simulated;
@@ -77,18 +77,18 @@ pub fn why(choice: &Choice) -> String {
 ///
 /// # Errors
 /// Media scatter, and the method gathers photons on surfaces only, or photons of caustics alone.
-pub fn check_media(file: &Path, method: Method, indirect: Option<Indirect>, scene: &Scene) -> Result<()> {
-    let method = method.chosen();
+pub fn check_media(job: &Job, scene: &Scene) -> Result<()> {
+    let method = job.method.chosen();
     let (option, hint) = match method {
         _ if !scene.survey.scattering() => return Ok(()),
         render::Method::Pm | render::Method::Bpm => {
             (format!("--method {}", method.name()), "choose --method sppm, cppm, vcm, bdpt or path")
         }
-        _ if indirect == Some(Indirect::Paths) => ("--indirect paths".into(), "leave --indirect paths out"),
+        _ if job.indirect == Some(Indirect::Paths) => ("--indirect paths".into(), "leave --indirect paths out"),
         _ => return Ok(()),
     };
     let cause = format!("{option} does not render media that scatter light");
-    Err(Error::new(Kind::Usage, file.display(), cause).hint(hint))
+    Err(Error::new(Kind::Usage, job.scene.path.display(), cause).hint(hint))
 }
 
 /// Prints what the plan warns of.

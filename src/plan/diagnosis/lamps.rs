@@ -56,6 +56,14 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
     ))
 }
 
+/// Lamps alone, where the file's writer never says what shines from all around. A scene without any light is told when it is built.
+pub(super) fn no_environment(scene: &Scene, asked: &Asked) -> Option<String> {
+    let dark = scene.world_unsaid && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
+    (dark && !asked.switches.off.has(Effect::Environment)).then(|| {
+        "no environment: Blender's own exporter leaves the world out, so what it shines is missing; export with scripts/blender/export.py, or give it with --env (--env 0,0,0 if it is dark)".into()
+    })
+}
+
 /// A light, and the rays that leave it.
 struct Source {
     name: String,

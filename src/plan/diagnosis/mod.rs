@@ -16,6 +16,7 @@ pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<Str
     let mut warnings = glass::thin(scene);
     warnings.extend(glass::wide(scene));
     warnings.extend(lamps::units(scene));
+    warnings.extend(lamps::no_environment(scene, asked));
     if !scene.lights.is_empty() {
         warnings.extend(lamps::encased(scene, camera.position()));
         warnings.extend(lamps::behind_glass(scene, asked));

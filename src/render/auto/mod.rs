@@ -31,6 +31,7 @@ use crate::camera::Camera;
 use crate::scene::Scene;
 use crate::transport::Indirect;
 use pilot::Pilot;
+use weights::Weighed;
 
 /// Squared errors whose ratio is nearer to one cannot be told apart by a pilot.
 const APART: f64 = 0.75;
@@ -117,8 +118,8 @@ pub fn choose(
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let untried = make(Way::UNTRIED)?;
     let pilot = Pilot::new(scene, camera, &untried);
-    let mut weights = pilot.weigh();
-    let (trials, because) = pilot.try_all(!weights.is_empty(), free, &make, &stop);
+    let (weighed, weighing) = pilot.weigh();
+    let (trials, because) = pilot.try_all(weighing, free, &make, &stop);
     let expected: Vec<(Method, f64)> = trials.iter().map(|trial| (trial.way.method, trial.expected)).collect();
     let best = best(&expected);
     let preferred = best.is_some_and(|best| expected.iter().any(|other| other.1 < expected[best].1));
@@ -129,9 +130,8 @@ pub fn choose(
         trials[best].balance.apply(&mut settings);
     }
     let cost = best.map_or(pilot.cost, |best| trials[best].cost);
-    for weight in &mut weights {
-        weight.saved = weights::saved(&cost, (way, &settings), weight.effect, pilot.pixels);
-    }
+    let saving = |weighed: Weighed| weighed.saving([&cost, &pilot.cost], way, &settings, pilot.pixels);
+    let weights = weighed.into_iter().map(saving).collect();
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
     Some(Choice { settings, way, trials, chosen: best, weights, because, spent })

@@ -2,7 +2,7 @@
 
 use super::contest;
 use super::trial::{self, Plan, Running, Trial};
-use super::weights::{self, Weight};
+use super::weights::{self, Weighed};
 use super::{Free, Way};
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
@@ -103,27 +103,32 @@ impl<'a> Pilot<'a> {
         PIXELS.0.min(self.pixels)
     }
 
-    /// Core-seconds that weighing the effects takes.
-    fn weighing_cost(&self) -> f64 {
+    /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is too short, only those of light are weighed, or none.
+    pub fn weigh(&self) -> (Vec<Weighed>, f64) {
         let settings = weights::settings(self.untried, trial::PHOTONS.0);
-        (weights::PICTURES as u64 * contest::ITERATIONS.0) as f64 * self.cost.of(Way::UNTRIED, &settings, self.least())
-    }
-
-    /// What effects of light mean to the picture; nothing where the render is too short.
-    pub fn weigh(&self) -> Vec<Weight> {
-        if self.weighing_cost() > WEIGHING * SHARE * self.budget {
-            return Vec::new();
+        let once = self.cost.of(Way::UNTRIED, &settings, self.least()) * contest::ITERATIONS.0 as f64;
+        let most = WEIGHING * SHARE * self.budget;
+        let mut taken = weights::PICTURES as f64 * once;
+        if taken > most {
+            return (Vec::new(), 0.0);
         }
-        let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
         let presence = Presence::of(self.scene, self.camera);
-        let settings = weights::settings(self.untried, trial::PHOTONS.0);
-        weights::weigh(self.scene, &small, &settings, |effect| !presence.because(effect).is_empty())
+        let mut properties = weights::properties(&presence);
+        properties.retain(|effect| {
+            let more = once + weights::making(self.scene, *effect);
+            let affordable = taken + more <= most;
+            taken += if affordable { more } else { 0.0 };
+            affordable
+        });
+        let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
+        let count = |scene: &Scene, camera: &Camera| Cost::count(scene, camera, self.untried, None);
+        (weights::weigh(self.scene, &small, &settings, &presence, &properties, count), taken)
     }
 
-    /// Tries what there is, if the effects are weighed for what is left after that; returns the trials, or why there are none.
+    /// Tries what there is, with what weighing the effects has left of the pilot; returns the trials, or why there are none.
     pub fn try_all(
         &self,
-        weighs: bool,
+        weighing: f64,
         free: Free,
         make: &impl Fn(Way) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
@@ -133,7 +138,7 @@ impl<'a> Pilot<'a> {
         if ways.len() < 2 {
             return (Vec::new(), Some("the one way that these options leave"));
         }
-        let allowed = SHARE * budget - if weighs { self.weighing_cost() } else { 0.0 };
+        let allowed = SHARE * budget - weighing;
         let Some((small, photons)) = self.size(&ways, allowed) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };

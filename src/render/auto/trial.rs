@@ -104,7 +104,7 @@ pub(super) struct Plan {
 
 /// Share of the pixels that are left out of means, those of the largest variance: a bright sample in a hundred or so of pixels says next to nothing about how often
 /// there is one. For them stands the power law of those below ([`Tail`]), up to the worst pixels, which are nobody's measure.
-const WORST: f64 = 0.01;
+pub(super) const WORST: f64 = 0.01;
 const NOBODYS: f64 = 0.001;
 
 /// Sums over pixels of relative squares.

@@ -27,6 +27,12 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
+    /// Blender's exporter wrote it, perhaps with more from ours: lamps are in lumens, and the world is left out.
+    pub(super) fn is_by_blender(&self) -> bool {
+        let generator = self.raw["asset"]["generator"].as_str();
+        generator.is_some_and(|generator| generator.starts_with("Khronos glTF Blender I/O"))
+    }
+
     /// Parses a file and loads its buffers; other files are looked for in `folder`.
     pub(super) fn parse(bytes: &'a [u8], folder: &'a Path, warnings: &mut Vec<String>) -> Result<Document<'a>> {
         let (mut raw, binary) = container::split(bytes)?;

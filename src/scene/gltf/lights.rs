@@ -65,7 +65,7 @@ pub(super) fn divisor(
         (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => (EFFICACY, None),
         (LightUnits::Auto, None) => {
             let generator = document.raw["asset"]["generator"].as_str();
-            let photometric = generator.is_some_and(|g| g.starts_with("Khronos glTF Blender I/O"));
+            let photometric = document.is_by_blender();
             let from = generator.map_or("the file's generator".into(), |g| format!("generator \"{g}\""));
             if !photometric {
                 warnings.push(format!(

@@ -136,7 +136,10 @@ impl Reader<'_> {
     }
 
     fn environment(&mut self, place: &str) -> Result<()> {
-        let Some(said) = &self.scene.environment else { return Ok(()) };
+        let Some(said) = &self.scene.environment else {
+            self.out.world_unsaid = self.document.is_by_blender();
+            return Ok(());
+        };
         let strength = said.strength.unwrap_or(1.0);
         if !(strength.is_finite() && strength >= 0.0 && said.rotation_deg.is_finite()) {
             return Err(fault("environment", "strength and rotation_deg must be finite, strength not negative"));
@@ -146,6 +149,10 @@ impl Reader<'_> {
                 let color = Rgb::from_array(*color);
                 if !(color.is_finite() && color.min_element() >= 0.0) {
                     return Err(fault("environment", "its color must be finite and not negative"));
+                }
+                // Said to be dark.
+                if color == Rgb::ZERO {
+                    return Ok(());
                 }
                 EnvironmentSource::Color(color)
             }

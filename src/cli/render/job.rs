@@ -1,0 +1,488 @@
+//! What is rendered and how: the options that `caustique render` and `caustique plan` have in common.
+
+use crate::cli::number::{between, positive};
+use crate::cli::scene::SceneArgs;
+use caustique::error::{Error, Kind, Result};
+use caustique::estimator::InitialBandwidth;
+use caustique::estimator::bandwidth::SCREEN_CAP;
+use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
+use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
+use caustique::render::auto::{Free, Way};
+use caustique::render::{
+    self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
+};
+use caustique::scene::{MAX_SIZE, View};
+use caustique::transport::MAX_LEVELS;
+use clap::{ValueEnum, value_parser};
+use serde::Serialize;
+use std::ops::Bound::{Excluded, Included};
+use std::str::FromStr;
+
+/// A picture of a scene, the method, and when to stop.
+#[derive(clap::Args, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub struct Job {
+    /// How light is found
+    #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
+    pub method: Method,
+    /// Light paths sent from the lights, by ppm, sppm, appm and cppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
+    /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000; guided ones with --indirect paths: one a pixel, at most 100000]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
+    pub photons: Option<u32>,
+    /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a warning says
+    /// so [default: 1024]
+    #[arg(long, value_name = "MIB", value_parser = value_parser!(u32).range(1..), help_heading = "Method")]
+    pub photon_memory: Option<u32>,
+    /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
+    /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
+    #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
+    pub levels: Option<usize>,
+    /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
+    /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
+    #[arg(long, value_name = "knn|footprint|R", help_heading = "Method")]
+    pub initial_bandwidth: Option<BandwidthChoice>,
+    /// Photons within the largest bandwidth to begin with, 1 to 1024; with pm within every bandwidth [default: 20, with one level 10; pm: 100]
+    #[arg(long, value_name = "K", value_parser = value_parser!(u32).range(1..=1024), help_heading = "Method")]
+    pub knn: Option<u32>,
+    /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
+    /// shrinks [default: 2/3; bpm and vcm: 0.75]
+    #[arg(long, value_name = "A", value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Method")]
+    pub alpha: Option<f64>,
+    /// With cppm the cells in which photons are counted: annuli and sectors of each, at most 64 in all [default: 2,6]
+    #[arg(long, value_name = "NA,NS", help_heading = "Method")]
+    pub cppm_grid: Option<GridChoice>,
+    /// With cppm the factor of the squared bandwidth where nothing within it looks uniform, in (0, 1) [default: 0.8]
+    #[arg(long, value_name = "K", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
+    pub cppm_k: Option<f64>,
+    /// With cppm the growth, with every reduction, of the number of photons it takes for a test: 1 to 1000 [default: 1.2]
+    #[arg(long, value_name = "BETA", value_parser = between(Included(1.0), Included(1000.0)), help_heading = "Method")]
+    pub cppm_beta: Option<f64>,
+    /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
+    #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
+    pub cppm_significance: Option<f64>,
+    /// With cppm red, green and blue apart, with photons of equal flux: finds what differs in colour or brightness but not in the number of photons, such as
+    /// the picture of a projector; takes about three times as long
+    #[arg(long, help_heading = "Method")]
+    pub cppm_plus: bool,
+    /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found [default: memoryless; ppm: local]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub radius_rule: Option<RadiusRule>,
+    /// How sppm and appm weigh photons by their distance: 'box' alike within the bandwidth, 'epanechnikov' and 'gaussian' (cut off at three
+    /// standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and the local rule count photons and need box [default: box]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub kernel: Option<Kernel>,
+    /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
+    /// the same, its noise another. Not for path, pm and --cppm-plus [default: off; auto tries both]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub guide: Option<Switch>,
+    /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
+    /// [default: photons; auto tries both]
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub indirect: Option<Indirect>,
+    /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
+    pub max_depth: Option<u32>,
+    /// Seed: another number, other noise; the same number and options, the same picture to the last bit
+    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Method")]
+    pub seed: u64,
+
+    /// Stop after so many iterations [default: 64, if nothing else says when to stop]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "When to stop")]
+    pub iterations: Option<u64>,
+    /// Stop after so many seconds of rendering; the running iteration is finished
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
+    pub time: Option<f64>,
+    /// Stop when the estimated relative error (the root of relMSE) is this small; 0.05 is 5 %
+    #[arg(long, value_name = "E", value_parser = positive, help_heading = "When to stop")]
+    pub target_error: Option<f64>,
+    /// Render only the iterations i with i mod N = I, for one of N machines
+    #[arg(long, value_name = "I/N", help_heading = "When to stop")]
+    pub shard: Option<ShardChoice>,
+
+    /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
+    #[arg(long, value_name = "W", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    pub width: Option<u32>,
+    /// Height in pixels; without a width the camera's aspect is kept
+    #[arg(long, value_name = "H", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    pub height: Option<u32>,
+    /// Camera by name [default: the scene's first]
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub scene: SceneArgs,
+
+    /// Leave the levels uncombined: the picture is the usual single-bandwidth image
+    #[arg(long, conflicts_with = "model", help_heading = "Combiner")]
+    pub no_combine: bool,
+    /// Network of the combiner: 'compact' comes with the program; or an ONNX file [default: compact]
+    #[arg(long, value_name = "compact|paper|FILE.onnx", help_heading = "Combiner")]
+    pub model: Option<String>,
+}
+
+/// Methods that exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Whichever a short pilot expects to be best; sppm where the render is too short for one
+    Auto,
+    /// Path tracing
+    Path,
+    /// Light tracing: what mirrors and clear glass show stays black
+    Light,
+    /// Bidirectional path tracing
+    Bdpt,
+    /// Classical photon mapping: one map, the nearest photons; tends to a blurred picture
+    Pm,
+    /// Progressive photon mapping: one fixed point per pixel, so edges are jagged
+    Ppm,
+    /// Stochastic progressive photon mapping
+    Sppm,
+    /// Adaptive progressive photon mapping: sppm whose bandwidths have the least estimated error
+    Appm,
+    /// Chi-squared progressive photon mapping: sppm whose bandwidths shrink only where the photons do not look uniform
+    Cppm,
+    /// Bidirectional photon mapping: merging alone
+    Bpm,
+    /// Vertex connection and merging
+    Vcm,
+}
+
+impl Method {
+    /// The method that renders.
+    pub fn chosen(self) -> render::Method {
+        match self {
+            Method::Auto | Method::Sppm => render::Method::Sppm,
+            Method::Path => render::Method::Path,
+            Method::Light => render::Method::Light,
+            Method::Bdpt => render::Method::Bdpt,
+            Method::Pm => render::Method::Pm,
+            Method::Ppm => render::Method::Ppm,
+            Method::Appm => render::Method::Appm,
+            Method::Cppm => render::Method::Cppm,
+            Method::Bpm => render::Method::Bpm,
+            Method::Vcm => render::Method::Vcm,
+        }
+    }
+}
+
+/// Who brings indirect light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Indirect {
+    /// Photons
+    Photons,
+    /// Eye paths, which go on; photons bring caustics alone
+    Paths,
+}
+
+impl From<Indirect> for caustique::transport::Indirect {
+    fn from(indirect: Indirect) -> Self {
+        match indirect {
+            Indirect::Photons => caustique::transport::Indirect::Photons,
+            Indirect::Paths => caustique::transport::Indirect::Paths,
+        }
+    }
+}
+
+/// On or off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Switch {
+    /// On
+    On,
+    /// Off
+    Off,
+}
+
+/// Rules by which bandwidths shrink.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RadiusRule {
+    /// By the iteration's number alone
+    Memoryless,
+    /// By the photons found
+    Local,
+}
+
+/// Kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// Alike within the bandwidth
+    Box,
+    /// Falling with the squared distance
+    Epanechnikov,
+    /// A normal distribution cut off at three standard deviations
+    Gaussian,
+}
+
+/// `--initial-bandwidth`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BandwidthChoice {
+    /// By neighbours.
+    Knn,
+    /// By pixels.
+    Footprint,
+    /// Scene units.
+    #[serde(untagged)]
+    Length(f64),
+}
+
+impl FromStr for BandwidthChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "knn" => Ok(BandwidthChoice::Knn),
+            "footprint" => Ok(BandwidthChoice::Footprint),
+            length => match length.parse::<f64>() {
+                Ok(r) if (1e-9..=1e9).contains(&r) => Ok(BandwidthChoice::Length(r)),
+                Ok(_) => Err("a length must be from 1e-9 to 1e9".into()),
+                Err(_) => Err("it is neither 'knn' nor 'footprint' nor a length".into()),
+            },
+        }
+    }
+}
+
+/// `--cppm-grid NA,NS`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct GridChoice {
+    /// Annuli.
+    pub annuli: usize,
+    /// Sectors of each.
+    pub sectors: usize,
+}
+
+impl FromStr for GridChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once(',').and_then(|(a, s)| Some((a.parse().ok()?, s.parse().ok()?)));
+        let cells =
+            |annuli: usize, sectors: usize| annuli.checked_mul(sectors).filter(|cells| (2..=64).contains(cells));
+        match parts {
+            Some((annuli, sectors)) if cells(annuli, sectors).is_some() => Ok(GridChoice { annuli, sectors }),
+            Some(_) => Err("there must be 2 to 64 cells".into()),
+            None => Err("it must be NA,NS, such as 2,6".into()),
+        }
+    }
+}
+
+/// `--shard I/N`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct ShardChoice {
+    /// Which one, from 0.
+    pub index: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+impl FromStr for ShardChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if index < count && count <= 1_000_000 => Ok(ShardChoice { index, count }),
+            Some((_, 0)) => Err("there is no shard of 0".into()),
+            Some((_, count)) if count <= 1_000_000 => Err(format!("shards of {count} are 0 to {}", count - 1)),
+            Some(_) => Err("there are at most 1000000 shards".into()),
+            None => Err("it must be I/N, such as 0/4".into()),
+        }
+    }
+}
+
+/// The helps of `--levels` and `--photon-memory` name these.
+const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 160);
+
+fn level_count(text: &str) -> std::result::Result<usize, String> {
+    let range = format!("it must be a whole number from 1 to {MAX_LEVELS}");
+    text.parse().ok().filter(|m| (1..=MAX_LEVELS).contains(m)).ok_or(range)
+}
+
+/// The error of an option that says nothing to a method; it does to another.
+pub(super) fn idle(option: &str, method: &str, other: &str) -> Error {
+    let cause = format!("{option} has no effect with --method {method}");
+    Error::new(Kind::Usage, "command line", cause).hint(format!("leave {option} out, or choose --method {other}"))
+}
+
+impl Job {
+    /// The picture asked for.
+    pub fn view(&self) -> View {
+        View { camera: self.camera.clone(), width: self.width, height: self.height }
+    }
+
+    /// Errors: options that say nothing to the method.
+    fn check_method(&self, method: render::Method, rule: render::RadiusRule) -> Result<()> {
+        use render::Method as M;
+        let local = rule == render::RadiusRule::Local;
+        let idle_rule = match self.radius_rule {
+            None => false,
+            Some(RadiusRule::Local) => !matches!(method, M::Ppm | M::Sppm),
+            Some(RadiusRule::Memoryless) => !matches!(method, M::Sppm | M::Bpm | M::Vcm),
+        };
+        let given = [
+            (self.photons.is_some() && !method.counts_photons(), "--photons"),
+            (self.photon_memory.is_some() && method != render::Method::Pm, "--photon-memory"),
+            (self.levels.is_some_and(|m| m > 1) && !method.has_levels(), "--levels"),
+            (self.knn.is_some() && !method.counts_photons(), "--knn"),
+            (self.initial_bandwidth.is_some() && !method.has_bandwidths(), "--initial-bandwidth"),
+            (
+                self.initial_bandwidth == Some(BandwidthChoice::Knn) && !method.counts_photons(),
+                "--initial-bandwidth knn",
+            ),
+            (self.alpha.is_some() && (!method.has_bandwidths() || matches!(method, M::Appm | M::Cppm)), "--alpha"),
+            (idle_rule, "--radius-rule"),
+            (self.cppm_grid.is_some() && method != render::Method::Cppm, "--cppm-grid"),
+            (self.cppm_k.is_some() && method != render::Method::Cppm, "--cppm-k"),
+            (self.cppm_beta.is_some() && method != render::Method::Cppm, "--cppm-beta"),
+            (self.cppm_significance.is_some() && method != render::Method::Cppm, "--cppm-significance"),
+            (self.cppm_plus && method != render::Method::Cppm, "--cppm-plus"),
+            (self.guide == Some(Switch::On) && (!method.guides() || self.cppm_plus), "--guide"),
+            (self.indirect == Some(Indirect::Paths) && (method != M::Sppm || local), "--indirect"),
+        ];
+        if self.kernel.is_some_and(|kernel| kernel != Kernel::Box) && (local || !matches!(method, M::Sppm | M::Appm)) {
+            let what = if local { "the local rule" } else { method.name() };
+            let error = Error::new(Kind::Usage, "command line", format!("{what} needs the box kernel"));
+            return Err(error.hint("leave --kernel out, or choose --method sppm with the memoryless rule, or appm"));
+        }
+        let Some((_, option)) = given.iter().find(|(idle, _)| *idle) else { return Ok(()) };
+        let plus = if self.cppm_plus { " --cppm-plus" } else { "" };
+        let other = match *option {
+            "--photon-memory" => "pm",
+            option if option.starts_with("--cppm") => "cppm",
+            _ => "sppm",
+        };
+        Err(idle(option, &format!("{}{plus}", method.name()), other))
+    }
+
+    /// The render asked for.
+    ///
+    /// # Errors
+    /// Options that contradict each other.
+    pub fn settings(&self) -> Result<Settings> {
+        self.settings_of(self.way())
+    }
+
+    /// The way to render that the options ask for; with auto that which needs no trial.
+    pub fn way(&self) -> Way {
+        let indirect = self.indirect.map_or(Way::UNTRIED.indirect, Into::into);
+        Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
+    }
+
+    /// What is left to auto: nothing where levels are combined, for the network has learnt on the usual light paths and neighbours.
+    pub fn free(&self) -> Free {
+        let combines = self.combines();
+        Free {
+            photons: self.photons.is_none() && !combines,
+            neighbours: self.knn.is_none() && self.initial_bandwidth.is_none() && !combines,
+        }
+    }
+
+    /// Whether several levels are to be combined.
+    fn combines(&self) -> bool {
+        self.settings().is_ok_and(|settings| settings.levels.count > 1) && !self.no_combine
+    }
+
+    /// The settings for a picture of that size: what the number of light paths follows from where none is asked for.
+    pub fn sized(&self, settings: Settings, size: (u32, u32)) -> Settings {
+        Settings { photons: self.photons.unwrap_or(settings.usual_photons(size)), ..settings }
+    }
+
+    /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out. Where auto balances light paths it starts from the usual number.
+    pub fn allowed(&self, way: Way, size: (u32, u32)) -> Option<Settings> {
+        let guide = match self.guide {
+            None => true,
+            Some(Switch::On) => way.guided || !way.method.guides(),
+            Some(Switch::Off) => !way.guided,
+        };
+        let indirect = self.indirect.is_none_or(|asked| !way.method.gathers() || way.indirect == asked.into());
+        let usual = self.settings().ok()?.levels;
+        self.settings_of(way)
+            .ok()
+            .filter(|settings| guide && indirect && (!self.combines() || settings.levels == usual))
+            .map(|settings| if self.free().photons { settings } else { self.sized(settings, size) })
+    }
+
+    fn settings_of(&self, way: Way) -> Result<Settings> {
+        let method = way.method;
+        let radius_rule = match (self.radius_rule, method) {
+            (Some(RadiusRule::Local), _) | (None, render::Method::Ppm) => render::RadiusRule::Local,
+            _ => render::RadiusRule::Memoryless,
+        };
+        self.check_method(method, radius_rule)?;
+        if method == render::Method::Pm && self.knn == Some(1) {
+            // The k-th photon is on the rim: with one neighbour there would be none inside.
+            let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
+            return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
+        }
+        let chi_squared = ChiSquaredSettings::default();
+        let chi_squared = ChiSquaredSettings {
+            annuli: self.cppm_grid.map_or(chi_squared.annuli, |grid| grid.annuli),
+            sectors: self.cppm_grid.map_or(chi_squared.sectors, |grid| grid.sectors),
+            k: self.cppm_k.unwrap_or(chi_squared.k),
+            beta: self.cppm_beta.unwrap_or(chi_squared.beta),
+            significance: self.cppm_significance.unwrap_or(chi_squared.significance),
+            plus: self.cppm_plus,
+        };
+        let levels = Levels::new(self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 }));
+        let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
+        let initial = match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
+            (BandwidthChoice::Knn, k) => {
+                InitialBandwidth::Nearest(k.map_or(method.neighbours(levels.count), |k| k as usize))
+            }
+            (_, Some(_)) => {
+                let error =
+                    Error::new(Kind::Usage, "command line", "--knn has no effect with this --initial-bandwidth");
+                return Err(error.hint("leave one of the two out"));
+            }
+            (BandwidthChoice::Footprint, None) => InitialBandwidth::Footprint,
+            (BandwidthChoice::Length(r), None) => InitialBandwidth::Fixed(r as f32),
+        };
+        let limited = self.time.is_some() || self.target_error.is_some();
+        let iterations = self.iterations.or((!limited).then_some(DEFAULT_ITERATIONS));
+        let shard = self.shard.map_or(Shard { index: 0, count: 1 }, |s| Shard { index: s.index, count: s.count });
+        if let Some(n) = iterations.filter(|n| shard.index >= *n) {
+            let cause = format!("shard {} of {} holds none of {n} iterations", shard.index, shard.count);
+            return Err(Error::new(Kind::Usage, "command line", cause).hint("use fewer shards or more --iterations"));
+        }
+        let settings = render::Settings {
+            method,
+            seed: self.seed,
+            photons: self.photons.unwrap_or(method.photons()),
+            photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
+            levels,
+            techniques: false,
+            initial,
+            widest: [SCREEN_CAP; 2],
+            alpha: self.alpha.unwrap_or(method.alpha()),
+            volume_alpha: self.alpha.unwrap_or(VOLUME_ALPHA),
+            radius_rule,
+            kernel: match self.kernel {
+                None | Some(Kernel::Box) => KernelChoice::Box,
+                Some(Kernel::Epanechnikov) => KernelChoice::Epanechnikov,
+                Some(Kernel::Gaussian) => KernelChoice::Gaussian,
+            },
+            chi_squared,
+            max_depth: self.max_depth.unwrap_or(u32::MAX),
+            iterations,
+            time: self.time,
+            target_error: self.target_error,
+            shard,
+            decided: render::Spent::default(),
+            guided: way.guided,
+            indirect: way.indirect,
+            classes: self.scene.switches().classes(),
+        };
+        if self.shard.is_some() && !settings.is_memoryless() {
+            let rule = if method == render::Method::Sppm { " with local statistics" } else { "" };
+            let cause = format!(
+                "--shard cannot divide --method {}{rule}: its bandwidths depend on all iterations before",
+                method.name()
+            );
+            return Err(Error::new(Kind::Usage, "command line", cause)
+                .hint("choose --method sppm with the memoryless rule, or render on one machine"));
+        }
+        Ok(settings)
+    }
+}
