@@ -113,6 +113,16 @@ pub enum Bsdf<'a> {
     Layered(Layered<'a>),
 }
 
+/// Lambert's BSDF and density over `set`, from the cosines of both directions with the normal on the side that the surface is seen from.
+#[inline(always)]
+fn lambert(color: Rgb, seen: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
+    if seen > 0.0 && lit > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
+        (color * FRAC_1_PI, lit * FRAC_1_PI)
+    } else {
+        (Rgb::ZERO, 0.0)
+    }
+}
+
 impl<'a> Bsdf<'a> {
     /// The BSDF of `parameters`, whose interface is `interface`.
     pub fn new(parameters: &Parameters, interface: &'a Interface) -> Bsdf<'a> {
@@ -162,20 +172,16 @@ impl<'a> Bsdf<'a> {
     /// `f_radiance(o, i) = f_importance(i, o) = f_importance(o, i) n_o^2 / n_i^2`.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
-        self.evaluate_seen(&self.seen(wo), wi, transport, set)
+        match self {
+            Bsdf::Matte(color) => lambert(*color, wo.z.abs(), if wo.z < 0.0 { -wi.z } else { wi.z }, set),
+            Bsdf::Layered(layered) => layered.evaluate(&layered.seen(wo), wi, transport, set),
+        }
     }
 
     #[inline]
     fn evaluate_seen(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         match self {
-            Bsdf::Matte(color) => {
-                let above = if seen.side == 1 { -wi.z } else { wi.z };
-                if seen.o.z > 0.0 && above > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
-                    (*color * FRAC_1_PI, above * FRAC_1_PI)
-                } else {
-                    (Rgb::ZERO, 0.0)
-                }
-            }
+            Bsdf::Matte(color) => lambert(*color, seen.o.z, if seen.side == 1 { -wi.z } else { wi.z }, set),
             Bsdf::Layered(layered) => layered.evaluate(seen, wi, transport, set),
         }
     }
