@@ -21,8 +21,8 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, MisState, Ratios};
 use caustique::transport::{
-    Bidirectional, Eye, Indirect, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next, PathStart,
-    Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
+    Bidirectional, Eye, EyeMeasure, Indirect, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next,
+    PathStart, Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -462,7 +462,8 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
         let meets = Meets { vertices: &vertices, photons: Some(&map), levels: &levels };
-        shared.eye_path(&arena, &(shared.eye.start(pixel, stream), stream), &meets, &mut by_eye);
+        let mut measure = EyeMeasure::default();
+        shared.eye_path(&arena, &(shared.eye.start(pixel, stream), stream), &meets, &mut by_eye, &mut measure);
 
         let start = eye.start(pixel, stream);
         let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);

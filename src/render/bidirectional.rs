@@ -214,7 +214,7 @@ impl<'a> Passes<'a> {
                             let levels = levels(bandwidths[index as usize].bandwidths[0], pair);
                             let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                             watch.begin(place.at, own);
-                            measures[place.at] = shared.eye_path(&arena, start, &meets, watch);
+                            shared.eye_path(&arena, start, &meets, watch, &mut measures[place.at]);
                         }
                     }
                     (left.splats, left.photons)
@@ -250,7 +250,7 @@ impl<'a> Passes<'a> {
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     arena.reset();
                     watch.begin(place.at, Some(0));
-                    measures[place.at] = path_measure(&eye, &arena, start, watch);
+                    path_measure(&eye, &arena, start, watch, &mut measures[place.at]);
                 }
             }
         });

@@ -37,7 +37,7 @@ struct EyeWalk<'a, R> {
     last: Receiver,
     /// Its depth.
     depth: u32,
-    measure: EyeMeasure,
+    measure: &'a mut EyeMeasure,
     record: &'a mut R,
 }
 
@@ -84,7 +84,7 @@ impl<R: Record> EyeWalk<'_, R> {
         for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
             self.record.arrival(technique, level, value, ratios.weight(eta));
         }
-        add(&mut self.measure, self.meets.levels, class, value, ratios);
+        add(self.measure, self.meets.levels, class, value, ratios);
     }
 
     /// The path has run into a light that sends it `value`.
@@ -203,7 +203,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, .. } = self.shared;
-        look(&mut self.trail, vertex, scattered, &mut self.measure);
+        look(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos).fly(vertex.flight);
@@ -218,7 +218,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
                 self.connect_all(vertex);
             }
             if let (true, Some(photons)) = (strategies.eye_merges(vertex.depth), self.meets.photons) {
-                let measure = &mut self.measure;
+                let measure = &mut *self.measure;
                 let longest = eye.max_depth - vertex.depth;
                 let add = |class: PathClass, level: usize, radiance: Rgb| {
                     *match class.part() {
@@ -251,7 +251,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let Bidirectional { eye, strategies, .. } = self.shared;
-        look_in_medium(&mut self.trail, vertex, scattered, &mut self.measure);
+        look_in_medium(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         self.mis = self.mis.arrive(vertex.met.distance * vertex.met.distance, 1.0).fly(vertex.flight);
         if strategies.connect && vertex.depth < eye.max_depth {
@@ -288,7 +288,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
 }
 
 impl Bidirectional<'_> {
-    /// Walks an eye path and measures all levels.
+    /// Walks an eye path and measures all levels, into `measure` in place of what was there.
     #[inline]
     pub fn eye_path<R: Record>(
         &self,
@@ -296,7 +296,9 @@ impl Bidirectional<'_> {
         (start, stream): &(PathStart, Stream),
         meets: &Meets<'_>,
         record: &mut R,
-    ) -> EyeMeasure {
+        measure: &mut EyeMeasure,
+    ) {
+        *measure = EyeMeasure::default();
         let eye = &self.eye;
         let pdf_w = eye.camera.pdf_w(start.direction) * self.pixels();
         let mut visitor = EyeWalk {
@@ -306,10 +308,9 @@ impl Bidirectional<'_> {
             trail: Trail::START,
             last: Receiver::anywhere(start.origin),
             depth: 0,
-            measure: EyeMeasure::default(),
+            measure,
             record,
         };
         walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut visitor);
-        visitor.measure
     }
 }

@@ -23,7 +23,7 @@ struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
     classes: ClassSet,
-    measure: EyeMeasure,
+    measure: &'a mut EyeMeasure,
     trail: Trail,
     last: Receiver,
     /// Depth of the last vertex.
@@ -75,7 +75,7 @@ impl<R: Record> PathTracer<'_, R> {
         if weight > 0.0 {
             self.record.arrival(technique, 0, light / weight, weight);
         }
-        let measure = &mut self.measure;
+        let measure = &mut *self.measure;
         *match class.part() {
             Part::Emission => &mut measure.emission,
             Part::Direct => &mut measure.direct,
@@ -93,7 +93,7 @@ impl<R: Record> PathTracer<'_, R> {
 
 impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
-        look(&mut self.trail, vertex, scattered, &mut self.measure);
+        look(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface) {
@@ -108,7 +108,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        look_in_medium(&mut self.trail, vertex, scattered, &mut self.measure);
+        look_in_medium(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         self.last = vertex.receiver();
         self.lit(vertex);
@@ -130,22 +130,25 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     }
 }
 
-/// What one path measures, on one level.
+/// What one path measures, on one level, into `measure` in place of what was there.
 pub fn path_measure(
     eye: &Eye<'_>,
     arena: &Bump,
     (start, stream): &(PathStart, Stream),
     record: &mut impl Record,
-) -> EyeMeasure {
-    let (measure, trail) = (EyeMeasure::default(), Trail::START);
+    measure: &mut EyeMeasure,
+) {
+    *measure = EyeMeasure::default();
+    let trail = Trail::START;
     let Eye { scene, max_depth, classes, .. } = *eye;
     let last = Receiver::anywhere(start.origin);
     let mut tracer = PathTracer { scene, max_depth, classes, measure, trail, last, depth: 0, record };
     walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut tracer);
-    tracer.measure
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    path_measure(eye, &Bump::new(), &(eye.start(pixel, stream), stream), &mut ()).radiance(0)
+    let mut measure = EyeMeasure::default();
+    path_measure(eye, &Bump::new(), &(eye.start(pixel, stream), stream), &mut (), &mut measure);
+    measure.radiance(0)
 }
