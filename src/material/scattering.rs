@@ -6,10 +6,11 @@ use crate::bsdf::{Bsdf, Coverings, EnergyTables, Interface, Parameters, Shading}
 use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use bumpalo::Bump;
+use std::sync::Arc;
 
 /// Energy compensation tables, and what of all materials no texture changes.
 pub struct Scattering {
-    tables: EnergyTables,
+    tables: Arc<EnergyTables>,
     of_materials: Vec<Ready>,
 }
 
@@ -49,7 +50,16 @@ impl EnergyTables {
 impl Scattering {
     /// For a scene with these materials.
     pub fn new(materials: &[Material]) -> Scattering {
-        let tables = EnergyTables::for_materials(materials);
+        Scattering::with(Arc::new(EnergyTables::for_materials(materials)), materials)
+    }
+
+    /// For the scene with other materials, which have no indices of refraction and no coverings that the first ones lack: the tables, which take
+    /// a tenth of a second for each index, are shared.
+    pub fn again(&self, materials: &[Material]) -> Scattering {
+        Scattering::with(Arc::clone(&self.tables), materials)
+    }
+
+    fn with(tables: Arc<EnergyTables>, materials: &[Material]) -> Scattering {
         let around = around(materials);
         // Anywhere: no texture is looked at.
         let surface = Surface {

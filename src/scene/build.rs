@@ -142,7 +142,7 @@ pub(super) fn dress(
         world_unsaid: scene.world_unsaid,
         cameras: scene.cameras.clone(),
         medium,
-        scattering: Scattering::new(&materials.list),
+        scattering: scene.scattering.again(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
         warnings: Vec::new(),
         shapes,

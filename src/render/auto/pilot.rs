@@ -20,6 +20,8 @@ use crate::transport::Indirect;
 const SHARE: f64 = 0.05;
 /// Share of that which may go to weighing the effects.
 const WEIGHING: f64 = 0.2;
+/// Share of the render's cost that the least of all pilots may take: in a render that short a wrong way costs more.
+const LEAST_SHARE: f64 = 0.1;
 /// Pixels of the pilot's picture.
 const PIXELS: (f64, f64) = (768.0, 4096.0);
 /// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of it. One core takes twice
@@ -139,7 +141,7 @@ impl<'a> Pilot<'a> {
             return (Vec::new(), Some("the one way that these options leave"));
         }
         let allowed = SHARE * budget - weighing;
-        let Some((small, photons)) = self.size(&ways, allowed) else {
+        let Some((small, photons)) = self.size(&ways, allowed, LEAST_SHARE * budget - weighing) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
         let (width, height) = small.size();
@@ -159,9 +161,9 @@ impl<'a> Pilot<'a> {
         (contest::hold(&mut running, &plan, allowed, stop), None)
     }
 
-    /// The picture that is tried and the share of the render's light paths, where a few iterations of all `ways` take half of what is allowed; `None` where that is
-    /// too little.
-    fn size(&self, ways: &[(Way, Settings)], allowed: f64) -> Option<(Camera, f64)> {
+    /// The picture that is tried and the share of the render's light paths, where a few iterations of all `ways` take half of what is allowed, or more where that is too
+    /// little; `None` where even the least picture takes more than `most`.
+    fn size(&self, ways: &[(Way, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
         let trial_cost = |pixels: f64, photons: f64| -> f64 {
             let each = |tried @ (way, settings): &(Way, Settings)| {
                 let once = self.cost.of(*way, &trial::settings(settings, photons), pixels);
@@ -170,14 +172,14 @@ impl<'a> Pilot<'a> {
             ways.iter().map(each).sum()
         };
         let (least, few) = (self.least(), trial::PHOTONS.0);
-        if trial_cost(least, few) > allowed {
+        if trial_cost(least, few) > most {
             return None;
         }
         // The cost grows linearly with pixels.
         let allowed = 0.5 * allowed;
         let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
-        let most = least + (allowed - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
-        let factor = (most.clamp(least, PIXELS.1.max(least)) / self.pixels).sqrt().min(1.0);
+        let pixels = least + (allowed - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
+        let factor = (pixels.clamp(least, PIXELS.1.max(least)) / self.pixels).sqrt().min(1.0);
         let small = self.camera.sparse(factor);
         let (width, height) = small.size();
         // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
