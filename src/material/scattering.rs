@@ -54,7 +54,7 @@ impl Scattering {
     }
 
     /// For the scene with other materials, which have no indices of refraction and no coverings that the first ones lack: the tables, which take
-    /// a tenth of a second for each index, are shared.
+    /// a thirtieth of a core-second for each pair of indices, are shared.
     pub fn again(&self, materials: &[Material]) -> Scattering {
         Scattering::with(Arc::clone(&self.tables), materials)
     }
