@@ -108,6 +108,21 @@ fn glossy_room() {
     }
 }
 
+/// A lamp behind glass, seen in varnished walls and sharp metal: found by eye paths that go on, which here are enough, and by photons.
+#[test]
+fn lamp_behind_glass_in_a_varnished_room() {
+    let varnish = Material { base_color: [0.5, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.35, ..Material::default() };
+    let mut description = room(varnish);
+    add(&mut description, "pane", cuboid(Vec3::new(-0.6, 1.8, -0.6), Vec3::new(0.6, 1.9, 0.6), false), glass(1.5));
+    let metal = Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness: 0.3, ..Material::default() };
+    add(&mut description, "metal", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
+    let scene = build(description);
+    let paths = by_paths(&scene, 256, 10);
+    for way in WAYS {
+        check(&format!("varnish, {way:?}"), &by_photons(&scene, way, 20_000, 0.06, 12, 10), &paths, 0.02, 0.2);
+    }
+}
+
 /// Smooth and rough glass under a large lamp, which path tracing can run into.
 #[test]
 fn glass_room() {

@@ -54,6 +54,15 @@ pub struct EmissionDensity {
     pub delta: bool,
 }
 
+impl EmissionDensity {
+    /// Density of the ray that leaves the light, per area that faces it and per solid angle: the same all along the ray, and behind mirrors and clear glass in
+    /// the same medium.
+    #[inline]
+    pub fn of_rays(&self) -> f32 {
+        self.start * self.onward / self.cos
+    }
+}
+
 /// The start of a light path.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {

@@ -17,18 +17,31 @@ const MAX_LEVELS: usize = 10;
 /// Bits per axis of the Morton code.
 const MORTON_BITS: u32 = 21;
 
-/// What kind of light path left a photon.
+/// What kind of light path left a photon: how hard to find its light is for eye paths, where all bounces so far were delta; nothing is known of others.
+///
+/// A byte: 1 if the light is a delta light, else twice the exponent of the density of emission, which so is known to a factor of two and no number is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct PhotonFlags(pub u8);
+pub struct PhotonFlags(u8);
 
 impl PhotonFlags {
-    /// The light is a delta light and every bounce was delta: no eye path that continues can find this light.
-    pub const UNREACHABLE: u8 = 1;
+    /// The light is a delta light: no eye path that continues can find it.
+    pub const UNREACHABLE: PhotonFlags = PhotonFlags(1);
+    /// What is added to exponents, and the least and the largest that there are.
+    const BIAS: i32 = 64;
+    const EXPONENTS: (i32, i32) = (-63, 63);
 
-    /// Whether all bits of `mask` are set.
+    /// The light has a size and is emitted with this density ([`crate::light::EmissionDensity::of_rays`]).
     #[inline]
-    pub fn has(self, mask: u8) -> bool {
-        self.0 & mask == mask
+    pub fn straight(density: f32) -> PhotonFlags {
+        let exponent = (density.to_bits() >> 23 & 0xff) as i32 - 127;
+        let (least, largest) = Self::EXPONENTS;
+        PhotonFlags(((exponent.clamp(least, largest) + Self::BIAS) << 1) as u8)
+    }
+
+    /// That density, rounded down to a power of two; 0 where there is none.
+    #[inline]
+    pub fn density(self) -> f32 {
+        if self.0 < 2 { 0.0 } else { f32::from_bits(((i32::from(self.0 >> 1) - Self::BIAS + 127) as u32) << 23) }
     }
 }
 
@@ -107,6 +120,7 @@ impl Located for Photon {
 /// Photons of one pass, ready for range queries.
 pub struct PhotonMap<P = Photon> {
     photons: Vec<P>,
+    paths: u32,
     leaves: Vec<Leaf>,
     quantiser: Quantiser,
     /// `levels[0]` is the root's level (one node); the last level's children are leaves.
@@ -206,7 +220,19 @@ impl<P: Located> PhotonMap<P> {
         }
         levels.reverse();
         debug_assert!(levels.len() <= MAX_LEVELS);
-        PhotonMap { photons, leaves, quantiser, levels }
+        PhotonMap { photons, paths: 0, leaves, quantiser, levels }
+    }
+
+    /// The same, of so many light paths that estimates can tell how many photons to expect.
+    #[must_use]
+    pub fn of_paths(self, paths: u32) -> PhotonMap<P> {
+        PhotonMap { paths, ..self }
+    }
+
+    /// Light paths that have left the photons; 0 where that is not told.
+    #[inline]
+    pub fn paths(&self) -> u32 {
+        self.paths
     }
 
     /// The photons, in Morton order.

@@ -172,7 +172,7 @@ mod tests {
                     wi: Vec3::Y,
                     ng,
                     flux: Vec3::splat(i as f32),
-                    flags: PhotonFlags(0),
+                    flags: PhotonFlags::default(),
                     depth: 2,
                     band: Band::WHITE,
                     mark: Mark::default(),

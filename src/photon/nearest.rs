@@ -102,7 +102,7 @@ mod tests {
                     wi: Vec3::Z,
                     ng: if i % 3 == 0 { Vec3::NEG_Z } else { Vec3::Z },
                     flux: Vec3::ONE,
-                    flags: PhotonFlags(0),
+                    flags: PhotonFlags::default(),
                     depth: 2,
                     band: Band::WHITE,
                     mark: Mark::default(),

@@ -99,7 +99,7 @@ impl Plan {
                 present,
                 simulated,
                 because,
-                by: simulated.then(|| asked.search.carrier(effect, scene.survey.scattering())),
+                by: simulated.then(|| asked.search.carrier(effect, scene)),
                 energy: None,
                 seconds_per_iteration: None,
                 time: None,

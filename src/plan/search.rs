@@ -2,6 +2,7 @@
 
 use super::class::{ClassSet, PathClass};
 use super::effect::Effect;
+use crate::scene::Scene;
 
 /// Kinds of methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +30,7 @@ pub enum Search {
 pub enum Owner {
     /// Eye paths that run into lights.
     Hits,
-    /// Connections to lights, and eye paths that run into them.
+    /// Connections to lights, and eye paths that run into them; where these come from a sharp lobe by mirrors and clear glass, photons of caustics as well.
     Lit,
     /// Photons, gathered or merged.
     Photons,
@@ -78,13 +79,16 @@ impl Search {
     }
 
     /// What brings an effect into the picture.
-    pub(super) fn carrier(self, effect: Effect, media_scatter: bool) -> &'static str {
+    pub(super) fn carrier(self, effect: Effect, scene: &Scene) -> &'static str {
+        let media_scatter = scene.survey.scattering();
+        let focuses = !scene.lights.targets().spheres().is_empty();
         let gathers = matches!(self, Search::Map | Search::Photons);
         let walks = matches!(self, Search::EyePaths | Search::PathsAndPhotons);
         match (effect, self) {
             (Effect::Environment | Effect::Alpha | Effect::Textures | Effect::Dispersion, _) => "all paths",
             (Effect::Volume, _) if !media_scatter => "all paths",
             (_, Search::LightPaths) => "light paths",
+            (Effect::Glossy, Search::Photons | Search::PathsAndPhotons) if focuses => "eye paths and photons",
             (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "eye paths",
             (Effect::Direct, Search::EyePaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
                 "connections to lights"

@@ -204,7 +204,7 @@ impl<'a> Sppm<'a> {
                 })
             });
             let traced = cpu_seconds();
-            let maps = self.build(photons, i);
+            let maps = self.build(photons, 0, i);
             phases.light += traced - start;
             phases.map += cpu_seconds() - traced;
             work.light_paths += u64::from(each);
@@ -225,18 +225,19 @@ impl<'a> Sppm<'a> {
         let pass = self.light_pass(i, Domain::Light);
         let photons = trace_photons(self.eye.scene, self.surroundings, &pass);
         let t1 = cpu_seconds();
-        let maps = self.build(photons, i);
+        let maps = self.build(photons, pass.paths(), i);
         phases.light += t1 - t0;
         phases.map += cpu_seconds() - t1;
         let photons = maps.len();
         (maps, Work { light_paths: u64::from(pass.paths()), photons })
     }
 
-    /// Maps of the photons of iteration `i`.
-    fn build(&self, photons: Photons, i: u64) -> Maps {
+    /// Maps of the photons of iteration `i`, and of how many light paths, if sharp lobes may merge them.
+    fn build(&self, photons: Photons, paths: u32, i: u64) -> Maps {
         let scatters = self.eye.scene.survey.scattering();
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
-        Maps { surface: photons.surface.map(PhotonMap::build), volume, comb: Comb::new(self.settings.seed, i) }
+        let surface = photons.surface.map(|photons| PhotonMap::build(photons).of_paths(paths));
+        Maps { surface, volume, comb: Comb::new(self.settings.seed, i) }
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass<'_> {

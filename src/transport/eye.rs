@@ -3,7 +3,8 @@
 //! Who carries which light, so that every path is counted once (X is the vertex where photons may be gathered, seen from the light):
 //! - a light, then X: next-event estimation at X and its second strategy ([`direct_light`]), whatever the lobes of X;
 //! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself, which goes on;
-//! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light.
+//! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light;
+//! - another light, delta bounces only, then the sharp lobes of X: both, weighed ([`super::glint`]).
 //!
 //! Where only caustics are left to photons ([`Indirect::Paths`]), the eye path goes on with the broad lobes of X, too. Between its last broad bounce and a
 //! light there is then at least one vertex:
@@ -16,6 +17,7 @@
 use super::bandwidths::{Bandwidths, Counter, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
+use super::glint::{Glints, Merging};
 use super::interior::Interior;
 use super::segment::{Known, token};
 use super::shares::leads;
@@ -23,9 +25,9 @@ use super::site::MediumVertex;
 use super::site::Site;
 use super::volume::Volume;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
-use crate::bsdf::{LobeSet, Transport};
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
-use crate::light::Receiver;
+use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::photon::{ByKind, Kernel, Kind, Near, Photon, PhotonMap, PhotonMaps, VolumePhoton};
@@ -134,15 +136,22 @@ struct Gather<'a, B, K, const PATHS: bool> {
     classes: ClassSet,
     /// The path has scattered broadly.
     broadly: bool,
+    glints: Glints,
     /// The last vertex.
     last: Receiver,
 }
 
 impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with
-    /// which next-event estimation at the last vertex would have found it.
+    /// which next-event estimation at the last vertex would have found it, `density` that of light paths that begin there.
     #[inline]
-    fn run_into(&mut self, radiance: Rgb, throughput: Rgb, pdf_light: f32, scattered: Option<Scattered>) {
+    fn run_into(
+        &mut self,
+        (radiance, throughput): (Rgb, Rgb),
+        pdf_light: f32,
+        scattered: Option<Scattered>,
+        density: impl FnOnce() -> Option<EmissionDensity>,
+    ) {
         if PATHS && self.broadly && scattered.is_some_and(|s| !s.lobe.has(LobeSet::BROAD)) {
             // A caustic.
             return;
@@ -154,7 +163,13 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let arriving = throughput * radiance;
         let weighted = match scattered {
             Some(s) if !s.lobe.has(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
-            // Behind a perfect mirror or clear glass next-event estimation cannot see it.
+            // Behind a perfect mirror or clear glass next-event estimation cannot see it, but photons may.
+            Some(_) if self.glints.shared() => {
+                for (level, weight) in density().iter().flat_map(|density| self.glints.weights(density)) {
+                    self.measure.indirect_photons[level] += arriving * weight;
+                }
+                return;
+            }
             _ => arriving,
         };
         *match class.part() {
@@ -219,7 +234,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
                 let direct = vertex.throughput * next_event(self.scene, vertex, sets);
                 *self.direct() += direct;
             }
-            self.gather(vertex, broad, seen & LobeSet::SHARP);
+            self.gather(vertex, broad, seen, tries(seen, 1.0 - chance));
         }
         if !self.leads(broad | onward) {
             return Next::Stop;
@@ -232,9 +247,10 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         }
     }
 
-    /// Photons around the vertex: kernel density estimation, all levels of a kind from one query [post-reconstruction 2021, (2) and (3)].
+    /// Photons around the vertex: kernel density estimation, all levels of a kind from one query [post-reconstruction 2021, (2) and (3)]. The path goes on by the lobes
+    /// of `onward` with probability `going`.
     #[inline]
-    fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, sharp: LobeSet) {
+    fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: LobeSet, going: f32) {
         // What a photon of caustics makes of sharp lobes is in the same class.
         let sight = self.sight.then(Event::Broad);
         let place = B::place(vertex.surface.ng);
@@ -245,7 +261,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             }
             // Caustics that surfaces scatter on before they are seen are indirect light.
             let caustic = kind == Kind::Caustic && (!PATHS || class.part() == Part::Caustic);
-            self.gather_kind(kind, caustic, vertex, &place, broad, sharp);
+            self.gather_kind(kind, caustic, vertex, &place, broad, (onward, going));
         }
     }
 
@@ -258,7 +274,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         vertex: &Vertex<'_, '_>,
         place: &B::Place,
         broad: LobeSet,
-        sharp: LobeSet,
+        (onward, going): (LobeSet, f32),
     ) {
         let (p, ng) = (vertex.surface.p, vertex.surface.ng);
         let photons = &self.photons[kind as usize];
@@ -268,6 +284,12 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             let factor = (radii.later2 / largest2).min(1.0);
             radii.radius2.iter_mut().for_each(|radius2| *radius2 *= factor);
         }
+        let sharp = onward & LobeSet::SHARP;
+        let shared = kind == Kind::Caustic
+            && !sharp.is_empty()
+            && self.classes.has(self.sight.then(Event::Sharp).receives(Beam::FOCUSED));
+        let mut glints =
+            shared.then(|| self.glints.merge(self.kernel, (vertex.shading, ng), (onward, going), &radii, photons));
         let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
@@ -277,6 +299,9 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let near = &mut self.near[kind as usize];
         let push = |photon: &Photon, distance2| {
             if u32::from(photon.depth) <= longest {
+                if let Some(glints) = &mut glints {
+                    glints.push(photon, distance2);
+                }
                 batch.push(photon, distance2, &mut counter);
             }
         };
@@ -288,6 +313,9 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
         for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
             into[usize::from(level)] += vertex.throughput * (FRAC_1_PI / radius2) * sum;
+        }
+        for (level, sum) in order.into_iter().zip(glints.into_iter().flat_map(Merging::finish)) {
+            self.measure.indirect_photons[usize::from(level)] += vertex.throughput * sum;
         }
     }
 }
@@ -321,8 +349,10 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         }
         self.sight = self.arrived(scattered);
         self.length += vertex.distance;
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, surface) {
-            self.run_into(radiance, vertex.throughput, pdf, scattered);
+        let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
+        if let Some((radiance, pdf)) = lights.hit(materials, &from, surface) {
+            let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
+            self.run_into((radiance, vertex.throughput), pdf, scattered, density);
         }
         self.last = vertex.receiver();
         let lobes = shading.bsdf.lobes();
@@ -339,7 +369,8 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         if smooth.is_empty() {
             return Next::Continue(lobes);
         }
-        let (broad, sharp) = (lobes & LobeSet::BROAD, lobes & LobeSet::SHARP);
+        self.glints.arrive();
+        let broad = lobes & LobeSet::BROAD;
         let onward = lobes & (LobeSet::SHARP | LobeSet::DELTA);
         if PATHS {
             return self.go_on(vertex, broad, onward);
@@ -351,7 +382,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
                 let direct = vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival);
                 *self.direct() += direct;
             }
-            self.gather(vertex, broad, sharp);
+            self.gather(vertex, broad, onward, survival);
         }
         if self.leads(onward) { Next::Continue(onward) } else { Next::Stop }
     }
@@ -403,7 +434,17 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let scene = self.scene;
         self.sight = self.arrived(scattered);
         let last = self.last;
-        scene.lights.escape(&last, direction, |radiance, pdf, _| self.run_into(radiance, throughput, pdf, scattered));
+        scene.lights.escape(&last, direction, |radiance, direct, start| {
+            let onward = || scene.lights.entry_pdf_a(last.p, direction);
+            let density =
+                || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });
+            self.run_into((radiance, throughput), direct, scattered, density);
+        });
+    }
+
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
+        self.glints.scatter(vertex.surface.ng, sample);
     }
 }
 
@@ -536,6 +577,7 @@ impl Eye<'_> {
             lobes: LobeSet::NONE,
             classes: self.classes,
             broadly: false,
+            glints: Glints::NONE,
             last: Receiver::anywhere(Vec3::ZERO),
         };
         walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);

@@ -98,7 +98,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
     /// Adds a photon at a distance squared within reach.
     #[inline(always)]
     pub fn push<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
-        if photon.flags.has(PhotonFlags::UNREACHABLE) && self.unreachable.is_some() {
+        if photon.flags == PhotonFlags::UNREACHABLE && self.unreachable.is_some() {
             return self.push_unreachable(photon, distance2, counter);
         }
         self.waiting.push(photon);

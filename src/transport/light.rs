@@ -192,7 +192,7 @@ struct Deposit<'a> {
     onward: LobeSet,
     kinds: ByKind<bool>,
     caustic: bool,
-    unreachable: bool,
+    flags: PhotonFlags,
     /// The path may go on after a broad bounce, and its flux then is multiplied by this.
     goes_on: bool,
     gain: f32,
@@ -220,7 +220,11 @@ impl<'a> Deposit<'a> {
             onward,
             kinds: pass.kinds,
             caustic: true,
-            unreachable: emitted.delta,
+            flags: if emitted.delta {
+                PhotonFlags::UNREACHABLE
+            } else {
+                PhotonFlags::straight(emitted.density.of_rays())
+            },
             goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
             gain: 1.0 / probability,
             scale: 1.0,
@@ -234,7 +238,9 @@ impl<'a> Deposit<'a> {
     fn arrives(&mut self, scattered: Option<Scattered>) -> bool {
         self.vertices += 1;
         let Some(scattered) = scattered else { return true };
-        self.unreachable &= scattered.lobe == LobeSet::DELTA;
+        if scattered.lobe != LobeSet::DELTA {
+            self.flags = PhotonFlags::default();
+        }
         // A medium, which focuses nothing, is as broad as can be.
         if scattered.lobe.has(LobeSet::BROAD) {
             if self.caustic {
@@ -258,13 +264,12 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
             let mark = self.weight.map(|weight| Mark::new(weight * self.scale, vertex.draws.one(Purpose::Mark)));
-            let flags = u8::from(self.unreachable) * PhotonFlags::UNREACHABLE;
             self.photons.surface[kind as usize].push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,
                 ng: vertex.surface.ng,
                 flux: vertex.throughput * self.scale,
-                flags: PhotonFlags(flags),
+                flags: self.flags,
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
                 band: Band::of(vertex.wavelength.as_ref()),
                 mark: mark.unwrap_or_default(),

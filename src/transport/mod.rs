@@ -8,6 +8,7 @@ mod direct;
 mod eye;
 mod flight;
 mod gather;
+mod glint;
 mod interior;
 mod lengths;
 mod light;

@@ -170,7 +170,7 @@ fn main() {
             wi: Vec3::Y,
             ng: Vec3::Y,
             flux: Rgb::ONE,
-            flags: PhotonFlags(0),
+            flags: PhotonFlags::default(),
             depth: 2,
             band: Band::WHITE,
             mark: Mark::default(),

@@ -123,7 +123,7 @@ fn main() {
         .map(|i| {
             let u = Stream::new(2, 0, Domain::Test, i).vertex(0);
             let (a, b) = (u.two(Purpose::Pixel), u.one(Purpose::Lobe));
-            let flags = PhotonFlags(0);
+            let flags = PhotonFlags::default();
             Photon {
                 p: Vec3::new(a.x, b * 0.01, a.y),
                 wi: Vec3::Y,

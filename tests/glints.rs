@@ -1,0 +1,80 @@
+//! Lamps behind glass, shown by sharp lobes: photons and eye paths share that light out, and together bring all of it.
+
+mod support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::Material;
+use caustique::math::{DVec3, Vec3};
+use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::scene::{Description, Scene};
+use caustique::transport::Indirect;
+use support::scenes::{add, build, cuboid, glass, look_at, matte, square};
+use support::stats::{mean_and_error, t_critical};
+
+const SIZE: u32 = 16;
+const SEEDS: u64 = 8;
+const ERROR_RATE: f64 = 1e-3;
+/// Relative: rays that are lost on edges, energy tables, and photons that are missing beyond the walls.
+const BIAS: f64 = 0.01;
+/// What is told: a tenth of the light.
+const DETECTS: f64 = 0.1;
+
+/// A closed room whose walls give 1/2 and reflect 1/2, so that there is 1 everywhere and in every direction, also below a pane of glass that keeps the floor from the ceiling;
+/// the floor is of white metal, sharp enough that eye paths go on from it, and seen from the side: a cosine that is
+/// forgotten in the weights shows.
+fn furnace(roughness: f32) -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness, ..Material::default() };
+    add(&mut description, "floor", cuboid(Vec3::new(0.02, 0.01, 0.02), Vec3::new(3.98, 0.02, 3.98), false), metal);
+    add(&mut description, "pane", cuboid(Vec3::new(0.01, 0.2, 0.01), Vec3::new(3.99, 0.25, 3.99), false), glass(1.5));
+    description.cameras.push(look_at(DVec3::new(2.0, 1.0, 2.8), DVec3::new(2.0, 0.0, 1.8), 12.0));
+    build(description)
+}
+
+/// Mean radiance of the picture: at the own level, and what of it photons and such eye paths share.
+fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let rendered = render(scene, &camera, settings, |_, _| Control::Continue);
+    assert_eq!(rendered.rejected(), 0);
+    let pixels = rendered.pixels.len() as f64;
+    let own = settings.levels.own();
+    let all: f64 = rendered.pixels.iter().map(|pixel| pixel.levels[own].mean.x).sum();
+    let shared: f64 = rendered.pixels.iter().map(|pixel| pixel.parts.indirect.x / f64::from(pixel.iterations)).sum();
+    (all / pixels, shared / pixels)
+}
+
+/// All of the light is there, whatever photons bring of it: with small bandwidths hardly any, with large ones nearly all.
+#[test]
+fn all_light_is_there_once() {
+    for (roughness, radius) in [(0.3, 0.02), (0.3, 0.2), (0.15, 0.3)] {
+        let scene = furnace(roughness);
+        for (method, indirect, levels) in [
+            (Method::Sppm, Indirect::Photons, 1),
+            (Method::Sppm, Indirect::Photons, 5),
+            (Method::Sppm, Indirect::Paths, 1),
+            (Method::Cppm, Indirect::Photons, 1),
+        ] {
+            let settings = |seed| Settings {
+                method,
+                seed,
+                indirect,
+                photons: 15_000,
+                initial: InitialBandwidth::Fixed(radius),
+                levels: Levels::new(levels),
+                iterations: Some(16),
+                ..Settings::default()
+            };
+            let (values, shared): (Vec<f64>, Vec<f64>) = (0..SEEDS).map(|seed| mean(&scene, &settings(seed))).unzip();
+            let (mean, error) = mean_and_error(&values);
+            let shared = mean_and_error(&shared).0;
+            println!(
+                "{roughness}, {radius}, {method:?}, {indirect:?}, {levels}: {mean:.5} +- {error:.5}, {shared:.3} of it by sharp lobes"
+            );
+            let critical = t_critical(ERROR_RATE, 12, SEEDS as f64 - 1.0);
+            let passes = |expected: f64| (mean - expected).abs() <= critical * error + BIAS * expected;
+            assert!(passes(1.0), "{mean} +- {error}");
+            assert!(!passes(1.0 - DETECTS) && !passes(1.0 + DETECTS), "{mean} +- {error} tells nothing");
+        }
+    }
+}
