@@ -5,10 +5,11 @@ mod support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::photon::Kind;
+use caustique::render::{Control, Levels, Method, RadiusRule, Settings, render};
 use caustique::scene::{Description, Scene};
 use caustique::transport::Indirect;
-use support::scenes::{add, build, cuboid, glass, look_at, matte, square};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
 const SIZE: u32 = 16;
@@ -78,3 +79,96 @@ fn all_light_is_there_once() {
         }
     }
 }
+
+/// A ball of metal in that room, smaller than the first bandwidth: most photons within it are of other sides of the ball, or beyond it.
+fn ball() -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.3, ..Material::default() };
+    add(&mut description, "ball", sphere(Vec3::new(2.0, 0.1, 2.0), BALL, 64), metal);
+    add(&mut description, "pane", cuboid(Vec3::new(0.01, 0.2, 0.01), Vec3::new(3.99, 0.25, 3.99), false), glass(1.5));
+    description.cameras.push(look_at(DVec3::new(2.0, 1.0, 2.8), DVec3::new(2.0, 0.1, 2.0), 4.0));
+    build(description)
+}
+
+const BALL: f32 = 0.09;
+
+/// Metal has no broad lobes, and yet bandwidths there follow the photons that it shows: rules that count photons find out what is missing around a ball, and from iteration to
+/// iteration less is.
+#[test]
+fn bandwidths_shrink_on_metal() {
+    let scene = ball();
+    let first = 4.0 * BALL;
+    for (method, radius_rule) in [
+        (Method::Cppm, RadiusRule::Memoryless),
+        (Method::Ppm, RadiusRule::Memoryless),
+        (Method::Sppm, RadiusRule::Local),
+    ] {
+        let missing = |iterations| {
+            let settings = Settings {
+                method,
+                radius_rule,
+                photons: 10_000,
+                initial: InitialBandwidth::Fixed(first),
+                levels: Levels::new(1),
+                iterations: Some(iterations),
+                ..Settings::default()
+            };
+            let camera = scene.camera(&square(SIZE)).expect("a camera");
+            let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+            let radii = &rendered.radii[Kind::Caustic as usize];
+            let radius = radii.iter().sum::<f32>() / (radii.len() as f32 * first);
+            let mean = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.x).sum::<f64>() / radii.len() as f64;
+            println!("{method:?}, {radius_rule:?}, {iterations}: {radius} of the first bandwidth, {mean:.3}");
+            assert!(radius < 0.8, "{radius}");
+            1.0 - mean
+        };
+        let (soon, later) = (missing(25), missing(100));
+        assert!(soon < 0.2 && later < 0.75 * soon, "{soon} is missing, then {later}");
+    }
+}
+
+/// A small lamp over metal and a small pane between them, which most light paths miss: of most iterations the map is empty.
+fn pane() -> Scene {
+    let mut description = Description::default();
+    let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.35, ..Material::default() };
+    let lamp = quad(Vec3::new(-0.05, 3.0, -0.05), Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.0, 0.0, 0.1));
+    add(&mut description, "lamp", lamp, matte(0.0, 100.0));
+    add(&mut description, "metal", cuboid(Vec3::new(-0.3, -0.1, -0.3), Vec3::new(0.3, 0.0, 0.3), false), metal);
+    add(&mut description, "pane", cuboid(Vec3::new(-0.2, 0.2, -0.2), Vec3::new(0.2, 0.25, 0.2), false), glass(1.5));
+    description.cameras.push(look_at(DVec3::new(0.2, 2.0, 0.4), DVec3::ZERO, 4.0));
+    build(description)
+}
+
+/// Eye paths leave photons their share whether any have come this time or not: few light paths bring as much as many, and as paths alone.
+#[test]
+fn empty_maps_bring_nothing_and_take_nothing() {
+    let scene = pane();
+    let by = |method, photons| {
+        let settings = |seed| Settings {
+            method,
+            seed,
+            photons,
+            initial: InitialBandwidth::Fixed(0.2),
+            levels: Levels::new(1),
+            iterations: Some(1000),
+            ..Settings::default()
+        };
+        let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&scene, &settings(seed)).0).collect();
+        mean_and_error(&values)
+    };
+    let (many, paths) = (by(Method::Sppm, 4_000), by(Method::Path, 100));
+    let critical = t_critical(ERROR_RATE, 2, SEEDS as f64 - 1.0);
+    for (name, (mean, error)) in [("paths", paths), ("few light paths", by(Method::Sppm, 100))] {
+        println!("{name}: {mean:.5} +- {error:.5}, many light paths: {:.5} +- {:.5}", many.0, many.1);
+        let passes = |expected: f64| (mean - expected).abs() <= critical * error.hypot(many.1) + BIAS * expected;
+        assert!(passes(many.0), "{mean} +- {error}, {many:?}");
+        assert!(
+            !passes(many.0 * (1.0 - PLANTED)) && !passes(many.0 * (1.0 + PLANTED)),
+            "{mean} +- {error} tells nothing"
+        );
+    }
+}
+
+/// What that test tells: a fifth of the light.
+const PLANTED: f64 = 0.2;

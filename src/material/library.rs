@@ -54,6 +54,17 @@ impl Material {
         self.has_narrow_base() || self.clearcoat > 0.0
     }
 
+    /// Whether its base or a coating may have a lobe without width, and whether one that is narrow and has a width.
+    pub fn perfect_and_sharp(&self) -> (bool, bool) {
+        let of = |there: bool, roughness: f32, textured: bool| {
+            let perfect = roughness * roughness < DELTA_ALPHA;
+            (there && (perfect || textured), there && (textured || (!perfect && roughness < WIDEST_ROUGHNESS)))
+        };
+        let base = of(true, self.roughness, self.metallic_roughness_texture.is_some());
+        let coat = of(self.clearcoat > 0.0, self.clearcoat_roughness, self.clearcoat_roughness_texture.is_some());
+        (base.0 || coat.0, base.1 || coat.1)
+    }
+
     /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light of its own to show.
     pub fn is_clear(&self) -> bool {
         let perfect = self.roughness * self.roughness < DELTA_ALPHA && self.metallic_roughness_texture.is_none();

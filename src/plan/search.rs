@@ -81,14 +81,15 @@ impl Search {
     /// What brings an effect into the picture.
     pub(super) fn carrier(self, effect: Effect, scene: &Scene) -> &'static str {
         let media_scatter = scene.survey.scattering();
-        let focuses = !scene.lights.targets().spheres().is_empty();
+        // Photons of caustics, if there are any, share what sharp lobes show of lamps.
+        let shared = scene.survey.glints && !scene.lights.targets().spheres().is_empty();
         let gathers = matches!(self, Search::Map | Search::Photons);
         let walks = matches!(self, Search::EyePaths | Search::PathsAndPhotons);
         match (effect, self) {
             (Effect::Environment | Effect::Alpha | Effect::Textures | Effect::Dispersion, _) => "all paths",
             (Effect::Volume, _) if !media_scatter => "all paths",
             (_, Search::LightPaths) => "light paths",
-            (Effect::Glossy, Search::Photons | Search::PathsAndPhotons) if focuses => "eye paths and photons",
+            (Effect::Glossy, Search::Photons | Search::PathsAndPhotons) if shared => "eye paths and photons",
             (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "eye paths",
             (Effect::Direct, Search::EyePaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
                 "connections to lights"

@@ -17,6 +17,8 @@ pub struct Survey {
     dispersion: bool,
     /// Some surface may have narrow lobes: mirrors, glass, what shines.
     pub narrow_lobes: bool,
+    /// Sharp lobes may show lamps that have a size, by way of perfect mirrors or clear glass.
+    pub glints: bool,
     /// Some light cannot be hit by a ray.
     pub delta_lights: bool,
     /// Light comes from infinity.
@@ -72,13 +74,15 @@ impl Survey {
         for instance in &shapes.instances {
             worn[instance.material as usize] += 1;
         }
-        let mut solids = 0;
+        let (mut solids, mut perfect, mut sharp) = (0, false, false);
         for (material, &worn) in materials.list.iter().zip(&worn) {
             if worn == 0 {
                 continue;
             }
             survey.alpha |= material.alpha != Alpha::Opaque;
             survey.narrow_lobes |= material.is_glossy() || material.transmission > 0.0;
+            let lobes = material.perfect_and_sharp();
+            (perfect, sharp) = (perfect | lobes.0, sharp | lobes.1);
             if material.is_solid_glass() {
                 solids += worn;
                 survey.media |= material.medium.is_some();
@@ -89,6 +93,7 @@ impl Survey {
         }
         survey.solids = solids > 0;
         survey.null_boundaries |= solids > 1;
+        survey.glints = perfect && sharp && lights.emitters().iter().any(|emitter| !emitter.is_delta());
         for emitter in lights.emitters() {
             survey.delta_lights |= emitter.is_delta();
             survey.infinite_lights |= matches!(emitter, Emitter::Sun { .. } | Emitter::Environment);

@@ -14,7 +14,7 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
 //! ([`super::flight`]).
 
-use super::bandwidths::{Bandwidths, Counter, MAX_LEVELS};
+use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
@@ -65,11 +65,11 @@ pub struct EyeMeasure {
     pub emission: Rgb,
     /// Light from lights at the first vertex that scatters otherwise.
     pub direct: Rgb,
-    /// All other light that this path found without photons.
+    /// All other light that this path found, and shares with no photons.
     pub indirect: Rgb,
     /// Photons of caustics, per level.
     pub caustic_photons: [Rgb; MAX_LEVELS],
-    /// All other photons, per level.
+    /// All other photons, and what this path found of the light that they share with it, per level.
     pub indirect_photons: [Rgb; MAX_LEVELS],
     /// Light whose first vertex that is not clear is in a medium, found without photons.
     pub volume: Rgb,
@@ -251,12 +251,15 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// of `onward` with probability `going`.
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: LobeSet, going: f32) {
-        // What a photon of caustics makes of sharp lobes is in the same class.
+        // What a photon of a light without size makes of sharp lobes is in the same class.
         let sight = self.sight.then(Event::Broad);
         let place = B::place(vertex.surface.ng);
         for (kind, beam) in [(Kind::Indirect, Beam::SCATTERED), (Kind::Caustic, Beam::FOCUSED)] {
             let class = sight.receives(beam);
-            if self.photons[kind as usize].photons().is_empty() || !self.classes.has(class) {
+            let photons = &self.photons[kind as usize];
+            // Where none has come this time, eye paths still leave photons their share.
+            let shares = onward.has(LobeSet::SHARP) && photons.paths() > 0;
+            if (photons.photons().is_empty() && !shares) || !self.classes.has(class) {
                 continue;
             }
             // Caustics that surfaces scatter on before they are seen are indirect light.
@@ -295,12 +298,21 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let longest = self.max_depth - vertex.depth;
         let mut counter = self.bandwidths.counter(kind, place);
         let reach2 = counter.reach2(largest);
+        // Bandwidths follow what broad lobes see of photons; metal has none.
+        let counts = <B::Counter<'_> as Counter>::COUNTS && broad.is_empty();
+        if let Some(glints) = glints.as_mut().filter(|_| counts) {
+            glints.look_beyond(reach2);
+        }
         let mut batch = Batch::new(self.kernel, radii, self.waiting, vertex, broad, broad | sharp);
         let near = &mut self.near[kind as usize];
         let push = |photon: &Photon, distance2| {
             if u32::from(photon.depth) <= longest {
                 if let Some(glints) = &mut glints {
-                    glints.push(photon, distance2);
+                    let light = glints.push(photon, distance2);
+                    if counts && light != Rgb::ZERO {
+                        let light = (light * vertex.throughput).element_sum() / 3.0;
+                        counter.count(&Found::one(photon.p - p, distance2, light, photon.mark));
+                    }
                 }
                 batch.push(photon, distance2, &mut counter);
             }

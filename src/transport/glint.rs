@@ -8,7 +8,7 @@
 //!
 //! `n pi r^2 e cos / pdf`
 //!
-//! photons for every eye path. Weights need only be the same function of the whole path on either side: of e both know the leading power of two
+//! photons for every eye path. What one of them brings is bounded, however small r is. Weights need only be the same function of the whole path on either side: of e both know the leading power of two
 //! ([`PhotonFlags::density`]).
 
 use super::bandwidths::{LevelRadii, MAX_LEVELS};
@@ -80,6 +80,7 @@ impl Glints {
             going,
             paths,
             radius2,
+            largest: PI * reach2,
             reach2,
             sums: [Rgb::ZERO; MAX_LEVELS],
         }
@@ -121,28 +122,34 @@ pub(super) struct Merging<'s, K> {
     going: f32,
     paths: f32,
     radius2: [f32; MAX_LEVELS],
+    /// Area of the largest kernel.
+    largest: f32,
     reach2: f32,
     sums: [Rgb; MAX_LEVELS],
 }
 
 impl<K: Kernel> Merging<'_, K> {
-    /// Adds a photon at a distance squared, if it is one of these.
+    /// Looks at photons as far away as this (squared), although those beyond the kernels bring nothing now.
+    #[inline]
+    pub fn look_beyond(&mut self, reach2: f32) {
+        self.reach2 = self.reach2.max(reach2);
+    }
+
+    /// Adds a photon at a distance squared, if it is one of these. Returns what it would bring to the largest kernel from within, before it is divided by an area.
     #[inline(always)]
-    pub fn push(&mut self, photon: &Photon, distance2: f32) {
-        if distance2 < self.reach2 && photon.flags.density() > 0.0 {
-            self.add(photon, distance2);
-        }
+    pub fn push(&mut self, photon: &Photon, distance2: f32) -> Rgb {
+        if distance2 < self.reach2 && photon.flags.density() > 0.0 { self.add(photon, distance2) } else { Rgb::ZERO }
     }
 
     #[inline(never)]
-    fn add(&mut self, photon: &Photon, distance2: f32) {
+    fn add(&mut self, photon: &Photon, distance2: f32) -> Rgb {
         let Merging { shading, ng, onward, .. } = *self;
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, onward);
         let cosine = photon.cosine();
         // Written so that what is no number is left out.
         let (cos, eye) = (photon.wi.dot(ng).abs(), pdf * self.going);
         if !(eye > 0.0 && cosine > 0.0 && cos > 0.0) {
-            return;
+            return Rgb::ZERO;
         }
         // Area within which a photon is expected for every eye path.
         let one_each = eye / (self.paths * photon.flags.density() * cos);
@@ -150,10 +157,11 @@ impl<K: Kernel> Merging<'_, K> {
         for (sum, radius2) in self.sums.iter_mut().zip(self.radius2) {
             if distance2 < radius2 {
                 let kernel = if K::BOX { 1.0 } else { K::weight(distance2 / radius2) };
-                // The weight over pi r^2, which is bounded: no photon brings more than an eye path that finds its light.
+                // The weight over pi r^2, which is bounded however small the kernel.
                 *sum += light * (kernel / (one_each + PI * radius2));
             }
         }
+        light * (self.largest / (one_each + self.largest))
     }
 
     /// Radiance by level, in the order of radii.

@@ -61,6 +61,31 @@ fn effects_are_there_for_reasons() {
     assert_eq!(present(&plan(scene)), "dispersion");
 }
 
+/// Photons take part in gloss only where they may be of lamps that sharp lobes show by way of clear glass or perfect mirrors.
+#[test]
+fn who_brings_gloss() {
+    let by = |lamp: bool, ball: Material, shining: Material| {
+        let mut scene = floor();
+        scene.lights = vec![point_light(DVec3::new(0.0, 3.0, 0.0), 10.0)];
+        if lamp {
+            add(&mut scene, "Panel", quad(Vec3::new(0.0, 4.0, 0.0), Vec3::X, Vec3::Z), matte(0.0, 1.0));
+        }
+        add(&mut scene, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), ball);
+        add(&mut scene, "Disc", sphere(Vec3::new(2.0, 1.0, 0.0), 0.5, 16), shining);
+        plan(scene).effect(Effect::Glossy).by
+    };
+    let brushed = Material { roughness: 0.3, ..mirror() };
+    let varnished = Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..matte(0.5, 0.0) };
+    let frosted = Material { roughness: 0.2, ..glass(1.5) };
+    let both = Some("eye paths and photons");
+    assert_eq!([&brushed, &varnished].map(|shining| by(true, glass(1.5), shining.clone())), [both; 2]);
+    let eye_paths = Some("eye paths");
+    assert_eq!(by(false, glass(1.5), brushed.clone()), eye_paths);
+    assert_eq!(by(true, frosted, brushed.clone()), eye_paths);
+    assert_eq!(by(true, matte(0.5, 0.0), brushed), eye_paths);
+    assert_eq!(by(true, glass(1.5), Material { clearcoat: 1.0, ..mirror() }), eye_paths);
+}
+
 #[test]
 fn properties_of_the_scene() {
     let mut scene = floor();
