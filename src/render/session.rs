@@ -9,10 +9,12 @@ use super::settings::{Levels, Settings};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::Pixel;
+use crate::estimator::bandwidth::initial_volume_bandwidths;
 use crate::film::LayerSet;
 use crate::light::Guide;
+use crate::photon::PhotonMap;
 use crate::scene::Scene;
-use crate::transport::Surroundings;
+use crate::transport::{Eye, Surroundings};
 
 /// What a render reads: scene, camera, settings, and what these say together.
 pub struct Stage<'a> {
@@ -35,6 +37,14 @@ impl<'a> Stage<'a> {
     /// The settings of the render.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// The largest that bandwidths in media may be, by pixel: what they are without photons.
+    pub fn widest_in_media(&self) -> Vec<f32> {
+        let Settings { initial, widest, seed, max_depth, indirect, classes, .. } = self.settings;
+        let (scene, camera, interior) = (self.scene, self.camera, self.surroundings.eye);
+        let eye = Eye { scene, camera, interior, max_depth, indirect, classes };
+        initial_volume_bandwidths(&eye, initial, widest[1], seed, &PhotonMap::build(Vec::new()))
     }
 
     /// Width and height of the picture (pixels).

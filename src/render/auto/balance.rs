@@ -50,9 +50,9 @@ impl Balance {
         Balance::least(all, error, eye_cost, light_cost)
     }
 
-    /// The same where bandwidths follow the photons' counts, and so the number of all photons sent, whatever the iterations that send them: `error` is that
-    /// of some factors in so many iterations, over those of the usual settings.
-    pub(super) fn counted(error: impl Fn(Balance, f64) -> f64, eye_cost: f64, light_cost: f64) -> Balance {
+    /// The number of light paths alone, by the error that is expected of some factors in so many iterations, over those of the usual settings: where bandwidths follow the
+    /// photons' counts, and so the number of all photons sent, whatever the iterations that send them, or do not grow as they like.
+    pub(super) fn expecting(error: impl Fn(Balance, f64) -> f64, eye_cost: f64, light_cost: f64) -> Balance {
         let all = steps(PHOTONS).map(|photons| Balance { photons, ..Balance::USUAL });
         Balance::least(all, error, eye_cost, light_cost)
     }
@@ -102,7 +102,7 @@ mod tests {
     /// a (1 + q) + b (1 + q) / q is least where q^2 = b / a.
     #[test]
     fn counting_rules_ask_for_photons_in_all() {
-        let of = |a: f64, b: f64| Balance::counted(move |balance, n| a / n + b / (n * balance.photons), 1.0, 1.0);
+        let of = |a: f64, b: f64| Balance::expecting(move |balance, n| a / n + b / (n * balance.photons), 1.0, 1.0);
         let close = |photons: f64, to: f64| assert!((photons / to - 1.0).abs() < 2.0 * ROUNDING, "{photons} for {to}");
         close(of(0.0, 1.0).photons, 1.0 / AREA.0);
         close(of(1.0, 0.0).photons, 1.0 / AREA.1);

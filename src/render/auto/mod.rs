@@ -14,6 +14,7 @@ mod bias;
 mod contest;
 mod missing;
 mod pilot;
+mod room;
 mod tail;
 mod trial;
 mod weights;

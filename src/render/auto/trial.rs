@@ -2,6 +2,7 @@
 
 use super::bias::{Bias, Differences};
 use super::missing::Caustics;
+use super::room::Room;
 use super::tail::Tail;
 use super::{Balance, Free, Way};
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -107,9 +108,16 @@ pub(super) struct Plan {
 pub(super) const WORST: f64 = 0.01;
 const NOBODYS: f64 = 0.001;
 
+/// Variance of a pixel's mean at a level, relative to what it is worth.
+fn relative_variance(pixel: &Pixel, level: usize, value: f64) -> f64 {
+    mean(pixel.levels[level].variance_of_mean(f64::from(pixel.iterations))) / (value * value + DARK)
+}
+
 /// Sums over pixels of relative squares.
 #[derive(Default)]
 struct Sums {
+    /// Largest relative variance at the own level of pixels that are not left out.
+    most: f64,
     /// Relative variance of the mean by level.
     variance: [f64; MAX_LEVELS],
     /// The largest at the own level.
@@ -126,31 +134,28 @@ impl Sums {
     /// `values`: what pixels are relative to.
     fn of(pixels: &[Pixel], levels: Levels, values: &[f64]) -> Sums {
         let own = levels.own();
-        let scale = |value: &f64| 1.0 / (value * value + DARK);
-        let relative = |(pixel, value): (&Pixel, &f64)| {
-            mean(pixel.levels[own].variance_of_mean(f64::from(pixel.iterations))) * scale(value)
-        };
-        let mut variances: Vec<f64> = pixels.iter().zip(values).map(relative).collect();
+        let of_own = |(pixel, value): (&Pixel, &f64)| relative_variance(pixel, own, *value);
+        let mut variances: Vec<f64> = pixels.iter().zip(values).map(of_own).collect();
         let worst = (variances.len() as f64 * WORST) as usize;
         let last = variances.len().saturating_sub(1 + worst);
         let most = *variances.select_nth_unstable_by(last, f64::total_cmp).1;
-        let mut sums = Sums { tail: Tail::of(&mut variances), ..Sums::default() };
+        let mut sums = Sums { most, tail: Tail::of(&mut variances), ..Sums::default() };
         for (pixel, value) in pixels.iter().zip(values) {
             if pixel.iterations < 2 {
                 continue;
             }
-            let (n, variance, scale) = (f64::from(pixel.iterations), relative((pixel, value)), scale(value));
+            let n = f64::from(pixel.iterations);
             let parts = &pixel.parts;
             let all = parts.emission + parts.direct + parts.indirect + parts.caustic + parts.volume;
             sums.light += mean(all) / n;
             sums.caustics += mean(parts.caustic) / n;
-            if variance > most {
+            if relative_variance(pixel, own, *value) > most {
                 continue;
             }
-            for (sum, level) in sums.variance.iter_mut().zip(&pixel.levels[..levels.count]) {
-                *sum += mean(level.variance_of_mean(n)) * scale;
+            for (level, sum) in sums.variance[..levels.count].iter_mut().enumerate() {
+                *sum += relative_variance(pixel, level, *value);
             }
-            sums.differences.add(pixel, scale);
+            sums.differences.add(pixel, 1.0 / (value * value + DARK));
             sums.pixels += 1.0;
         }
         sums
@@ -238,12 +243,22 @@ impl<'a> Running<'a> {
         let sums = Sums::of(self.session.pixels(), levels, values);
         let (done, pixels) = (self.iterations as f64, sums.pixels.max(1.0));
         let relative = |sum: f64| sum / pixels;
+        // Noise of eye paths is the same at all levels.
+        let noise = |index: usize, pixel: &Pixel| {
+            let variance = |level: usize| relative_variance(pixel, level, values[index]);
+            let is_left_out = variance(levels.own()) > sums.most;
+            if is_left_out { 0.0 } else { variance(levels.own().saturating_sub(1)) - variance(levels.count - 1) }
+        };
+        let in_media = self.session.pixels().iter().any(|pixel| pixel.volume_bandwidth > 0.0);
+        let widest = if in_media { self.stage.widest_in_media() } else { Vec::new() };
+        let room = Room::of(self.session.pixels(), &widest, noise);
         let gathers = of.method.gathers();
         let variance = relative(sums.variance[levels.own()]);
         let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };
         let (all, light) = (cost.of(way, of, plan.pixels), cost.of(way, of, 0.0));
-        let alpha = of.alpha;
-        let counted = of.method == Method::Cppm;
+        // What media scatter rules where they do: there bandwidths follow the iteration's number.
+        let alpha = if room.is_some() { of.volume_alpha } else { of.alpha };
+        let counted = of.method == Method::Cppm && room.is_none();
         // The same neighbours in a smaller area.
         let bias = if gathers { sums.differences.bias(pixels).scaled(plan.photons) } else { Bias::default() };
         // After n times as many iterations as in the trial: noise of photons and bias.
@@ -259,10 +274,14 @@ impl<'a> Running<'a> {
             let area = balance.neighbours / balance.photons;
             let (sent, area) = if counted { (n * balance.photons, 1.0) } else { (n, area) };
             let (photons, bias) = ruled(sent);
-            (1.0 - WORST) * (fixed / n + photons / balance.neighbours + bias.at(area)) + tail(n)
+            let (photons, bias) = match &room {
+                Some(room) => (photons * room.noise(balance.photons), room.mean(area, |volume| bias.at(volume))),
+                None => (photons / balance.neighbours, bias.at(area)),
+            };
+            (1.0 - WORST) * (fixed / n + photons + bias) + tail(n)
         };
-        let mut balance = if counted {
-            Balance::counted(|balance, n| expected(balance, n * usual), all - light, light)
+        let mut balance = if counted || room.is_some() {
+            Balance::expecting(|balance, n| expected(balance, n * usual), all - light, light)
         } else if gathers {
             let (photons, bias) = ruled(usual);
             Balance::new(fixed / usual, photons, bias, all - light, light)
