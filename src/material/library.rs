@@ -19,6 +19,11 @@ pub struct Materials {
     pub textures: Arc<[Texture]>,
 }
 
+/// Whether lobes of some roughness have no width.
+fn is_perfect(roughness: f32) -> bool {
+    roughness * roughness < DELTA_ALPHA
+}
+
 impl Material {
     /// Whether surfaces of this material give light of their own.
     pub fn emits(&self) -> bool {
@@ -56,18 +61,17 @@ impl Material {
 
     /// Whether its base or a coating may have a lobe without width, and whether one that is narrow and has a width.
     pub fn perfect_and_sharp(&self) -> (bool, bool) {
-        let of = |there: bool, roughness: f32, textured: bool| {
-            let perfect = roughness * roughness < DELTA_ALPHA;
-            (there && (perfect || textured), there && (textured || (!perfect && roughness < WIDEST_ROUGHNESS)))
-        };
-        let base = of(true, self.roughness, self.metallic_roughness_texture.is_some());
-        let coat = of(self.clearcoat > 0.0, self.clearcoat_roughness, self.clearcoat_roughness_texture.is_some());
-        (base.0 || coat.0, base.1 || coat.1)
+        let base = (self.roughness, self.metallic_roughness_texture.is_some());
+        let coat = (self.clearcoat_roughness, self.clearcoat_roughness_texture.is_some());
+        let lobes = [Some(base), (self.clearcoat > 0.0).then_some(coat)];
+        let any =
+            |of: &dyn Fn(f32) -> bool| lobes.iter().flatten().any(|&(roughness, textured)| textured || of(roughness));
+        (any(&is_perfect), any(&|roughness| !is_perfect(roughness) && roughness < WIDEST_ROUGHNESS))
     }
 
     /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light of its own to show.
     pub fn is_clear(&self) -> bool {
-        let perfect = self.roughness * self.roughness < DELTA_ALPHA && self.metallic_roughness_texture.is_none();
+        let perfect = is_perfect(self.roughness) && self.metallic_roughness_texture.is_none();
         let glass = self.transmission == 1.0 && self.transmission_texture.is_none() && self.metallic == 0.0;
         let covered = self.clearcoat > 0.0 || self.sheen_color != Rgb::ZERO;
         perfect && (glass || self.metallic == 1.0) && !covered

@@ -232,12 +232,13 @@ impl<'a> Sppm<'a> {
         (maps, Work { light_paths: u64::from(pass.paths()), photons })
     }
 
-    /// Maps of the photons of iteration `i`, and of how many light paths, of kinds that are sent.
+    /// Maps of the photons of iteration `i`, and of how many light paths, if sharp lobes may merge them: those of caustics, if they are sent.
     fn build(&self, photons: Photons, paths: u32, i: u64) -> Maps {
         let scatters = self.eye.scene.survey.scattering();
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
-        let mut sent = self.kinds().map(|sent| if sent { paths } else { 0 }).into_iter();
-        let surface = photons.surface.map(|photons| PhotonMap::build(photons).of_paths(sent.next().unwrap_or(0)));
+        let [others, caustics] = photons.surface.map(PhotonMap::build);
+        let [_, caustics_sent] = self.kinds();
+        let surface = [others, caustics.of_paths(if caustics_sent { paths } else { 0 })];
         Maps { surface, volume, comb: Comb::new(self.settings.seed, i) }
     }
 

@@ -93,9 +93,9 @@ impl Survey {
         }
         survey.solids = solids > 0;
         survey.null_boundaries |= solids > 1;
-        survey.glints = perfect && sharp && lights.emitters().iter().any(|emitter| !emitter.is_delta());
         for emitter in lights.emitters() {
             survey.delta_lights |= emitter.is_delta();
+            survey.glints |= perfect && sharp && !emitter.is_delta();
             survey.infinite_lights |= matches!(emitter, Emitter::Sun { .. } | Emitter::Environment);
         }
         survey

@@ -3,7 +3,7 @@
 //! Connections find some caustics well and others hardly ever, those seen through the glass that makes them first of all. Merging finds both. So blocks of pixels whose
 //! caustics connections leave darker than merging does, by more than chance, are taken for missing light, and that for an error.
 
-use super::trial::{DARK, mean};
+use super::trial::{mean, scale};
 use crate::estimator::Pixel;
 use crate::math::DVec3;
 use crate::stat::Welford;
@@ -61,7 +61,7 @@ impl Caustics {
         let error = |(index, value): (usize, f64)| {
             let ((own, own_noise), (all, noise)) = (of(self, index), of(complete, index));
             let (lacks, noise) = (all - own, own_noise + noise);
-            if lacks > SIGNIFICANT * noise.sqrt() { (lacks * lacks - noise) / (value * value + DARK) } else { 0.0 }
+            if lacks > SIGNIFICANT * noise.sqrt() { (lacks * lacks - noise) * scale(value) } else { 0.0 }
         };
         let blocks = values.len().max(1) as f64;
         values.into_iter().enumerate().map(error).sum::<f64>() / blocks
@@ -70,6 +70,7 @@ impl Caustics {
 
 #[cfg(test)]
 mod tests {
+    use super::super::trial::DARK;
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 

@@ -9,14 +9,12 @@ use crate::estimator::Pixel;
 pub(super) struct Room(Vec<(f64, f64)>);
 
 impl Room {
-    /// `None` where no photons are gathered in media. `widest` is the largest that each pixel's bandwidth may be, `noise` that of its photons, right on average.
-    pub fn of(pixels: &[Pixel], widest: &[f32], noise: impl Fn(usize, &Pixel) -> f64) -> Option<Room> {
-        let of_pixel = |(index, (pixel, widest)): (usize, (&Pixel, &f32))| {
-            let room = f64::from(widest / pixel.volume_bandwidth).powi(3).max(1.0);
-            (pixel.volume_bandwidth > 0.0).then(|| (room, noise(index, pixel)))
-        };
-        let room: Vec<(f64, f64)> = pixels.iter().zip(widest).enumerate().filter_map(of_pixel).collect();
-        (!room.is_empty()).then_some(Room(room))
+    /// `None` where no photons are gathered in media. `widest` is the largest that each pixel's bandwidth may be, none there; `noise` that of its photons, right on average.
+    pub fn of(pixels: &[Pixel], widest: &[f32], noise: &[f64]) -> Option<Room> {
+        let room = |pixel: &Pixel, widest: f32| f64::from(widest / pixel.volume_bandwidth).powi(3).max(1.0);
+        let of_pixel = |((pixel, &widest), &noise): ((&Pixel, &f32), &f64)| (room(pixel, widest), noise);
+        let all: Vec<(f64, f64)> = pixels.iter().zip(widest).zip(noise).map(of_pixel).collect();
+        (!all.is_empty()).then_some(Room(all))
     }
 
     /// Mean of something of the kernels' volume, if they could grow to so many times the usual.

@@ -108,18 +108,18 @@ pub(super) struct Plan {
 pub(super) const WORST: f64 = 0.01;
 const NOBODYS: f64 = 0.001;
 
-/// Variance of a pixel's mean at a level, relative to what it is worth.
-fn relative_variance(pixel: &Pixel, level: usize, value: f64) -> f64 {
-    mean(pixel.levels[level].variance_of_mean(f64::from(pixel.iterations))) / (value * value + DARK)
+/// What makes squares relative to the value of a pixel.
+pub(super) fn scale(value: f64) -> f64 {
+    1.0 / (value * value + DARK)
 }
 
 /// Sums over pixels of relative squares.
 #[derive(Default)]
 struct Sums {
-    /// Largest relative variance at the own level of pixels that are not left out.
-    most: f64,
     /// Relative variance of the mean by level.
     variance: [f64; MAX_LEVELS],
+    /// Relative noise of photons, by pixel and right on average but for a factor; 0 where a pixel is left out.
+    noise: Vec<f64>,
     /// The largest at the own level.
     tail: Tail,
     differences: Differences,
@@ -134,13 +134,17 @@ impl Sums {
     /// `values`: what pixels are relative to.
     fn of(pixels: &[Pixel], levels: Levels, values: &[f64]) -> Sums {
         let own = levels.own();
-        let of_own = |(pixel, value): (&Pixel, &f64)| relative_variance(pixel, own, *value);
-        let mut variances: Vec<f64> = pixels.iter().zip(values).map(of_own).collect();
+        let relative = |pixel: &Pixel, level: usize, value: f64| {
+            mean(pixel.levels[level].variance_of_mean(f64::from(pixel.iterations))) * scale(value)
+        };
+        let mut variances: Vec<f64> =
+            pixels.iter().zip(values).map(|(pixel, value)| relative(pixel, own, *value)).collect();
         let worst = (variances.len() as f64 * WORST) as usize;
         let last = variances.len().saturating_sub(1 + worst);
         let most = *variances.select_nth_unstable_by(last, f64::total_cmp).1;
-        let mut sums = Sums { most, tail: Tail::of(&mut variances), ..Sums::default() };
-        for (pixel, value) in pixels.iter().zip(values) {
+        let noise = vec![0.0; pixels.len()];
+        let mut sums = Sums { noise, tail: Tail::of(&mut variances), ..Sums::default() };
+        for (index, (pixel, value)) in pixels.iter().zip(values).enumerate() {
             if pixel.iterations < 2 {
                 continue;
             }
@@ -149,13 +153,14 @@ impl Sums {
             let all = parts.emission + parts.direct + parts.indirect + parts.caustic + parts.volume;
             sums.light += mean(all) / n;
             sums.caustics += mean(parts.caustic) / n;
-            if relative_variance(pixel, own, *value) > most {
+            let variance: [f64; MAX_LEVELS] = std::array::from_fn(|level| relative(pixel, level, *value));
+            if variance[own] > most {
                 continue;
             }
-            for (level, sum) in sums.variance[..levels.count].iter_mut().enumerate() {
-                *sum += relative_variance(pixel, level, *value);
-            }
-            sums.differences.add(pixel, 1.0 / (value * value + DARK));
+            sums.variance.iter_mut().zip(variance).for_each(|(sum, variance)| *sum += variance);
+            // That of eye paths is the same at all levels.
+            sums.noise[index] = variance[own.saturating_sub(1)] - variance[levels.count - 1];
+            sums.differences.add(pixel, scale(*value));
             sums.pixels += 1.0;
         }
         sums
@@ -187,6 +192,8 @@ pub(super) struct Running<'a> {
     once: f64,
     spent: f64,
     found: Caustics,
+    /// The largest that bandwidths in media may be, by pixel; empty where no photons are gathered there.
+    widest: Vec<f32>,
     iterations: u64,
 }
 
@@ -202,7 +209,9 @@ impl<'a> Running<'a> {
         let session = Session::new(stage);
         let cost = cost_with(session.guide());
         let (found, spent) = (Caustics::default(), setup * once);
-        Running { way: *way, of, stage, session, cost, once, spent, found, iterations: 0 }
+        let in_media = session.pixels().iter().any(|pixel| pixel.volume_bandwidth > 0.0);
+        let widest = if in_media { stage.widest_in_media() } else { Vec::new() };
+        Running { way: *way, of, stage, session, cost, once, spent, found, widest, iterations: 0 }
     }
 
     /// Adds as many iterations as so many core-seconds allow, up to at least and at most so many in all; no more than the least once `stop` holds.
@@ -243,15 +252,7 @@ impl<'a> Running<'a> {
         let sums = Sums::of(self.session.pixels(), levels, values);
         let (done, pixels) = (self.iterations as f64, sums.pixels.max(1.0));
         let relative = |sum: f64| sum / pixels;
-        // Noise of eye paths is the same at all levels.
-        let noise = |index: usize, pixel: &Pixel| {
-            let variance = |level: usize| relative_variance(pixel, level, values[index]);
-            let is_left_out = variance(levels.own()) > sums.most;
-            if is_left_out { 0.0 } else { variance(levels.own().saturating_sub(1)) - variance(levels.count - 1) }
-        };
-        let in_media = self.session.pixels().iter().any(|pixel| pixel.volume_bandwidth > 0.0);
-        let widest = if in_media { self.stage.widest_in_media() } else { Vec::new() };
-        let room = Room::of(self.session.pixels(), &widest, noise);
+        let room = Room::of(self.session.pixels(), &self.widest, &sums.noise);
         let gathers = of.method.gathers();
         let variance = relative(sums.variance[levels.own()]);
         let (fixed, photons) = if gathers { split(&sums.variance.map(relative)) } else { (variance, 0.0) };

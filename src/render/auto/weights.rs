@@ -6,7 +6,7 @@
 
 use super::Way;
 use super::contest::ITERATIONS;
-use super::trial::{self, DARK, WORST, mean, values};
+use super::trial::{self, WORST, mean, scale, values};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
@@ -124,7 +124,7 @@ impl Scale<'_> {
     /// relMSE by lack of the light, and its standard error, without the pixels where the halves disagree most.
     fn relmse(&self, [first, second]: &[Vec<DVec3>; 2]) -> (f64, f64) {
         let pixels = first.iter().zip(second).zip(self.values).map(|((first, second), value)| {
-            let (scale, apart) = (1.0 / (value * value + DARK), *first - *second);
+            let (scale, apart) = (scale(*value), *first - *second);
             (mean(apart * apart) * scale, mean(*first * *second) * scale)
         });
         let mut pixels: Vec<(f64, f64)> = pixels.collect();
