@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
 # Installs what is missing on Debian (12, 13, and relatives with apt) and leaves alone what is there.
 #
-#   scripts/setup.sh render    what building and rendering need: Rust (checked), a C linker, Embree, ONNX Runtime
+#   scripts/setup.sh render    what building and rendering need: Rust (checked), a C linker, Embree, ONNX Runtime; and
+#                              Open Image Denoise, where it can be had
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
 #   scripts/setup.sh test      python, and Blender as a Python module in .venv-bpy
 #
 # Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
-# CAUSTIQUE_EMBREE and CAUSTIQUE_ONNXRUNTIME name libraries to use instead; CAUSTIQUE_PYTHON names a Python.
+# CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
+# Python.
 
 set -euo pipefail
 
@@ -142,19 +144,32 @@ need_venv_module() {
         fail "$(command -v "$PYTHON") has no venv module" "set CAUSTIQUE_PYTHON=/usr/bin/python3"
 }
 
-find_onnxruntime() { ONNXRUNTIME=$("$PYTHON" "$ROOT/scripts/setup_onnxruntime.py"); }
+# find_library NAME: prints version and path
+find_library() { "$PYTHON" "$ROOT/scripts/setup_library.py" "$1"; }
 
-# unpack_onnxruntime TEMPORARY. The library inside the wheel does not depend on the Python; naming one takes the wheel
+# fetch_library NAME TEMPORARY. The libraries inside the wheels do not depend on the Python; naming one takes a wheel
 # whatever the Python here.
-unpack_onnxruntime() {
-    "$PYTHON" -m venv "$1/venv" &&
-        "$1/venv/bin/python" -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
-            --python-version 3.11 -d "$1" -r "$ROOT/scripts/requirements-onnxruntime.txt" >&2 &&
-        "$PYTHON" "$ROOT/scripts/setup_onnxruntime.py" unpack "$1"/onnxruntime-*.whl >/dev/null
+fetch_library() {
+    "$PYTHON" -m venv "$2/venv" &&
+        "$2/venv/bin/python" -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
+            --require-hashes --python-version 3.11 -d "$2" -r "$ROOT/scripts/requirements-$1.txt" >&2 &&
+        "$PYTHON" "$ROOT/scripts/setup_library.py" "$1" unpack "$2"/*.whl >/dev/null
 }
 
+# unpack_library NAME: from its Python wheel into .deps
+unpack_library() {
+    local temporary status=0
+    need_venv_module
+    temporary=$(mktemp -d)
+    fetch_library "$1" "$temporary" || status=1
+    rm -rf "$temporary"
+    return "$status"
+}
+
+find_onnxruntime() { ONNXRUNTIME=$(find_library onnxruntime); }
+
 need_onnxruntime() {
-    local package temporary
+    local package
     find_onnxruntime && return
     [ -z "${CAUSTIQUE_ONNXRUNTIME:-}" ] ||
         fail "CAUSTIQUE_ONNXRUNTIME=$CAUSTIQUE_ONNXRUNTIME is no ONNX Runtime 1.17 or newer" "name its libonnxruntime.so, or unset it"
@@ -164,16 +179,27 @@ need_onnxruntime() {
         apt_install "$package"
     else
         say "unpacking ONNX Runtime from its Python wheel into .deps/onnxruntime"
-        need_venv_module
-        temporary=$(mktemp -d)
-        if ! unpack_onnxruntime "$temporary"; then
-            rm -rf "$temporary"
+        unpack_library onnxruntime ||
             fail "pip could not fetch ONNX Runtime" \
                 "check the network, or install it and set CAUSTIQUE_ONNXRUNTIME to libonnxruntime.so"
-        fi
-        rm -rf "$temporary"
     fi
     find_onnxruntime || fail "the installed ONNX Runtime does not load" "set CAUSTIQUE_ONNXRUNTIME to a working libonnxruntime.so"
+}
+
+find_oidn() { OIDN=$(find_library oidn); }
+
+# Rendering does without, so only what the user named must be right.
+need_oidn() {
+    find_oidn && return
+    [ -z "${CAUSTIQUE_OIDN:-}" ] ||
+        fail "CAUSTIQUE_OIDN=$CAUSTIQUE_OIDN is no Open Image Denoise 2" "name its libOpenImageDenoise.so, or unset it"
+    say "unpacking Open Image Denoise from a Python wheel into .deps/oidn"
+    # In a shell of its own, because what fails in there would end this one.
+    if ! (unpack_library oidn) || ! find_oidn; then
+        OIDN=none
+        say "warning: Open Image Denoise could not be had here; rendering does without." \
+            "Where you have it, set CAUSTIQUE_OIDN to libOpenImageDenoise.so"
+    fi
 }
 
 # need_venv DIRECTORY PYTHON REQUIREMENTS: a virtual environment with exactly these requirements
@@ -226,7 +252,8 @@ setup() {
     need_python
     need_embree
     need_onnxruntime
-    say "Embree: $EMBREE; ONNX Runtime: $ONNXRUNTIME"
+    need_oidn
+    say "Embree: $EMBREE; ONNX Runtime: $ONNXRUNTIME; Open Image Denoise: $OIDN"
     [ "$1" != render ] || return 0
     need_venv_module
     need_venv .venv "$PYTHON" requirements-test.txt

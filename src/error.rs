@@ -20,7 +20,7 @@ pub enum Kind {
     Image,
     /// A file or folder cannot be opened, read, written or renamed.
     Io,
-    /// A shared library (Embree, ONNX Runtime) is missing or refuses.
+    /// A shared library (Embree, ONNX Runtime, Open Image Denoise) is missing or refuses.
     Library,
     /// A network file is not what the combiner needs.
     Model,

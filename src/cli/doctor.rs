@@ -3,10 +3,11 @@
 use super::{print, print_json};
 use caustique::error::{Error, Kind, Result};
 use caustique_embree as embree;
+use caustique_oidn as oidn;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Say which Embree and ONNX Runtime are found, where, which versions, and what to install if not
+/// Say which Embree, ONNX Runtime and Open Image Denoise are found, where, which versions, and what to install if not
 #[derive(clap::Args)]
 pub struct DoctorArgs {
     /// Print one JSON object
@@ -24,7 +25,7 @@ struct Finding {
 
 /// Looks for the libraries and reports; an error if one is missing.
 pub fn run(args: &DoctorArgs) -> Result<()> {
-    let findings = [embree(), onnxruntime()];
+    let findings = [embree(), onnxruntime(), oidn()];
     if args.json {
         let mut object = serde_json::Map::new();
         object.insert("version".into(), env!("CARGO_PKG_VERSION").into());
@@ -64,6 +65,14 @@ fn onnxruntime() -> Finding {
     Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", found }
 }
 
+fn oidn() -> Finding {
+    let found = match oidn::Library::load() {
+        Ok(library) => Ok((library.version().to_string(), show(library.path()))),
+        Err(error) => Err((error.to_string(), error.hint())),
+    };
+    Finding { name: "Open Image Denoise", key: "oidn", needed_for: "denoise", found }
+}
+
 fn show(path: &Path) -> String {
     path.display().to_string()
 }
@@ -78,10 +87,10 @@ impl Finding {
 
     fn text(&self) -> String {
         match &self.found {
-            Ok((version, path)) => format!("{:<13} {version:<14} {path}\n", self.name),
+            Ok((version, path)) => format!("{:<18} {version:<14} {path}\n", self.name),
             Err((cause, hint)) => {
-                let hint = hint.as_ref().map(|h| format!("{:<13} {h}\n", "")).unwrap_or_default();
-                format!("{:<13} not usable, needed to {}: {cause}\n{hint}", self.name, self.needed_for)
+                let hint = hint.as_ref().map(|h| format!("{:<18} {h}\n", "")).unwrap_or_default();
+                format!("{:<18} not usable, needed to {}: {cause}\n{hint}", self.name, self.needed_for)
             }
         }
     }

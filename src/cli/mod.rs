@@ -43,7 +43,7 @@ enum Command {
     Converge(Box<converge::ConvergeArgs>),
     /// Say what a scene or an EXR holds
     Info(info::InfoArgs),
-    /// Say which Embree and ONNX Runtime are found, and what to install if not
+    /// Say which Embree, ONNX Runtime and Open Image Denoise are found, and what to install if not
     Doctor(doctor::DoctorArgs),
 }
 

@@ -259,21 +259,35 @@ fn missing_libraries() {
     assert_eq!(outcome.code, Some(1));
     assert!(outcome.stderr.contains("Embree") && outcome.stderr.contains("\nhint: "), "{}", outcome.stderr);
 
-    for (variable, key, name) in
-        [("CAUSTIQUE_EMBREE", "embree", "Embree"), ("CAUSTIQUE_ONNXRUNTIME", "onnxruntime", "ONNX Runtime")]
-    {
+    let libraries = [
+        ("CAUSTIQUE_EMBREE", "embree", "Embree", "Debian"),
+        ("CAUSTIQUE_ONNXRUNTIME", "onnxruntime", "ONNX Runtime", "Debian"),
+        ("CAUSTIQUE_OIDN", "oidn", "Open Image Denoise", "run scripts/setup.sh, or set CAUSTIQUE_OIDN to "),
+    ];
+    for (variable, key, name, advice) in libraries {
         let outcome = missing(variable, "doctor --json");
         assert_eq!(outcome.code, Some(1));
-        let other = if key == "embree" { "onnxruntime" } else { "embree" };
         let json = outcome.json();
         assert_eq!(json[key]["found"], false);
-        assert!(json[key]["hint"].as_str().is_some_and(|hint| hint.contains("Debian")), "{json}");
-        assert_eq!(json[other]["found"], true, "{json}");
-        assert!(json[other]["version"].as_str().is_some_and(|version| version.contains('.')), "{json}");
+        assert!(json[key]["hint"].as_str().is_some_and(|hint| hint.contains(advice)), "{json}");
+        for (_, other, ..) in libraries.iter().filter(|(_, other, ..)| *other != key) {
+            assert_eq!(json[other]["found"], true, "{json}");
+            assert!(json[other]["version"].as_str().is_some_and(|version| version.contains('.')), "{json}");
+        }
         assert!(outcome.stderr.starts_with(&format!("doctor: cannot use {name}\nhint: ")), "{}", outcome.stderr);
     }
     let well = folder.run("doctor");
     assert_eq!((well.code, well.stderr.as_str()), (Some(0), ""));
+    let names = ["caustique ", "Embree ", "ONNX Runtime ", "Open Image Denoise "];
+    let lines: Vec<&str> = well.stdout.lines().collect();
+    assert!(lines.len() == 4 && lines.iter().zip(names).all(|(line, name)| line.starts_with(name)), "{lines:?}");
+    let unwell = missing("CAUSTIQUE_OIDN", "doctor");
+    let indent = " ".repeat(18);
+    let text = format!(
+        "Open Image Denoise not usable, needed to denoise: CAUSTIQUE_OIDN=/no/such/library.so: no such file\n\
+         {indent} run scripts/setup.sh, or set CAUSTIQUE_OIDN to libOpenImageDenoise.so\n"
+    );
+    assert!(unwell.stdout.ends_with(&text), "{}", unwell.stdout);
 }
 
 /// Methods that gather photons on surfaces alone, or those of caustics alone, would show no light that media scatter, or some of it: they refuse, before any work is done.

@@ -1,0 +1,73 @@
+//! The C functions and constants we use, and nothing more. All are in every version 2.
+
+use std::ffi::{c_char, c_int, c_void};
+
+/// A device or a filter: opaque pointers, null on failure.
+pub type Handle = *mut c_void;
+
+/// The kind of device that computes on the processor.
+pub const DEVICE_TYPE_CPU: c_int = 1;
+
+/// Pixels of three floats.
+pub const FORMAT_FLOAT3: c_int = 3;
+
+/// From version 2.3 on.
+pub const QUALITY_FAST: c_int = 4;
+pub const QUALITY_BALANCED: c_int = 5;
+pub const QUALITY_HIGH: c_int = 6;
+
+/// What [`Functions::device_error`] returns when there was none.
+pub const NO_ERROR: c_int = 0;
+
+/// The library's error codes, as words.
+pub fn error_name(code: c_int) -> &'static str {
+    match code {
+        2 => "invalid argument",
+        3 => "invalid operation",
+        4 => "out of memory",
+        5 => "this processor is not supported",
+        6 => "cancelled",
+        _ => "unknown error",
+    }
+}
+
+/// Declares a table of function pointers and the function that fills it from a library.
+macro_rules! functions {
+    ($(#[$doc:meta])* $table:ident { $($field:ident = $symbol:literal ($($argument:ty),*) $(-> $result:ty)?;)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        pub struct $table { $(pub $field: unsafe extern "C" fn($($argument),*) $(-> $result)?),* }
+
+        impl $table {
+            /// # Safety
+            /// The library's symbols of these names must be Open Image Denoise's, and the library must stay loaded.
+            pub unsafe fn load(library: &libloading::Library) -> Result<Self, libloading::Error> {
+                // SAFETY: the caller vouches for the symbols' types and the library's lifetime.
+                Ok(unsafe { Self { $($field: *library.get($symbol)?),* } })
+            }
+        }
+    };
+}
+
+functions! {
+    /// The typed setters came with version 2.0: an older library lacks them, and is refused for that.
+    Functions {
+        new_device = b"oidnNewDevice\0" (c_int) -> Handle;
+        release_device = b"oidnReleaseDevice\0" (Handle);
+        commit_device = b"oidnCommitDevice\0" (Handle);
+        device_error = b"oidnGetDeviceError\0" (Handle, *mut *const c_char) -> c_int;
+        device_int = b"oidnGetDeviceInt\0" (Handle, *const c_char) -> c_int;
+        set_device_int = b"oidnSetDeviceInt\0" (Handle, *const c_char, c_int);
+        set_device_bool = b"oidnSetDeviceBool\0" (Handle, *const c_char, bool);
+        new_filter = b"oidnNewFilter\0" (Handle, *const c_char) -> Handle;
+        release_filter = b"oidnReleaseFilter\0" (Handle);
+        // Filter, name, pixels, format, width, height, then offset and strides in bytes (0: packed).
+        set_image = b"oidnSetSharedFilterImage\0"
+            (Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize);
+        unset_image = b"oidnUnsetFilterImage\0" (Handle, *const c_char);
+        set_filter_bool = b"oidnSetFilterBool\0" (Handle, *const c_char, bool);
+        set_filter_int = b"oidnSetFilterInt\0" (Handle, *const c_char, c_int);
+        commit_filter = b"oidnCommitFilter\0" (Handle);
+        execute_filter = b"oidnExecuteFilter\0" (Handle);
+    }
+}

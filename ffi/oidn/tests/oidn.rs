@@ -1,0 +1,273 @@
+//! The binding against whichever Open Image Denoise `CAUSTIQUE_OIDN` names, or the one that is found.
+
+use std::sync::OnceLock;
+
+use caustique_oidn::{Device, Error, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
+
+const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::High];
+
+/// The library under test, opened once.
+fn library() -> &'static Library {
+    static LIBRARY: OnceLock<Library> = OnceLock::new();
+    LIBRARY.get_or_init(|| Library::load().unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint())))
+}
+
+fn device(threads: usize) -> Device {
+    Device::new(library(), threads).unwrap()
+}
+
+/// Uniform in [0, 2), by SplitMix64: a constant picture of 1 with noise.
+fn noise(pixels: usize, seed: u64) -> Vec<[f32; 3]> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 23) as f32
+    };
+    (0..pixels).map(|_| std::array::from_fn(|_| next())).collect()
+}
+
+/// Root of the mean square of the distance from 1.
+fn deviation(pixels: &[[f32; 3]]) -> f64 {
+    let squares: f64 = pixels.iter().flatten().map(|&value| (f64::from(value) - 1.0).powi(2)).sum();
+    (squares / (3 * pixels.len()) as f64).sqrt()
+}
+
+fn bits(pixels: &[[f32; 3]]) -> Vec<u32> {
+    pixels.iter().flatten().map(|value| value.to_bits()).collect()
+}
+
+/// A picture with both guides.
+fn guided<'a>(
+    (width, height): (usize, usize),
+    color: &'a [[f32; 3]],
+    albedo: &'a [[f32; 3]],
+    normal: &'a [[f32; 3]],
+) -> Input<'a> {
+    Input { albedo: Some(albedo), normal: Some(normal), ..Input::new(width, height, color) }
+}
+
+#[test]
+fn library_says_what_it_is_and_is_the_same_the_second_time() {
+    let library = library();
+    assert!(library.version() >= Version { major: 2, minor: 0, patch: 0 }, "{library:?}");
+    assert!(library.version().to_string().starts_with("2."), "{library:?}");
+    let path = library.path();
+    assert!(path.is_absolute() && path.is_file() && !path.is_symlink(), "{library:?}");
+    assert!(path.file_name().unwrap().to_string_lossy().starts_with("libOpenImageDenoise.so"), "{library:?}");
+    let again = Library::load().unwrap();
+    assert_eq!((again.path(), again.version()), (path, library.version()));
+}
+
+#[test]
+fn noise_about_a_constant_is_taken_out() {
+    let (width, height) = (96, 80);
+    let color = noise(width * height, 1);
+    let before = deviation(&color);
+    assert!((0.55..0.6).contains(&before), "{before}");
+    let flat = vec![[0.5; 3]; width * height];
+    let up = vec![[0.0, 0.0, 1.0]; width * height];
+    let device = device(1);
+    for quality in QUALITIES {
+        let mut input = Input { quality, ..Input::new(width, height, &color) };
+        let check = |input: &Input, name: &str| {
+            let output = device.denoise(input).unwrap();
+            assert_eq!(output.len(), color.len());
+            let after = deviation(&output);
+            assert!(after < 0.15 * before, "{quality:?}, {name}: {after} of {before}");
+        };
+        check(&input, "alone");
+        input.albedo = Some(&flat);
+        check(&input, "albedo");
+        input.normal = Some(&up);
+        check(&input, "albedo and normal");
+        input.clean_aux = true;
+        check(&input, "clean guides");
+    }
+}
+
+/// An edge that only the guides know sharply is kept where it is.
+#[test]
+fn guides_are_looked_at() {
+    let (width, height) = (64, 64);
+    let left = |k: usize| k % width < width / 2;
+    let shade = |k: usize| if left(k) { 0.2 } else { 1.0 };
+    let color: Vec<[f32; 3]> =
+        noise(width * height, 2).iter().enumerate().map(|(k, p)| p.map(|v| v * shade(k))).collect();
+    let albedo: Vec<[f32; 3]> = (0..width * height).map(|k| [shade(k); 3]).collect();
+    let error = |output: Vec<[f32; 3]>| -> f32 {
+        let near = |k: &usize| (width / 2 - 2..width / 2 + 2).contains(&(k % width));
+        (0..width * height).filter(near).flat_map(|k| output[k].map(|v| (v - shade(k)).powi(2))).sum()
+    };
+    let device = device(1);
+    let alone = Input::new(width, height, &color);
+    let guided = Input { albedo: Some(&albedo), clean_aux: true, ..alone };
+    let (without, with) = (error(device.denoise(&alone).unwrap()), error(device.denoise(&guided).unwrap()));
+    assert!(with < 0.5 * without, "{with} with, {without} without");
+}
+
+/// What the crate's documentation promises of bytes: one, two or more threads, once or again, a new filter or a used
+/// one, in one piece or in tiles.
+#[test]
+fn same_bytes_whatever_the_threads() {
+    for (width, height) in [(1, 1), (1, 50), (2, 3), (64, 64), (320, 180), (641, 359), (1280, 720)] {
+        let pixels = width * height;
+        let (color, albedo, normal) = (noise(pixels, 3), noise(pixels, 4), noise(pixels, 5));
+        let [mut one, mut two] = [1, 2].map(|threads| device(threads).filter().unwrap());
+        // The large one is there for its tiles and takes long.
+        let large = pixels > 300_000;
+        let qualities = if large { &QUALITIES[..1] } else { &QUALITIES[..] };
+        for &quality in qualities {
+            let input = Input { quality, ..guided((width, height), &color, &albedo, &normal) };
+            let first = bits(&one.denoise(&input).unwrap());
+            let name = format!("{width}x{height}, {quality:?}");
+            assert!(bits(&two.denoise(&input).unwrap()) == first, "{name}: two threads");
+            let tiles = Input { max_memory_mib: Some(100), ..input };
+            assert!(bits(&two.denoise(&tiles).unwrap()) == first, "{name}: tiles");
+            if !large {
+                assert!(bits(&one.denoise(&input).unwrap()) == first, "{name}: again");
+                assert!(bits(&device(5).denoise(&input).unwrap()) == first, "{name}: five threads");
+            }
+        }
+    }
+}
+
+/// A filter remembers nothing of earlier pictures: sizes, guides and settings come and go.
+#[test]
+fn a_filter_serves_many_pictures() {
+    let device = device(2);
+    let mut filter = device.filter().unwrap();
+    let (albedo, normal) = (noise(40 * 30, 6), noise(40 * 30, 7));
+    let colors = [noise(40 * 30, 8), noise(40 * 30, 9)];
+    let plain = Input::new(40, 30, &colors[0]);
+    let both = guided((40, 30), &colors[0], &albedo, &normal);
+    let small = Input::new(7, 5, &colors[1][..35]);
+    let inputs = [
+        both,
+        Input { color: &colors[1], ..both },
+        plain,
+        small,
+        Input { quality: Quality::Fast, ..both },
+        Input { hdr: false, ..both },
+        Input { clean_aux: true, ..plain },
+        Input { clean_aux: true, ..both },
+        Input { albedo: Some(&albedo), ..plain },
+        Input { max_memory_mib: Some(0), ..both },
+        Input { max_memory_mib: Some(u32::MAX), ..small },
+        both,
+    ];
+    let mut seen = Vec::new();
+    for (k, input) in inputs.iter().enumerate() {
+        let found = filter.denoise(input).unwrap();
+        // Its guides are elsewhere the next time, and what was there is gone.
+        let copies = [input.albedo, input.normal].map(|guide| guide.map(<[_]>::to_vec));
+        let moved = Input { albedo: copies[0].as_deref(), normal: copies[1].as_deref(), ..*input };
+        assert!(bits(&filter.denoise(&moved).unwrap()) == bits(&found), "picture {k}, moved");
+        assert!(bits(&device.denoise(input).unwrap()) == bits(&found), "picture {k}, another filter");
+        seen.push(bits(&found));
+    }
+    assert!(seen[0] == seen[11] && seen[0] != seen[1] && seen[0] != seen[5] && seen[0] != seen[7]);
+    assert!(seen[2] == seen[6], "clean guides that are none");
+}
+
+#[test]
+fn two_devices_on_two_threads_and_one_device_on_two() {
+    let (width, height) = (150, 100);
+    let pictures: Vec<_> = (0..4).map(|seed| noise(width * height, 10 + seed)).collect();
+    let alone = device(1);
+    let denoise =
+        |device: &Device, color: &[[f32; 3]]| bits(&device.denoise(&Input::new(width, height, color)).unwrap());
+    let expected: Vec<_> = pictures.iter().map(|picture| denoise(&alone, picture)).collect();
+    for shared in [false, true] {
+        std::thread::scope(|scope| {
+            for half in 0..2 {
+                let device = if shared { alone.clone() } else { device(1 + half) };
+                let (pictures, expected) = (&pictures[2 * half..][..2], &expected[2 * half..][..2]);
+                scope.spawn(move || {
+                    for _ in 0..3 {
+                        for (picture, expected) in pictures.iter().zip(expected) {
+                            assert!(denoise(&device, picture) == *expected, "shared: {shared}");
+                        }
+                    }
+                });
+            }
+        });
+    }
+    // A filter goes to another thread, and outlives the device it was made with.
+    let mut filter = device(1).filter().unwrap();
+    let picture = &pictures[0];
+    let moved = std::thread::spawn({
+        let picture = picture.clone();
+        move || bits(&filter.denoise(&Input::new(width, height, &picture)).unwrap())
+    });
+    assert!(moved.join().unwrap() == expected[0]);
+}
+
+/// Nothing that is not a picture reaches the library.
+#[test]
+fn sizes_and_lengths_are_checked() {
+    let device = device(1);
+    let mut filter = device.filter().unwrap();
+    let mut refused = |input: &Input| {
+        let error = device.denoise(input).unwrap_err();
+        assert_eq!(filter.denoise(input).unwrap_err(), error);
+        error.to_string()
+    };
+    let pixels = noise(12, 20);
+    let limits = "pixels cannot be denoised: sides from 1 to 65536 can";
+    for (width, height) in
+        [(0, 0), (0, 5), (5, 0), (usize::MAX, 2), (2, usize::MAX), (MAX_SIDE + 1, 1), (1 << 63, 1 << 63)]
+    {
+        for color in [&[][..], &pixels] {
+            let text = refused(&Input::new(width, height, color));
+            assert_eq!(text, format!("a picture of {width} x {height} {limits}"));
+        }
+    }
+    let right = Input::new(4, 3, &pixels);
+    assert_eq!(refused(&Input { color: &pixels[1..], ..right }), "color: 11 pixels are not 4 x 3");
+    assert_eq!(refused(&Input { height: 4, ..right }), "color: 12 pixels are not 4 x 4");
+    assert_eq!(
+        refused(&Input { width: MAX_SIDE, height: MAX_SIDE, ..right }),
+        "color: 12 pixels are not 65536 x 65536"
+    );
+    assert_eq!(refused(&Input { albedo: Some(&[]), ..right }), "albedo: 0 pixels are not 4 x 3");
+    let guides = Input { albedo: Some(&pixels), normal: Some(&pixels[..6]), ..right };
+    assert_eq!(refused(&guides), "normal: 6 pixels are not 4 x 3");
+    assert_eq!(refused(&Input { normal: Some(&pixels), ..right }), "normals guide only together with albedo");
+    assert_eq!(Error::NormalWithoutAlbedo.hint().as_deref(), Some("give albedo, too, or leave normals out"));
+    assert!(filter.denoise(&right).is_ok(), "the filter serves on");
+}
+
+#[test]
+fn odd_values_do_no_harm() {
+    let (width, height) = (33, 17);
+    let (clean, device) = (noise(width * height, 21), device(1));
+    for odd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0, f32::MIN_POSITIVE / 4.0] {
+        let mut dirty = clean.clone();
+        dirty[0] = [odd; 3];
+        dirty[width * height / 2][1] = odd;
+        let everywhere = vec![[odd; 3]; width * height];
+        for hdr in [false, true] {
+            for (color, guide) in [(&dirty, &clean), (&clean, &dirty), (&everywhere, &everywhere)] {
+                let input = Input { hdr, ..guided((width, height), color, guide, guide) };
+                for input in [input, Input { albedo: None, normal: None, ..input }] {
+                    let output = device.denoise(&input).unwrap();
+                    let bad = output.iter().flatten().find(|value| !value.is_finite() || **value < 0.0);
+                    assert!(bad.is_none(), "{odd}, hdr {hdr}: {bad:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn threads_without_sense() {
+    let error = Device::new(library(), MAX_THREADS + 1).err().unwrap();
+    assert_eq!(error.to_string(), "4097 threads are more than 4096");
+    assert!(matches!(Device::new(library(), usize::MAX), Err(Error::TooManyThreads(usize::MAX))));
+    for threads in [0, MAX_THREADS] {
+        assert_eq!(device(threads).denoise(&Input::new(1, 1, &[[1.0; 3]])).unwrap().len(), 1);
+    }
+}
