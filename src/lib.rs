@@ -1,6 +1,6 @@
 //! caustique renders caustics, and caustics seen through glass, water and mirrors.
 //!
-//! Data flows one way: scene file -> [`scene::Description`] -> scene -> plan -> passes -> estimator -> layers -> EXR -> combiner.
+//! Data flows one way: scene file -> [`scene::Description`] -> scene -> plan -> passes -> estimator -> layers -> finish -> EXR.
 //! Each module uses only modules declared above it ([`error`] may be used anywhere).
 
 pub mod error;
@@ -44,6 +44,8 @@ pub mod film;
 pub mod image;
 
 pub mod combine;
+
+pub mod finish;
 
 pub mod render;
 

@@ -456,7 +456,7 @@ fn techniques_share_the_picture() {
         (Method::Vcm, 5, &["hit_s0_t3", "nextevent_s1_t3", "connect_s3_t2", "merge_s3_t3"]),
     ];
     for (method, levels, expected) in cases {
-        let settings = Settings { levels: Levels::new(levels), techniques: true, ..settings(5, 0.08, 3) };
+        let settings = Settings { levels: Levels::decorrelated(levels), techniques: true, ..settings(5, 0.08, 3) };
         let rendered = render(&scene, method, 40, &settings);
         let plain = render(&scene, method, 40, &Settings { techniques: false, ..settings.clone() });
         let own = settings.levels.own();
@@ -493,7 +493,7 @@ fn threads_and_shards_change_nothing() {
         let levels = rendered.pixels.iter().flat_map(|p| p.levels[..5].iter());
         levels.map(|l| l.mean.to_array()).collect()
     };
-    let base = Settings { levels: Levels::new(5), ..settings(6, 0.08, 7) };
+    let base = Settings { levels: Levels::decorrelated(5), ..settings(6, 0.08, 7) };
     for method in [Method::Bdpt, Method::Bpm, Method::Vcm, Method::Cppm] {
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");

@@ -5,13 +5,14 @@
 mod support;
 
 use caustique::estimator::{InitialBandwidth, Pixel};
+use caustique::finish::{Denoiser, Finish};
 use caustique::light::{Guide, Region};
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
 use caustique::plan::{ClassSet, Effect, PathClass, switch};
 use caustique::random::Domain;
-use caustique::render::auto::{Choice, Free, Way, Weight, choose};
+use caustique::render::auto::{Choice, Way, Weight, choose};
 use caustique::render::output::Present;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
@@ -295,8 +296,8 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(W
     let settings = |way| Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(way) };
     let make = |way| allowed(way).then(|| settings(way));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let free = Free { photons: true, neighbours: true };
-    pool.install(|| choose((scene, &camera), free, make, || false)).expect("a choice")
+    let mut finish = Finish::new(Denoiser::Own, None);
+    pool.install(|| choose((scene, &camera), &mut finish, make, || false)).expect("a choice")
 }
 
 /// The same arguments, the same choice and the same expectations to the last bit, on any number of threads.
@@ -304,14 +305,14 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(W
 fn the_choice_does_not_depend_on_threads() {
     let scene = glass_room();
     let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
-    assert_eq!(one.trials.len(), 5, "{:?}", one.because);
+    assert_eq!(one.trials.len(), 6, "{:?}", one.because);
     assert_eq!(one.way, three.way);
     for (a, b) in one.trials.iter().zip(&three.trials) {
-        println!("{}: {:.5}", a.way.name(), a.expected.sqrt());
-        assert_eq!((a.expected.to_bits(), a.balance), (b.expected.to_bits(), b.balance), "{}", a.way.name());
+        println!("{}: {:.5}", a.way.name(), a.error());
+        assert_eq!(a.squared_error.to_bits(), b.squared_error.to_bits(), "{}", a.way.name());
     }
     let chosen = one.trial().expect("a trial");
-    assert!(one.trials.iter().all(|trial| trial.expected >= chosen.expected));
+    assert!(one.trials.iter().all(|trial| trial.squared_error >= chosen.squared_error));
     let bits = |choice: &Choice| -> Vec<_> {
         choice.weights.iter().map(|w| (w.effect, w.energy.map(f64::to_bits), w.saved.map(f64::to_bits))).collect()
     };
@@ -354,8 +355,7 @@ fn what_is_left_out_is_weighed_too() {
             let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
             (way == Way::UNTRIED).then(|| Settings { classes: off.complement(), ..settings })
         };
-        let free = Free { photons: false, neighbours: false };
-        choose((scene, &camera), free, make, || false).expect("a choice").weights
+        choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").weights
     };
     let mut matte_only = room();
     matte_only.lights.push(point_light(DVec3::new(0.0, 1.5, 0.0), 1.0));
@@ -438,8 +438,8 @@ fn a_pilot_can_be_stopped() {
             times.set(times.get() + 1);
             answer
         };
-        let choice = choose((&scene, &camera), Free { photons: true, neighbours: true }, make, stop);
-        assert!(choice.is_some_and(|choice| choice.trials.len() == 5));
+        let choice = choose((&scene, &camera), &mut Finish::new(Denoiser::Own, None), make, stop);
+        assert!(choice.is_some_and(|choice| choice.trials.len() == 6));
         times.get()
     };
     let (stopped, whole) = (asked(true), asked(false));
@@ -462,10 +462,9 @@ fn rare_caustics_are_left_to_guided_light_paths() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.5), DVec3::new(0.0, 0.05, 0.0), 50.0));
     let choice = auto(&build(description), 2, 20_000);
     for trial in &choice.trials {
-        println!("{}: {:.3e}, caustics {:.4}", trial.way.name(), trial.expected, trial.caustics);
-        assert_eq!(trial.expected.is_infinite(), !trial.way.guided);
+        println!("{}: {:.3e}", trial.way.name(), trial.squared_error);
     }
-    assert!(choice.trials.len() == 3 && choice.way.guided, "{}", choice.way.name());
+    assert!(choice.trials.len() == 4 && choice.way.guided, "{}", choice.way.name());
 }
 
 /// What a scene does not call for is not tried, and a short render tries nothing.
@@ -477,7 +476,7 @@ fn only_what_is_called_for_is_tried() {
     let matte_only = auto(&scene, 2, 20_000);
     let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.way.method).collect();
     assert_eq!(tried, [Method::Sppm, Method::Path, Method::Bdpt]);
-    assert!(matte_only.trials.iter().all(|trial| !trial.way.guided && trial.caustics == 0.0));
+    assert!(matte_only.trials.iter().all(|trial| !trial.way.guided));
     // Where nothing has narrow lobes no photons of caustics are sent.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
     let photons = |narrow_lobes| of_caustics.of_photons(Present { narrow_lobes, ..Present::default() });

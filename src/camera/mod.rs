@@ -78,6 +78,11 @@ impl Camera {
         Camera { width, height, covered, ..*self }
     }
 
+    /// The whole view in a smaller picture, `factor` times as many pixels a side, at least one: each sees as much more.
+    pub fn smaller(&self, factor: f64) -> Camera {
+        Camera { covered: self.covered, ..self.sparse(factor) }
+    }
+
     /// The same without its lens: all is sharp.
     pub fn pinhole(&self) -> Camera {
         Camera { lens_radius: 0.0, focus_distance: 1.0, ..*self }

@@ -1,79 +1,35 @@
-//! `caustique combine`: the learned combiner on layers in memory and in files.
+//! `caustique combine`: finishes a stored picture.
 
+use super::finish::FinishArgs;
 use super::output::{self, PictureArgs};
 use super::progress::duration;
 use super::say;
-use caustique::combine::{Combiner, LevelStack, Model, Runtime};
 use caustique::error::Result;
-use caustique::film::{self, Layer, LayerSet, Naming, Plane, Role};
+use caustique::film::{self, Layer, LayerSet, Naming, Plane};
 use caustique::image::exr;
 use caustique::render::Clock;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
-/// Name of the network that comes with the program.
-pub const DEFAULT_MODEL: &str = "compact";
-
-/// Run the learned combiner on a rendered EXR
+/// Finish a rendered EXR as 'caustique render' finishes its own
 ///
-/// The file needs the layers Level1, Level2, ..., their Variance1, ..., albedo, normal and depth, as 'caustique render' writes them;
-/// names as Blender gives them will do. All layers are kept, the picture itself is replaced.
+/// The file needs a picture and what tells its noise: the layers that 'caustique render' writes, or from another renderer the beauty with a layer
+/// Variance (of the mean) or two independent halves, Half1 and Half2. Albedo and normal guide the denoiser, by the names that Blender, Mitsuba, pbrt,
+/// LuxCore and Arnold give them. With --model it needs Level1, Level2, ... and Variance1, ... All layers are kept, the picture itself is replaced.
 #[derive(clap::Args)]
 pub struct CombineArgs {
-    /// EXR with bandwidth levels
+    /// EXR to finish
     input: PathBuf,
     /// EXR to write
     #[arg(short, long, value_name = "OUT.exr")]
     output: PathBuf,
-    /// Network: 'compact' comes with the program; or an ONNX file
-    #[arg(long, value_name = "compact|paper|FILE.onnx", default_value = DEFAULT_MODEL)]
-    model: String,
+    #[command(flatten)]
+    finish: FinishArgs,
     #[command(flatten)]
     picture: PictureArgs,
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads)]
     threads: usize,
-}
-
-/// A network, and how `--model` called it.
-pub struct Named {
-    /// What `--model` said.
-    pub name: String,
-    combiner: Combiner,
-}
-
-impl Named {
-    /// Finds ONNX Runtime and loads the network; the current rayon pool says how many threads it gets.
-    pub fn open(name: &str) -> Result<Named> {
-        let model = Model::open(name)?;
-        Ok(Named { name: name.into(), combiner: Combiner::new(&model, &Runtime::find()?)? })
-    }
-
-    /// The network alone.
-    pub fn into_combiner(self) -> Combiner {
-        self.combiner
-    }
-
-    /// Levels that it takes.
-    pub fn levels(&self) -> usize {
-        self.combiner.facts().levels
-    }
-
-    /// Combines the levels of `set` and makes the result its beauty; alpha stays. Returns what the header says about it.
-    pub fn apply(&mut self, set: &mut LayerSet) -> Result<Value> {
-        let combined = self.combiner.run(&LevelStack::of(set)?)?;
-        let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
-        set.layers.retain(|layer| layer.name != "Combined");
-        let layer = match alpha {
-            Some(alpha) => {
-                let pixels = combined.into_iter().zip(alpha).map(|([r, g, b], a)| [r, g, b, a]);
-                Layer::interleaved("", "RGBA", pixels)
-            }
-            None => Layer::interleaved("", "RGB", combined),
-        };
-        set.push(layer)?;
-        Ok(json!({"model": self.name, "levels": self.levels(), "training": self.combiner.facts().training}))
-    }
 }
 
 /// Names as Blender gives them back to ours. Layers with names that we cannot write are left out and returned.
@@ -97,12 +53,12 @@ fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
     left.into_iter().map(|layer| layer.name).collect()
 }
 
-/// Combines a file.
+/// Finishes a file.
 pub fn run(args: &CombineArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     super::pool(args.threads)?.install(|| {
-        let mut network = Named::open(&args.model)?;
+        let mut ready = args.finish.open(None)?;
         let (mut set, mut attributes) = exr::read(&args.input)?;
         // Names in the style of the input: cryptomatte attributes hold them too.
         let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
@@ -112,13 +68,13 @@ pub fn run(args: &CombineArgs) -> Result<()> {
             say(&format!("warning: {input}: layer \"{name}\" cannot be written under this name and is left out"));
         }
         let clock = Clock::start();
-        let facts = network.apply(&mut set).map_err(|error| error.within(args.input.display()))?;
+        let account = ready.finish().apply(&mut set, |_| true).map_err(|error| error.within(args.input.display()))?;
         let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        object["combined"] = facts;
+        object["combined"] = ready.facts(&account);
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
         args.picture.write_png(&set)?;
-        say(&format!("combined {} levels with {} in {}", network.levels(), network.name, duration(clock.seconds())));
+        say(&format!("finished with {} in {}", ready.name(), duration(clock.seconds())));
         Ok(())
     })
 }

@@ -4,6 +4,7 @@ mod combine;
 mod compare;
 mod converge;
 mod doctor;
+mod finish;
 mod info;
 mod number;
 mod output;
@@ -35,7 +36,7 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Say which effects a scene calls for, which will be simulated, and why
     Plan(Box<plan::PlanArgs>),
-    /// Run the learned combiner on a rendered EXR
+    /// Finish a rendered EXR, also one of another renderer
     Combine(combine::CombineArgs),
     /// Measure the error of an image against a reference
     Compare(compare::CompareArgs),

@@ -41,8 +41,12 @@ fn report(args: &PlanArgs) -> Result<()> {
     let camera = loaded.scene.camera(&job.view())?;
     check_media(job, &loaded.scene)?;
     let make = |way| job.allowed(way, camera.size());
-    let choice =
-        (job.method == Method::Auto).then(|| choose((&loaded.scene, &camera), job.free(), make, || false)).flatten();
+    let choice = if job.method == Method::Auto {
+        let mut finish = job.pilot_finish()?;
+        choose((&loaded.scene, &camera), &mut finish, make, || false)
+    } else {
+        None
+    };
     let wishes = Wishes::of(job, choice.as_ref());
     let mut plan = plan(&wishes, &loaded.scene, &camera, &loaded.removed);
     let of_scene = &loaded.scene.warnings;

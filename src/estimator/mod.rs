@@ -4,9 +4,11 @@ pub mod bandwidth;
 mod coverage;
 mod error;
 mod pixel;
+mod quarters;
 pub mod rule;
 
 pub use bandwidth::InitialBandwidth;
 pub use coverage::{Coverage, RANKS};
 pub use error::SquaredError;
-pub use pixel::{Parts, Pixel};
+pub use pixel::{Parts, Pixel, QUARTERS, Quarter};
+pub use quarters::variance_ratio;

@@ -25,6 +25,25 @@ pub struct Parts {
     pub volume: DVec3,
 }
 
+/// Independent groups of iterations: iteration `i` (from 1) belongs to quarter `(i - 1) % QUARTERS`.
+pub const QUARTERS: usize = 4;
+
+/// Estimates of one quarter of the iterations, of the level that is the method's own image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quarter {
+    /// Sum over the quarter's iterations.
+    pub sum: DVec3,
+    /// Iterations counted.
+    pub count: u32,
+}
+
+impl Quarter {
+    /// Mean of the quarter's iterations; zero without any.
+    pub fn mean(&self) -> DVec3 {
+        if self.count == 0 { DVec3::ZERO } else { self.sum / f64::from(self.count) }
+    }
+}
+
 /// Statistics of one pixel over the iterations so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pixel {
@@ -35,6 +54,8 @@ pub struct Pixel {
     pub differences: [Welford; MAX_LEVELS - 1],
     /// Sums of the parts.
     pub parts: Parts,
+    /// The own image by independent groups of iterations, whose points share no scramble: what variance and error are measured by.
+    pub quarters: [Quarter; QUARTERS],
     /// Sums of G-buffers over all eye paths.
     pub albedo: DVec3,
     /// See `albedo`.
@@ -67,6 +88,22 @@ impl Pixel {
         Pixel { bandwidths, z: 1e10, ..Pixel::default() }
     }
 
+    /// Variance of the mean of the own image as the quarters tell it, which is right also where iterations are not independent
+    /// within a quarter: the scatter of group means about their weighted mean, over the degrees of freedom. `None` where a quarter is empty.
+    #[inline]
+    pub fn variance_by_quarters(&self) -> Option<DVec3> {
+        if self.quarters.iter().any(|quarter| quarter.count == 0) {
+            return None;
+        }
+        let total: f64 = self.quarters.iter().map(|quarter| f64::from(quarter.count)).sum();
+        let mean = self.quarters.iter().map(|quarter| quarter.sum).sum::<DVec3>() / total;
+        let scatter = self.quarters.iter().map(|quarter| {
+            let apart = quarter.mean() - mean;
+            apart * apart * f64::from(quarter.count)
+        });
+        Some(scatter.sum::<DVec3>() / ((QUARTERS - 1) as f64 * total))
+    }
+
     /// Looks at the memory that [`Pixel::add`] is about to change, so that the processor waits for that of several pixels at once. Returns
     /// something that depends on it.
     #[inline]
@@ -75,15 +112,22 @@ impl Pixel {
         levels + self.parts.emission.x + self.parts.indirect.z + self.depth + f64::from(self.bandwidths[0])
     }
 
-    /// Adds one iteration: level 1 from `independent`, the others from `correlated` (of `count - 1` levels), or all from `independent`
-    /// when there is one level. `own` is the level (from 0) whose parts are kept.
-    pub fn add(&mut self, independent: &EyeMeasure, correlated: Option<&EyeMeasure>, count: usize, own: usize) {
+    /// Adds iteration `pass` (from 1): level 1 from `independent`, the others from `correlated` (of `count - 1` levels), or all from `independent`
+    /// when they share one eye path. `levels`: their number, and the one (from 0) whose parts are kept.
+    pub fn add(
+        &mut self,
+        pass: u64,
+        independent: &EyeMeasure,
+        correlated: Option<&EyeMeasure>,
+        levels: (usize, usize),
+    ) {
+        let (count, own) = levels;
         let mut values = [Rgb::ZERO; MAX_LEVELS];
-        values[0] = independent.radiance(0);
-        if let Some(correlated) = correlated {
-            for (level, value) in values[1..count].iter_mut().enumerate() {
-                *value = correlated.radiance(level);
-            }
+        for (level, value) in values[..count].iter_mut().enumerate() {
+            *value = match correlated {
+                Some(correlated) if level > 0 => correlated.radiance(level - 1),
+                _ => independent.radiance(level),
+            };
         }
         if !values[..count].iter().all(|v| v.is_finite()) {
             self.rejected += 1;
@@ -105,6 +149,9 @@ impl Pixel {
                 self.differences[level].add(difference, inverse_count);
             }
         }
+        let quarter = &mut self.quarters[(pass.wrapping_sub(1) % QUARTERS as u64) as usize];
+        quarter.sum += values[own].as_dvec3();
+        quarter.count += 1;
         let (measure, level) = match correlated {
             Some(correlated) if own > 0 => (correlated, own - 1),
             _ => (independent, own),
@@ -147,7 +194,7 @@ mod tests {
         };
         for media in [true, false] {
             let mut pixel = Pixel { volume_bandwidth: if media { 0.1 } else { 0.0 }, ..Pixel::new([0.1; 2]) };
-            pixel.add(&measure(0), Some(&measure(1)), 5, 3);
+            pixel.add(1, &measure(0), Some(&measure(1)), (5, 3));
             for (level, difference) in (0..).zip(&pixel.differences) {
                 let (surface, volume) = biases(level);
                 let expected = f64::from(surface + volume);

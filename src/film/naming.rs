@@ -62,10 +62,11 @@ const RADIANCE: &str = "W/(sr m^2)";
 pub fn describe(name: &str) -> Option<Description> {
     let is = |components, unit, meaning| Some(Description { components, unit, meaning });
     match name.trim_end_matches(|c: char| c.is_ascii_digit()) {
-        "" if name.is_empty() => is("RGBA", RADIANCE, "beauty: the combined image, or the estimator's own"),
-        "Noisy" => is("RGB", RADIANCE, "the estimator's image without the combiner"),
+        "" if name.is_empty() => is("RGBA", RADIANCE, "beauty: the finished image, or the estimator's own"),
+        "Noisy" => is("RGB", RADIANCE, "the estimator's image without the finish"),
         "Level" => is("RGB", RADIANCE, "estimate of one bandwidth level, 1 the smallest"),
         "Variance" => is("RGB", "(W/(sr m^2))^2", "variance of the mean of one level"),
+        "Quarter" => is("RGB", RADIANCE, "the estimator's image by every fourth iteration: four independent pictures"),
         "Radius" => is("X", "m", "bandwidth of the last iteration of one level"),
         "CausticRadius" => is("X", "m", "the same for photons of caustics, where others are gathered, too"),
         "VolumeRadius" => is("X", "m", "the same for photons in media"),
@@ -74,7 +75,12 @@ pub fn describe(name: &str) -> Option<Description> {
         "Caustic" => is("RGB", RADIANCE, "light from a rough surface that mirrors or glass sent there"),
         "Emission" => is("RGB", RADIANCE, "light that reaches the camera from its source without a rough bounce"),
         "Volume" => is("RGB", RADIANCE, "light scattered to the camera by media"),
-        "Error" => is("RGB", RADIANCE, "estimated standard error of the uncombined image (Noisy), bias included"),
+        "CombinedDirect" => is("RGB", RADIANCE, "Direct as finished; all finished parts sum to the beauty"),
+        "CombinedIndirect" => is("RGB", RADIANCE, "Indirect as finished"),
+        "CombinedCaustic" => is("RGB", RADIANCE, "Caustic as finished"),
+        "CombinedEmission" => is("RGB", RADIANCE, "Emission as finished"),
+        "CombinedVolume" => is("RGB", RADIANCE, "Volume as finished"),
+        "Error" => is("RGB", RADIANCE, "estimated standard error of the unfinished image (Noisy), bias included"),
         "albedo" => is("RGB", "1", "reflectance at the first hit that is not a mirror or clear glass"),
         "normal" => is("XYZ", "1", "world-space unit normal at that hit"),
         "depth" => is("Z", "m", "distance along the path to that hit"),
@@ -90,7 +96,7 @@ pub fn describe(name: &str) -> Option<Description> {
 /// What `--layers` asks for.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub enum Selection {
-    /// Every layer.
+    /// Every layer but `Quarter1` to `Quarter4`, which few want.
     #[default]
     All,
     /// The picture alone.
@@ -122,7 +128,7 @@ impl Selection {
     pub fn wants(&self, name: &str) -> bool {
         let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
         match self {
-            Selection::All => true,
+            Selection::All => stem != "Quarter",
             Selection::Beauty => name.is_empty(),
             Selection::List(names) => {
                 names.iter().any(|n| n == name || (n == "beauty" && name.is_empty()) || (!stem.is_empty() && n == stem))
@@ -150,11 +156,12 @@ impl Selection {
 }
 
 /// Names to suggest from; [`describe`] knows each.
-const KNOWN: [&str; 20] = [
+const KNOWN: [&str; 26] = [
     "beauty",
     "Noisy",
     "Level1",
     "Variance1",
+    "Quarter1",
     "Radius1",
     "CausticRadius1",
     "VolumeRadius1",
@@ -163,6 +170,11 @@ const KNOWN: [&str; 20] = [
     "Caustic",
     "Emission",
     "Volume",
+    "CombinedDirect",
+    "CombinedIndirect",
+    "CombinedCaustic",
+    "CombinedEmission",
+    "CombinedVolume",
     "Error",
     "albedo",
     "normal",

@@ -13,7 +13,7 @@
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
 use crate::estimator::rule::volume::level_factor;
-use crate::estimator::{Parts, Pixel, SquaredError};
+use crate::estimator::{Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
 use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Part};
@@ -47,8 +47,8 @@ pub struct Shape {
     pub volume_radius_factor: Option<f64>,
 }
 
-/// Values of one layer at one pixel, as many as it has components.
-type Get = Box<dyn Fn(&Pixel) -> [f32; 4] + Sync>;
+/// Values of one layer at one pixel, as many as it has components, given the ratio by which variances of Welford's statistics are too large.
+type Get = Box<dyn Fn(&Pixel, f64) -> [f32; 4] + Sync>;
 
 /// One of the additive parts.
 type OfParts = fn(&Parts) -> DVec3;
@@ -62,15 +62,20 @@ struct Column {
 
 impl Column {
     fn rgb(name: impl Into<String>, get: impl Fn(&Pixel) -> DVec3 + Sync + 'static) -> Column {
-        Column { name: name.into(), components: "RGB", get: Box::new(move |p| three(get(p).as_vec3())) }
+        Column { name: name.into(), components: "RGB", get: Box::new(move |p, _| three(get(p).as_vec3())) }
+    }
+
+    fn noise(name: impl Into<String>, get: impl Fn(&Pixel, f64) -> DVec3 + Sync + 'static) -> Column {
+        let get = Box::new(move |p: &Pixel, ratio: f64| three(get(p, ratio).as_vec3()));
+        Column { name: name.into(), components: "RGB", get }
     }
 
     fn xyz(name: &str, get: impl Fn(&Pixel) -> Vec3 + Sync + 'static) -> Column {
-        Column { name: name.into(), components: "XYZ", get: Box::new(move |p| three(get(p))) }
+        Column { name: name.into(), components: "XYZ", get: Box::new(move |p, _| three(get(p))) }
     }
 
     fn one(name: impl Into<String>, components: &'static str, get: impl Fn(&Pixel) -> f32 + Sync + 'static) -> Column {
-        Column { name: name.into(), components, get: Box::new(move |p| [get(p), 0.0, 0.0, 0.0]) }
+        Column { name: name.into(), components, get: Box::new(move |p, _| [get(p), 0.0, 0.0, 0.0]) }
     }
 }
 
@@ -99,7 +104,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
         Column {
             name: String::new(),
             components: "RGBA",
-            get: Box::new(move |p| {
+            get: Box::new(move |p, _| {
                 let alpha = if environment { 1.0 } else { p.coverage.hit_fraction() };
                 p.levels[own].mean.as_vec3().extend(alpha).to_array()
             }),
@@ -110,7 +115,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
         columns.push(Column::rgb(format!("Level{}", level + 1), move |p| p.levels[level].mean));
     }
     for level in 0..levels {
-        columns.push(Column::rgb(format!("Variance{}", level + 1), move |p| variance(p, level)));
+        columns.push(Column::noise(format!("Variance{}", level + 1), move |p, ratio| variance(p, level) * ratio));
     }
     for (kind, name) in radius_layers(kinds) {
         for level in 0..levels {
@@ -123,6 +128,9 @@ fn columns(shape: &Shape) -> Vec<Column> {
     for (level, factor) in volume_radius_factor.into_iter().flat_map(|factor| (0..levels).map(move |k| (k, factor))) {
         let factor = factor as f32 * level_factor(level, levels);
         columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", move |p| p.volume_bandwidth * factor));
+    }
+    for quarter in 0..QUARTERS {
+        columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarters[quarter].mean()));
     }
     let parts: [(Part, &str, OfParts); 5] = [
         (Part::Direct, "Direct", |parts| parts.direct),
@@ -138,8 +146,8 @@ fn columns(shape: &Shape) -> Vec<Column> {
         }
     }
     columns.extend([
-        Column::rgb("Error", move |p| match SquaredError::of(p, own, compared) {
-            Some(error) => error.root(),
+        Column::noise("Error", move |p, ratio| match SquaredError::of(p, own, compared) {
+            Some(error) => SquaredError { variance: error.variance * ratio, ..error }.root(),
             None => p.levels[own].mean.abs(),
         }),
         Column::rgb("albedo", |p| mean(p.albedo, p.features)),
@@ -181,6 +189,8 @@ pub fn layers(
     columns.retain(|column| wanted(&column.name));
     let channels = columns.iter().map(|column| column.components.len()).sum();
     let mut values = vec![vec![0f32; pixels.len()]; channels];
+    let noisy = columns.iter().any(|column| column.name.starts_with("Variance") || column.name == "Error");
+    let ratios = if noisy { variance_ratio(pixels, width as usize, shape.own) } else { Vec::new() };
     // One look at each pixel for all layers: pixels are large, and reading them all once per layer would take seconds.
     let mut blocks: Vec<Vec<&mut [f32]>> = Vec::new();
     blocks.resize_with(pixels.len().div_ceil(BLOCK), || Vec::with_capacity(channels));
@@ -189,12 +199,13 @@ pub fn layers(
             block.push(part);
         }
     }
-    blocks.par_iter_mut().zip(pixels.par_chunks(BLOCK)).for_each(|(planes, pixels)| {
+    blocks.par_iter_mut().zip(pixels.par_chunks(BLOCK)).enumerate().for_each(|(block, (planes, pixels))| {
+        let ratio = |i: usize| ratios.get(block * BLOCK + i).copied().map_or(1.0, f64::from);
         let mut planes = planes.as_mut_slice();
         for column in &columns {
             let (own, others) = std::mem::take(&mut planes).split_at_mut(column.components.len());
             for (i, pixel) in pixels.iter().enumerate() {
-                for (plane, value) in own.iter_mut().zip((column.get)(pixel)) {
+                for (plane, value) in own.iter_mut().zip((column.get)(pixel, ratio(i))) {
                     plane[i] = value;
                 }
             }
@@ -259,7 +270,7 @@ mod tests {
         let mut pixel = Pixel { volume_bandwidth: 3.0, ..Pixel::new([2.0, 4.0]) };
         for i in 0..5 {
             let x = 0.1 + 0.37 * i as f32;
-            pixel.add(&measure(x, true), Some(&measure(1.1 * x, i != 0)), 5, 3);
+            pixel.add(i + 1, &measure(x, true), Some(&measure(1.1 * x, i != 0)), (5, 3));
         }
         let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
         for c in ["R", "G", "B"] {
@@ -296,7 +307,7 @@ mod tests {
     #[test]
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
         let mut pixel = Pixel::new([1.0; 2]);
-        pixel.add(&measure(0.5, false), Some(&measure(0.5, false)), 5, 3);
+        pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)), (5, 3));
         let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");
         assert!((value(&set, "Variance2", "R") / (mean * mean) - 1.0).abs() < 1e-6);

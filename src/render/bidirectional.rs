@@ -164,7 +164,7 @@ impl<'a> Passes<'a> {
     fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Work {
         let Some(shared) = self.shared else {
             self.paths(i, watches);
-            self.add(pixels);
+            self.add(i, pixels);
             return Work { light_paths: 0, photons: 0 };
         };
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
@@ -231,7 +231,7 @@ impl<'a> Passes<'a> {
             }
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
-        self.add(pixels);
+        self.add(i, pixels);
         if shared.strategies.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons.concat())));
         }
@@ -256,8 +256,8 @@ impl<'a> Passes<'a> {
         });
     }
 
-    /// Adds the iteration's measures to the pixels.
-    fn add(&self, pixels: &mut [Pixel]) {
+    /// Adds the measures of iteration `i` to the pixels.
+    fn add(&self, i: u64, pixels: &mut [Pixel]) {
         let levels = self.settings.levels;
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
             let slot = self.tiles.slot(index as u32);
@@ -267,7 +267,7 @@ impl<'a> Passes<'a> {
                 pixel.p = (first.p.as_dvec3() + self.scene.origin).as_vec3();
             }
             let others = self.measures.get(1).map(|measures| &measures[slot]);
-            pixel.add(measure, others, levels.count, levels.own());
+            pixel.add(i, measure, others, (levels.count, levels.own()));
         });
     }
 }

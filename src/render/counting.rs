@@ -249,7 +249,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                     }
                 }
                 keep_first_hit(&eye, pixel, &first);
-                pixel.add(&first, others.as_ref(), count, levels.own());
+                pixel.add(i, &first, others.as_ref(), (count, levels.own()));
             }
         });
     }

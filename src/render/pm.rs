@@ -160,7 +160,7 @@ impl Iterate for Pm<'_> {
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
                     let measure = eye.measure(scratch, start, &maps, None, neighbours, kernel::Box);
                     keep_first_hit(eye, pixel, &measure);
-                    pixel.add(&measure, None, 1, 0);
+                    pixel.add(i, &measure, None, (1, 0));
                 }
             },
         );

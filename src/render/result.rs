@@ -106,7 +106,7 @@ pub(super) fn error_estimate(pixels: &[Pixel], settings: &Settings) -> Option<Er
         };
         let mean = pixel.levels[own].mean.element_sum() / 3.0;
         let scale = 1.0 / (3.0 * (mean * mean + 0.01));
-        variance += error.variance.element_sum() * scale;
+        variance += pixel.variance_by_quarters().unwrap_or(error.variance).element_sum() * scale;
         squared_bias += error.squared_bias.element_sum() * scale;
         known += 1;
     }

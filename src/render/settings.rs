@@ -41,14 +41,20 @@ pub struct Shard {
 pub struct Levels {
     /// Number of levels, 1 to [`MAX_LEVELS`].
     pub count: usize,
-    /// Trace the second eye path that decorrelates level 1 from the others; without it all levels share one path.
+    /// Trace a second eye path that decorrelates level 1 from the others \[post-reconstruction 2021, 3\], which equation (6) wants; without it
+    /// all levels share one path, which costs a little more than half as much.
     pub two_paths: bool,
 }
 
 impl Levels {
-    /// `count` levels; with more than one, two eye paths.
+    /// `count` levels that share one eye path.
     pub fn new(count: usize) -> Levels {
-        Levels { count: count.clamp(1, MAX_LEVELS), two_paths: count > 1 }
+        Levels { count: count.clamp(1, MAX_LEVELS), two_paths: false }
+    }
+
+    /// `count` levels; with more than one, level 1 has an eye path of its own.
+    pub fn decorrelated(count: usize) -> Levels {
+        Levels { two_paths: count > 1, ..Levels::new(count) }
     }
 
     /// The level (from 0) that is the method's own image: the second largest, whose bandwidth is the usual one (k = 10 where the

@@ -107,13 +107,13 @@ fn eye_pass(
                     let volume = maps.volume(pixel, others.clone());
                     let correlated = eye.measure(scratch, correlated, photons, volume, &radii(others), kernel);
                     keep_first_hit(eye, pixel, &independent);
-                    pixel.add(&independent, Some(&correlated), levels.count, levels.own());
+                    pixel.add(i, &independent, Some(&correlated), (levels.count, levels.own()));
                 }
                 None => {
                     let volume = maps.volume(pixel, 0..levels.count);
                     let all = eye.measure(scratch, start, photons, volume, &radii(0..levels.count), kernel);
                     keep_first_hit(eye, pixel, &all);
-                    pixel.add(&all, None, levels.count, levels.own());
+                    pixel.add(i, &all, None, (levels.count, levels.own()));
                 }
             }
         }

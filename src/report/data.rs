@@ -18,7 +18,7 @@ struct Row<'a> {
     light_paths: u64,
     seconds: f64,
     cpu_seconds: f64,
-    combine_seconds: Option<f64>,
+    finish_seconds: Option<f64>,
     /// The error of the report's metric without the reference's own; none at or below that.
     figure: Option<f64>,
     relmse: f64,
@@ -39,7 +39,7 @@ impl<'a> Row<'a> {
             light_paths: point.light_paths,
             seconds: point.seconds,
             cpu_seconds: point.cpu_seconds,
-            combine_seconds: point.combine_seconds,
+            finish_seconds: point.finish_seconds,
             figure: subject.reference.figure(subject.metric, &point.errors),
             relmse: point.errors.relmse,
             relmse_trimmed: point.errors.relmse_trimmed,

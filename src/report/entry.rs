@@ -14,8 +14,8 @@ pub struct Entry {
     pub options: String,
     /// Its settings; seeds are the race's.
     pub settings: Settings,
-    /// Name of the combiner's network, if its levels are combined.
-    pub combiner: Option<String>,
+    /// What finishes its pictures, if they are finished.
+    pub finish: Option<String>,
 }
 
 impl Entry {
@@ -27,7 +27,7 @@ impl Entry {
             "options": self.options,
             "method": method.name(),
             "levels": levels.count,
-            "combiner": self.combiner,
+            "finish": self.finish,
             "max_depth": (max_depth < u32::MAX).then_some(max_depth),
         });
         if method.counts_photons() {

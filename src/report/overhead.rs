@@ -1,4 +1,4 @@
-//! What an iteration costs and of what, and what levels and combiner add, as Table 2 of \[post-reconstruction 2021\].
+//! What an iteration costs and of what, and what levels and finish add, as Table 2 of \[post-reconstruction 2021\].
 
 use super::entry::Entry;
 use super::race::Ending;
@@ -12,8 +12,8 @@ pub struct Overhead {
     pub iterations: f64,
     /// Wall-clock seconds of pilot and iterations.
     pub render_seconds: f64,
-    /// Wall-clock seconds of the combiner with its layers, once at the end.
-    pub combine_seconds: Option<f64>,
+    /// Wall-clock seconds of the finish with its layers, once at the end.
+    pub finish_seconds: Option<f64>,
     /// All seconds over iterations.
     pub seconds_per_iteration: f64,
     /// All processor seconds over iterations.
@@ -55,14 +55,14 @@ fn row(run: usize, endings: &[Ending]) -> Option<Overhead> {
     if mine.is_empty() {
         return None;
     }
-    let combine = |e: &Ending| e.combine.unwrap_or_default();
+    let finish = |e: &Ending| e.finish.unwrap_or_default();
     let each = |get: fn(&Phases) -> f64| mean(&|e| get(&e.phases) / e.iterations as f64);
     Some(Overhead {
         iterations: mean(&|e| e.iterations as f64),
         render_seconds: mean(&|e| e.spent.seconds),
-        combine_seconds: mine[0].combine.map(|_| mean(&|e| combine(e).seconds)),
-        seconds_per_iteration: mean(&|e| (e.spent.seconds + combine(e).seconds) / e.iterations as f64),
-        cpu_seconds_per_iteration: mean(&|e| (e.spent.cpu_seconds + combine(e).cpu_seconds) / e.iterations as f64),
+        finish_seconds: mine[0].finish.map(|_| mean(&|e| finish(e).seconds)),
+        seconds_per_iteration: mean(&|e| (e.spent.seconds + finish(e).seconds) / e.iterations as f64),
+        cpu_seconds_per_iteration: mean(&|e| (e.spent.cpu_seconds + finish(e).cpu_seconds) / e.iterations as f64),
         pilot: mean(&|e| e.phases.pilot),
         light: each(|p| p.light),
         map: each(|p| p.map),

@@ -173,7 +173,7 @@ fn overheads(subject: &Subject, summary: &Summary) -> Markup {
         section {
             h2 { "What it costs" }
             div.wide { table {
-                thead { tr { th { "Run" } th.number { "iterations" } th.number { "render" br; small { "s" } } th.number { "combiner" br; small { "s, once" } }
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "render" br; small { "s" } } th.number { "finish" br; small { "s, once" } }
                     th.number { "per iteration" br; small { "s" } } th.number { "over first" } th.number { "over same method" }
                     th.number { "pilot" br; small { "core-s, once" } } th.number { "light" br; small { "core-s" } } th.number { "map" br; small { "core-s" } }
                     th.number { "eye" br; small { "core-s" } } } }
@@ -181,7 +181,7 @@ fn overheads(subject: &Subject, summary: &Summary) -> Markup {
                     td { (name(subject, run)) }
                     td.number { (row.as_ref().map_or("–".into(), |row| format!("{:.0}", row.iterations))) }
                     td.number { (cell(row, &|row| Some(row.render_seconds))) }
-                    td.number { (cell(row, &|row| row.combine_seconds)) }
+                    td.number { (cell(row, &|row| row.finish_seconds)) }
                     td.number { (cell(row, &|row| Some(row.seconds_per_iteration))) }
                     td.number { (row.as_ref().filter(|_| run > 0).map_or("–".into(), |row| percent(row.over_first))) }
                     td.number { (row.as_ref().and_then(|row| row.over_plain).map_or("–".into(), percent)) }
@@ -191,7 +191,7 @@ fn overheads(subject: &Subject, summary: &Summary) -> Markup {
                     td.number { (cell(row, &|row| Some(row.eye))) }
                 } } }
             } }
-            p.note { "Seconds per iteration are those of pilot, iterations and combiner over the number of iterations. “Over same method” compares with the first run of that method. "
+            p.note { "Seconds per iteration are those of pilot, iterations and finish over the number of iterations. “Over same method” compares with the first run of that method. "
                 "Light, map and eye are processor seconds of one iteration; the methods that weigh strategies path by path count their light paths under eye." }
         }
     }
@@ -261,14 +261,14 @@ fn runs(subject: &Subject) -> Markup {
         section {
             h2 { "Runs" }
             div.wide { table {
-                thead { tr { th { "Run" } th { "Method" } th.number { "levels" } th { "combiner" } th.number { "light paths" } th.number { "alpha" } th { "options of caustique render" } } }
+                thead { tr { th { "Run" } th { "Method" } th.number { "levels" } th { "finish" } th.number { "light paths" } th.number { "alpha" } th { "options of caustique render" } } }
                 tbody { @for (run, entry) in subject.entries.iter().enumerate() {
                     @let (settings, method) = (&entry.settings, entry.settings.method);
                     tr {
                         td { (name(subject, run)) }
                         td { (method.name()) }
                         td.number { (settings.levels.count) }
-                        td { (entry.combiner.as_deref().unwrap_or("off")) }
+                        td { (entry.finish.as_deref().unwrap_or("off")) }
                         td.number { (if method.counts_photons() { settings.photons.to_string() } else { "–".into() }) }
                         td.number { (if method.has_bandwidths() { short(settings.alpha) } else { "–".into() }) }
                         td { code { (entry.options) } }

@@ -6,15 +6,15 @@ use super::entry::{Entry, Moments};
 use super::reference::Reference;
 use super::spool::Spool;
 use crate::camera::Camera;
-use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Result};
+use crate::finish::Finish;
 use crate::image::{Errors, errors};
 use crate::render::{Control, Phases, Rendered, Session, Settings, Spent, Stage, StopReason};
 use crate::scene::Scene;
 use std::path::Path;
 
-/// Layers that the combiner reads.
-const COMBINED_LAYERS: [&str; 5] = ["Level", "Variance", "albedo", "normal", "depth"];
+/// Layers that a finish reads for the picture alone.
+const READ: [&str; 5] = ["Noisy", "Level", "Variance", "albedo", "normal"];
 
 /// When runs stop and where they are measured.
 #[derive(Clone, Debug)]
@@ -42,16 +42,16 @@ pub struct Point {
     pub iterations: u64,
     /// Light paths emitted.
     pub light_paths: u64,
-    /// Wall-clock seconds, the combiner's included, were it to stop here.
+    /// Wall-clock seconds, the finish's included, were it to stop here.
     pub seconds: f64,
     /// Processor seconds, likewise.
     pub cpu_seconds: f64,
-    /// Wall-clock seconds of the combiner and its layers, of runs that have one: the median of all its uses with this seed, which do the same
+    /// Wall-clock seconds of the finish and its layers, of runs that have one: the median of all its uses with this seed, which do the same
     /// work.
-    pub combine_seconds: Option<f64>,
+    pub finish_seconds: Option<f64>,
     /// Its error as measured against the reference, the reference's own included.
     pub errors: Errors,
-    /// The squared relative error that it estimates itself, of runs without combiner.
+    /// The squared relative error that it estimates itself, of runs without finish.
     pub estimate: Option<f64>,
     /// Number of the picture among those that are kept.
     pub picture: Option<u64>,
@@ -70,8 +70,8 @@ pub struct Ending {
     pub spent: Spent,
     /// Core-seconds by phase.
     pub phases: Phases,
-    /// Time of the combiner: the median of its uses.
-    pub combine: Option<Spent>,
+    /// Time of the finish: the median of its uses.
+    pub finish: Option<Spent>,
 }
 
 /// What is told after every step.
@@ -117,8 +117,8 @@ impl Outcome {
 struct Lane<'a> {
     session: Session<'a>,
     moments: Moments,
-    /// Times of the combiner.
-    combines: Vec<Spent>,
+    /// Times of the finish.
+    finishings: Vec<Spent>,
     measured: u64,
     open: bool,
 }
@@ -141,21 +141,23 @@ impl Lane<'_> {
         if rules.time.is_some() { self.session.spent().cpu_seconds } else { self.session.iterations() as f64 }
     }
 
-    /// The picture as it is, combined if that is the run's way.
-    fn picture(&mut self, combiner: Option<&mut Combiner>) -> Result<Vec<[f32; 3]>> {
-        let Some(combiner) = combiner else { return Ok(self.session.picture()) };
+    /// The picture as it is, finished if that is the run's way.
+    fn picture(&mut self, finish: Option<&mut Finish>) -> Result<Vec<[f32; 3]>> {
+        let Some(finish) = finish else { return Ok(self.session.picture()) };
         let mut spent = Spent::default();
         let session = &mut self.session;
         let picture = spent.during(|| {
-            let set = session.layers(|name| COMBINED_LAYERS.iter().any(|stem| name.starts_with(stem)))?;
-            combiner.run(&LevelStack::of(&set)?)
+            // Quarters and parts are for those who look closer.
+            let mut set = session.layers(|name| name.is_empty() || READ.iter().any(|stem| name.starts_with(stem)))?;
+            finish.apply(&mut set, |_| false)?;
+            set.beauty()
         })?;
-        self.combines.push(spent);
+        self.finishings.push(spent);
         Ok(picture)
     }
 }
 
-/// Races all entries, with each seed in turn. `combiners` are as many as entries. Pictures of the first seed are kept in `folder` until the outcome is
+/// Races all entries, with each seed in turn. `finishes` are as many as entries. Pictures of the first seed are kept in `folder` until the outcome is
 /// dropped. `observe` is called after every step and may stop the race.
 ///
 /// # Errors
@@ -163,7 +165,7 @@ impl Lane<'_> {
 pub fn race(
     (scene, camera): (&Scene, &Camera),
     entries: &[Entry],
-    combiners: &mut [Option<Combiner>],
+    finishes: &mut [Option<Finish>],
     rules: &Rules,
     reference: &Reference,
     folder: &Path,
@@ -188,7 +190,7 @@ pub fn race(
         for stage in &stages {
             let session = Session::new(stage);
             let moments = Moments::new(rules.ratio);
-            lanes.push(Lane { session, moments, combines: Vec::new(), measured: 0, open: true });
+            lanes.push(Lane { session, moments, finishings: Vec::new(), measured: 0, open: true });
         }
         while let Some(run) = next(&lanes, rules) {
             lanes[run].session.step();
@@ -197,7 +199,7 @@ pub fn race(
             let moment = lanes[run].moments.reached(iterations) || rules.more.contains(&(run, iterations)) || done;
             let mut measured = false;
             if moment {
-                measured = outcome.measure(run, seed, round == 0, &mut lanes[run], &mut combiners[run], reference);
+                measured = outcome.measure(run, seed, round == 0, &mut lanes[run], &mut finishes[run], reference);
             }
             lanes[run].open &= !done;
             let fraction = lanes.iter().map(|lane| lane.fraction(rules)).sum::<f64>() / lanes.len() as f64;
@@ -216,13 +218,13 @@ pub fn race(
         for (run, mut lane) in lanes.into_iter().enumerate() {
             let iterations = lane.session.iterations();
             if lane.open && iterations > lane.measured {
-                outcome.measure(run, seed, round == 0, &mut lane, &mut combiners[run], reference);
+                outcome.measure(run, seed, round == 0, &mut lane, &mut finishes[run], reference);
             }
-            let (spent, phases, combine) = (lane.session.spent(), lane.session.phases(), median(&lane.combines));
-            if let Some(combine) = combine {
-                outcome.charge(run, seed, combine);
+            let (spent, phases, finish) = (lane.session.spent(), lane.session.phases(), median(&lane.finishings));
+            if let Some(finish) = finish {
+                outcome.charge(run, seed, finish);
             }
-            outcome.endings.push(Ending { run, seed, iterations, spent, phases, combine });
+            outcome.endings.push(Ending { run, seed, iterations, spent, phases, finish });
             if round == 0 {
                 let stop = if outcome.interrupted { StopReason::Interrupted } else { StopReason::Iterations };
                 let mut rendered = lane.session.finish(stop);
@@ -251,12 +253,12 @@ fn median(times: &[Spent]) -> Option<Spent> {
 }
 
 impl Outcome {
-    /// Adds the combiner's time to all points of a run.
-    fn charge(&mut self, run: usize, seed: u64, combine: Spent) {
+    /// Adds the finish's time to all points of a run.
+    fn charge(&mut self, run: usize, seed: u64, finish: Spent) {
         for point in self.points.iter_mut().filter(|point| point.run == run && point.seed == seed) {
-            point.seconds += combine.seconds;
-            point.cpu_seconds += combine.cpu_seconds;
-            point.combine_seconds = Some(combine.seconds);
+            point.seconds += finish.seconds;
+            point.cpu_seconds += finish.cpu_seconds;
+            point.finish_seconds = Some(finish.seconds);
         }
     }
 
@@ -267,10 +269,10 @@ impl Outcome {
         seed: u64,
         keep: bool,
         lane: &mut Lane<'_>,
-        combiner: &mut Option<Combiner>,
+        finish: &mut Option<Finish>,
         reference: &Reference,
     ) -> bool {
-        match self.point(run, seed, keep, lane, combiner, reference) {
+        match self.point(run, seed, keep, lane, finish, reference) {
             Ok(Some(point)) => {
                 self.points.push(point);
                 true
@@ -291,15 +293,15 @@ impl Outcome {
         seed: u64,
         keep: bool,
         lane: &mut Lane<'_>,
-        combiner: &mut Option<Combiner>,
+        finish: &mut Option<Finish>,
         reference: &Reference,
     ) -> Result<Option<Point>> {
-        let picture = lane.picture(combiner.as_mut())?;
+        let picture = lane.picture(finish.as_mut())?;
         let iterations = lane.session.iterations();
         lane.measured = iterations;
         let Some(errors) = errors(&picture, &reference.picture) else { return Ok(None) };
         let spent = lane.session.spent();
-        let estimate = lane.session.estimate().filter(|_| combiner.is_none());
+        let estimate = lane.session.estimate().filter(|_| finish.is_none());
         Ok(Some(Point {
             run,
             seed,
@@ -307,7 +309,7 @@ impl Outcome {
             light_paths: lane.session.light_paths(),
             seconds: spent.seconds,
             cpu_seconds: spent.cpu_seconds,
-            combine_seconds: None,
+            finish_seconds: None,
             errors,
             estimate: estimate.map(|e| e.root().powi(2)),
             picture: if keep { Some(self.pictures.push(&picture)?) } else { None },

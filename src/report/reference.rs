@@ -119,7 +119,7 @@ impl Reference {
     }
 }
 
-/// The error that a header of ours tells: as a reference, or as a render that was not combined and estimates itself.
+/// The error that a header of ours tells: as a reference, or as a render that was not finished and estimates itself.
 fn told(header: &Value) -> OwnError {
     let own = &header["reference_error"];
     if own.is_object() {

@@ -1,9 +1,11 @@
-//! Combining, comparing, and what files hold.
+//! Finishing, comparing, and what files hold.
 
 use crate::{Folder, support, values};
+use caustique::film::{Layer, LayerSet, Naming};
+use caustique::image::exr::{self, Attributes};
 
 #[test]
-fn combining_later_is_combining_at_once() {
+fn finishing_later_is_finishing_at_once() {
     let folder = Folder::new();
     folder.render("-o at_once.exr --iterations 3");
     folder.render("-o levels.exr --iterations 3 --no-combine");
@@ -13,15 +15,68 @@ fn combining_later_is_combining_at_once() {
         (folder.read("at_once.exr"), folder.read("levels.exr"), folder.read("later.exr"));
     assert!(values(&at_once, "") == values(&later, ""));
     assert!(values(&levels, "") != values(&later, ""));
-    assert_eq!(levels.layers.len(), later.layers.len());
-    assert_eq!((&header["combined"]["model"], &header["iterations"]), (&"compact".into(), &3.into()));
+    // With the finished parts: direct, indirect, caustic and seen light.
+    assert_eq!(levels.layers.len() + 4, later.layers.len());
+    assert_eq!(at_once.layers.len(), later.layers.len());
+    assert!(values(&at_once, "CombinedCaustic") == values(&later, "CombinedCaustic"));
+    let denoiser = header["combined"]["denoiser"].as_str().expect("it says with what");
+    assert!(denoiser.starts_with("Open Image Denoise 2.") && header["iterations"] == 3, "{denoiser}");
+    // Equation (6) with its network, and nothing after it.
+    let outcome = folder.run("combine levels.exr -o network.exr --model compact --denoise none");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let (network, header) = folder.read("network.exr");
+    assert_eq!((&header["combined"]["model"], &header["combined"]["levels"]), (&"compact".into(), &5.into()));
+    assert!(values(&network, "") != values(&later, "") && values(&network, "") != values(&levels, ""));
     folder.render("-o blender.exr --iterations 3 --no-combine --exr-naming blender");
     assert_eq!(folder.run("combine blender.exr -o combined.exr").code, Some(0));
     assert!(values(&folder.read("combined.exr").0, "ViewLayer.Combined") == values(&later, ""));
     folder.render("-o beauty.exr --iterations 2 --layers beauty");
     let outcome = folder.run("combine beauty.exr -o no.exr");
-    let error = "beauty.exr: the file has no bandwidth levels (Level1, Level2, ...)\nhint: render with --layers all\n";
+    let error = "beauty.exr: nothing tells how noisy the picture is: there is no layer Variance1, Variance, or Half1 and Half2\n\
+                 hint: render with --layers all, or add the variance of the mean, or two independent halves\n";
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), error));
+    let outcome = folder.run("combine beauty.exr -o no.exr --model compact");
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+}
+
+/// A picture with Blender's names: combined, two halves, albedo and normal. With a layer of variances instead of halves
+/// the same picture comes out where they say the same.
+#[test]
+fn pictures_of_other_renderers_are_finished() {
+    let folder = Folder::new();
+    folder.render("-o own.exr --iterations 8 --no-combine --layers beauty,Quarter,albedo,normal --method path");
+    let (own, _) = folder.read("own.exr");
+    let quarters: Vec<Vec<[f32; 3]>> = (1..=4).map(|k| values(&own, &format!("Quarter{k}"))).collect();
+    let half = |a: usize| -> Vec<[f32; 3]> {
+        let pairs = quarters[a].iter().zip(&quarters[a + 1]);
+        pairs.map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
+    };
+    let halves = [half(0), half(2)];
+    let beauty: Vec<[f32; 3]> =
+        halves[0].iter().zip(&halves[1]).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
+    let write = |name: &str, with: &[(&str, Vec<[f32; 3]>)]| {
+        let mut set = LayerSet::new(own.width, own.height);
+        let layers = [("", beauty.clone()), ("albedo", values(&own, "albedo"))];
+        for (layer, values) in layers.into_iter().chain(with.iter().cloned()) {
+            set.push(Layer::interleaved(layer, "RGB", values)).expect("as many pixels");
+        }
+        let normal = values(&own, "normal");
+        set.push(Layer::interleaved("normal", "XYZ", normal)).expect("as many pixels");
+        let options = exr::Options { naming: Naming::Blender, ..exr::Options::default() };
+        exr::write(&folder.path(name), &set, &Attributes::default(), options).expect("it can be written");
+    };
+    write("halves.exr", &[("Half1", halves[0].clone()), ("Half2", halves[1].clone())]);
+    let variance = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| (0.5 * (a[c] - b[c])).powi(2));
+    write("variance.exr", &[("Variance", halves[0].iter().zip(&halves[1]).map(variance).collect())]);
+    for name in ["halves", "variance"] {
+        let outcome = folder.run(&format!("combine {name}.exr -o {name}-done.exr"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    }
+    let [by_halves, by_variance] =
+        ["halves", "variance"].map(|name| values(&folder.read(&format!("{name}-done.exr")).0, "ViewLayer.Combined"));
+    assert!(by_halves != beauty);
+    let apart = by_halves.iter().flatten().zip(by_variance.iter().flatten()).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f32::max) < 1e-4);
 }
 
 #[test]

@@ -246,14 +246,27 @@ fn missing_libraries() {
         Outcome::of(command)
     };
     let render = "render scene.glb -o out.exr --width 32 --iterations 1 --photons 100";
-    let outcome = missing("CAUSTIQUE_ONNXRUNTIME", render);
+    let outcome = missing("CAUSTIQUE_ONNXRUNTIME", &format!("{render} --model compact"));
     assert_eq!(outcome.code, Some(1));
     let lines: Vec<&str> = outcome.stderr.lines().collect();
     assert_eq!(lines[0], "CAUSTIQUE_ONNXRUNTIME=/no/such/library.so: no such file");
     assert!(lines[1].starts_with("hint: on Debian 13: apt-get install libonnxruntime1.21;"), "{}", lines[1]);
-    assert!(lines[1].ends_with("; or add --no-combine to do without the combiner"), "{}", lines[1]);
+    assert!(lines[1].ends_with("; or leave --model out: levels are not combined by the network then"), "{}", lines[1]);
     assert_eq!((lines.len(), folder.files().len()), (2, 0));
-    assert_eq!(missing("CAUSTIQUE_ONNXRUNTIME", &format!("{render} --no-combine")).code, Some(0));
+    assert_eq!(missing("CAUSTIQUE_ONNXRUNTIME", &format!("{render} --progress none")).code, Some(0));
+
+    // Without Open Image Denoise there is our own denoiser, unless it was asked for by name.
+    let outcome = missing("CAUSTIQUE_OIDN", &format!("{render} --progress none"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let lines: Vec<&str> = outcome.stderr.lines().collect();
+    assert!(
+        lines[0].contains("our own denoiser takes its place") && lines[1].contains("scripts/setup.sh"),
+        "{lines:?}"
+    );
+    assert_eq!(folder.read("out.exr").1["combined"]["denoiser"], "own");
+    let outcome = missing("CAUSTIQUE_OIDN", &format!("{render} --denoise oidn"));
+    assert!(outcome.code == Some(1) && outcome.stderr.contains("\nhint: "), "{}", outcome.stderr);
+    assert_eq!(missing("CAUSTIQUE_OIDN", &format!("{render} --denoise none --progress none")).stderr, "");
 
     let outcome = missing("CAUSTIQUE_EMBREE", render);
     assert_eq!(outcome.code, Some(1));

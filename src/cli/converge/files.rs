@@ -86,7 +86,7 @@ fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: us
         let mut header = outcome.renders[run].account(Some(threads));
         header.insert("name".into(), entry.name.as_str().into());
         header.insert("options".into(), entry.options.as_str().into());
-        header.insert("combined".into(), entry.combiner.as_ref().map(|name| json!({"model": name})).into());
+        header.insert("combined".into(), entry.finish.as_ref().map(|name| json!({"finish": name})).into());
         let mut set = LayerSet::new(subject.reference.width, subject.reference.height);
         set.push(Layer::interleaved("", "RGB", picture))?;
         let path = folder.join(format!("{name}.exr"));

@@ -8,14 +8,15 @@ mod runs;
 
 pub use options::ConvergeArgs;
 
+use super::finish::Ready;
 use super::render::plan::{self, Wishes as PlanWishes};
-use super::render::{Method, memory, network};
+use super::render::{Method, memory, ready};
 use super::say;
 use super::scene::{self, Loaded};
 use super::signals::Interrupt;
 use caustique::camera::Camera;
-use caustique::combine::{Combiner, Runtime};
 use caustique::error::{Error, Kind, Result};
+use caustique::finish::Finish;
 use caustique::plan::switch::Removed;
 use caustique::render::auto::{Choice, choose};
 use caustique::render::{Control, Settings};
@@ -58,19 +59,19 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         })?;
     }
     let interrupt = Interrupt::listen()?;
-    let (runs, choices) = choose_all(args, runs, (&scene, &camera), &interrupt);
+    let (runs, choices) = choose_all(args, runs, (&scene, &camera), &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
     memory::check_all(runs.iter().map(|run| &run.entry.settings), camera.size())?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;
-    let (entries, mut combiners) = open(args, runs, &choices, (&scene, &camera), &removed)?;
+    let (entries, mut finishes) = open(args, runs, &choices, (&scene, &camera), &removed)?;
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
     let reference = reference::get(args, source, (&scene, &camera), &interrupt, &mut notes)?;
     let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
     let mut reporter = Reporter::new(args.progress);
-    let mut outcome = race((&scene, &camera), &entries, &mut combiners, &rules, &reference, &args.output, |step| {
+    let mut outcome = race((&scene, &camera), &entries, &mut finishes, &rules, &reference, &args.output, |step| {
         reporter.step(&entries, step);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     })?;
@@ -136,34 +137,36 @@ fn choose_all(
     mut runs: Vec<Run>,
     (scene, camera): (&Scene, &Camera),
     interrupt: &Interrupt,
-) -> (Vec<Run>, Vec<Option<Choice>>) {
+) -> Result<(Vec<Run>, Vec<Option<Choice>>)> {
     let choose_one = |run: &mut Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
         run.entry.settings = run.args.sized(run.entry.settings.clone(), camera.size());
         let make = |way| run.args.allowed(way, camera.size()).map(limits);
-        let chosen = (run.args.method == Method::Auto)
-            .then(|| choose((scene, camera), run.args.free(), make, || interrupt.asked()))
-            .flatten()?;
+        if run.args.method != Method::Auto {
+            return Ok(None);
+        }
+        let mut finish = run.args.pilot_finish()?;
+        let Some(chosen) = choose((scene, camera), &mut finish, make, || interrupt.asked()) else { return Ok(None) };
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
-        Some(chosen)
+        Ok(Some(chosen))
     };
-    let choices = runs.iter_mut().map(choose_one).collect();
-    (runs, choices)
+    let choices = runs.iter_mut().map(choose_one).collect::<Result<_>>()?;
+    Ok((runs, choices))
 }
 
-/// Opens the networks and tells what methods miss.
+/// Opens the finishes and tells what methods miss.
 fn open(
     args: &ConvergeArgs,
     runs: Vec<Run>,
     choices: &[Option<Choice>],
     (scene, camera): (&Scene, &Camera),
     removed: &Removed,
-) -> Result<(Vec<Entry>, Vec<Option<Combiner>>)> {
+) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
     let mut told = HashSet::new();
     let mut entries = Vec::new();
-    let mut combiners = Vec::new();
+    let mut finishes = Vec::new();
     for (Run { mut entry, args: options }, choice) in runs.into_iter().zip(choices) {
         let of_run = PlanWishes::of(&options, choice.as_ref());
         let wishes = PlanWishes { max_depth: args.max_depth, switches: args.scene.switches(), ..of_run };
@@ -171,17 +174,17 @@ fn open(
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| told.insert(warning.clone())).collect();
         plan::tell(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);
-        let network = network(&options, entry.settings.levels.count).map_err(|mut error| {
+        let ready = ready(&options, entry.settings.levels.count).map_err(|mut error| {
             if error.kind == Kind::Usage {
                 error.place = place;
             }
             error
         })?;
-        entry.combiner = network.as_ref().map(|network| network.name.clone());
+        entry.finish = ready.as_ref().map(Ready::name);
         entries.push(entry);
-        combiners.push(network.map(super::combine::Named::into_combiner));
+        finishes.push(ready.map(Ready::into_finish));
     }
-    Ok((entries, combiners))
+    Ok((entries, finishes))
 }
 
 /// Options that concern all runs.
@@ -204,16 +207,15 @@ fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let embree = caustique_embree::Library::load().ok().map(|library| library.version().to_string());
-    let combined = entries.iter().any(|entry| entry.combiner.is_some());
-    let runtime = if combined { Runtime::find().ok() } else { None };
-    let runtime = runtime.and_then(|runtime| runtime.version().map(str::to_string));
+    let finished = entries.iter().any(|entry| entry.finish.is_some());
+    let denoiser = if finished { caustique_oidn::Library::load().ok() } else { None };
     let known = [
         ("processor", model.map(|(_, name)| name.trim().to_string())),
         ("threads", Some(threads.to_string())),
         ("system", Some(format!("{} {}", std::env::consts::OS, std::env::consts::ARCH))),
         ("caustique", Some(env!("CARGO_PKG_VERSION").into())),
         ("Embree", embree),
-        ("ONNX Runtime", runtime),
+        ("Open Image Denoise", denoiser.map(|library| library.version().to_string())),
     ];
     known.into_iter().filter_map(|(name, value)| Some((name.to_string(), value?))).collect()
 }

@@ -14,7 +14,7 @@ const COMMON: [&str; 2] = ["seed", "max_depth"];
 
 /// A run, and the options it was read from.
 pub struct Run {
-    /// What competes; its combiner is not known before its network is opened.
+    /// What competes; its finish is not known before libraries are found.
     pub entry: Entry,
     /// All options of a render with this method.
     pub args: Job,
@@ -53,13 +53,14 @@ pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
     Ok(runs)
 }
 
-/// A method with its defaults and one level.
+/// A method with its defaults, one level and no finish.
 pub fn by_method(args: &ConvergeArgs, method: Method) -> Result<Run> {
     let name = method.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
     let mut words = vec!["--method".to_string(), name.clone()];
     if method.chosen().has_levels() {
         words.extend(["--levels".into(), "1".into()]);
     }
+    words.push("--no-combine".into());
     parse(args, &name, &words.join(" "), words)
 }
 
@@ -80,21 +81,21 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         time: None,
         ..render.settings()?
     };
-    let entry = Entry { name: name.into(), options: options.into(), settings, combiner: None };
+    let entry = Entry { name: name.into(), options: options.into(), settings, finish: None };
     Ok(Run { entry, args: render.job })
 }
 
-/// Errors: an option that is not about the method or the combiner of one run.
+/// Errors: an option that is not about the method or the finish of one run.
 fn refuse_common(command: &Command, matches: &ArgMatches) -> Result<()> {
     let given = |arg: &&clap::Arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
     for arg in command.get_arguments().filter(given) {
         let id = arg.get_id().as_str();
-        let of_run = matches!(arg.get_help_heading(), Some("Method" | "Combiner")) && !COMMON.contains(&id);
+        let of_run = matches!(arg.get_help_heading(), Some("Method" | "Finish")) && !COMMON.contains(&id);
         if !of_run && !["output", "path"].contains(&id) {
             let option = arg.get_long().unwrap_or(id);
             let cause = format!("--{option} cannot differ from run to run");
             return Err(Error::new(Kind::Usage, "command line", cause)
-                .hint("a run has the method and combiner options of 'caustique render'; the others, where there are such, concern all runs"));
+                .hint("a run has the method and finish options of 'caustique render'; the others, where there are such, concern all runs"));
         }
     }
     Ok(())

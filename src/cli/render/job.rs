@@ -1,5 +1,6 @@
 //! What is rendered and how: the options that `caustique render` and `caustique plan` have in common.
 
+use crate::cli::finish::FinishArgs;
 use crate::cli::number::{between, positive};
 use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
@@ -7,7 +8,8 @@ use caustique::estimator::InitialBandwidth;
 use caustique::estimator::bandwidth::SCREEN_CAP;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
-use caustique::render::auto::{Free, Way};
+use caustique::finish::{Choice, Denoiser, Finish};
+use caustique::render::auto::Way;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
@@ -37,6 +39,10 @@ pub struct Job {
     /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
     #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
     pub levels: Option<usize>,
+    /// Eye paths of a pixel in an iteration with several levels: one for all levels, or two, of which one is level 1's own, as the network of
+    /// --model was trained with; they take about 1.7 times as long [default: 1, with --model 2]
+    #[arg(long, value_name = "1|2", value_parser = value_parser!(u32).range(1..=2), help_heading = "Method")]
+    pub eye_paths: Option<u32>,
     /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
     /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
     #[arg(long, value_name = "knn|footprint|R", help_heading = "Method")]
@@ -113,12 +119,12 @@ pub struct Job {
     #[serde(flatten)]
     pub scene: SceneArgs,
 
-    /// Leave the levels uncombined: the picture is the usual single-bandwidth image
-    #[arg(long, conflicts_with = "model", help_heading = "Combiner")]
+    /// No finish at all: the picture is the estimator's own, at the usual single bandwidth
+    #[arg(long, conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
     pub no_combine: bool,
-    /// Network of the combiner: 'compact' comes with the program; or an ONNX file [default: compact]
-    #[arg(long, value_name = "compact|paper|FILE.onnx", help_heading = "Combiner")]
-    pub model: Option<String>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub finish: FinishArgs,
 }
 
 /// Methods that exist.
@@ -370,18 +376,17 @@ impl Job {
         Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 
-    /// What is left to auto: nothing where levels are combined, for the network has learnt on the usual light paths and neighbours.
-    pub fn free(&self) -> Free {
-        let combines = self.combines();
-        Free {
-            photons: self.photons.is_none() && !combines,
-            neighbours: self.knn.is_none() && self.initial_bandwidth.is_none() && !combines,
-        }
-    }
-
-    /// Whether several levels are to be combined.
-    fn combines(&self) -> bool {
-        self.settings().is_ok_and(|settings| settings.levels.count > 1) && !self.no_combine
+    /// What auto's pilots are finished with: as the render, but for a network, and on one of several machines by our own denoiser, whose pictures are the same on all.
+    ///
+    /// # Errors
+    /// A library that was asked for by name is missing.
+    pub fn pilot_finish(&self) -> Result<Finish> {
+        let choice = match self.finish.denoise.into() {
+            _ if self.no_combine => Choice::None,
+            Choice::Auto | Choice::Oidn if self.shard.is_some() => Choice::Own,
+            asked => asked,
+        };
+        Ok(Finish::new(Denoiser::open(choice)?.0, None))
     }
 
     /// The settings for a picture of that size: what the number of light paths follows from where none is asked for.
@@ -389,7 +394,7 @@ impl Job {
         Settings { photons: self.photons.unwrap_or(settings.usual_photons(size)), ..settings }
     }
 
-    /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out. Where auto balances light paths it starts from the usual number.
+    /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out.
     pub fn allowed(&self, way: Way, size: (u32, u32)) -> Option<Settings> {
         let guide = match self.guide {
             None => true,
@@ -397,11 +402,11 @@ impl Job {
             Some(Switch::Off) => !way.guided,
         };
         let indirect = self.indirect.is_none_or(|asked| !way.method.gathers() || way.indirect == asked.into());
+        // A network combines as many levels as it has learnt.
         let usual = self.settings().ok()?.levels;
-        self.settings_of(way)
-            .ok()
-            .filter(|settings| guide && indirect && (!self.combines() || settings.levels == usual))
-            .map(|settings| if self.free().photons { settings } else { self.sized(settings, size) })
+        let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == usual;
+        let allowed = self.settings_of(way).ok().filter(|settings| guide && indirect && levels(settings));
+        allowed.map(|settings| self.sized(settings, size))
     }
 
     fn settings_of(&self, way: Way) -> Result<Settings> {
@@ -425,7 +430,10 @@ impl Job {
             significance: self.cppm_significance.unwrap_or(chi_squared.significance),
             plus: self.cppm_plus,
         };
-        let levels = Levels::new(self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 }));
+        let count = self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 });
+        // Equation (6) of the 2021 paper combines an independent level with correlated ones.
+        let two_paths = self.eye_paths.map_or(self.finish.model.is_some(), |paths| paths == 2);
+        let levels = if two_paths { Levels::decorrelated(count) } else { Levels::new(count) };
         let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
         let initial = match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
             (BandwidthChoice::Knn, k) => {

@@ -10,16 +10,17 @@ mod techniques;
 pub use job::{Job, Method};
 pub use options::RenderArgs;
 
-use super::combine::{DEFAULT_MODEL, Named};
-use super::progress::Reporter;
+use super::finish::Ready;
+use super::progress::{Reporter, duration, percent};
 use super::scene::Loaded;
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::camera::Camera;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::Result;
 use caustique::estimator::Pixel;
 use caustique::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use caustique::film::{Layer, LayerSet, Selection, describe, output as film};
+use caustique::finish;
 use caustique::image::exr::{self, Attributes};
 use caustique::render::auto::{Choice, choose};
 use caustique::render::output::{Present, shape};
@@ -31,8 +32,6 @@ use summary::Summary;
 
 /// Kinds of cryptomattes.
 const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
-/// Layers that the combiner reads.
-const COMBINED_LAYERS: [&str; 5] = ["Level", "Variance", "albedo", "normal", "depth"];
 
 /// Renders: everything that can be wrong is found before the first light path.
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -58,12 +57,21 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     // Before anything is tried, which takes time.
     memory::check(settings, camera.size(), channels(settings, present))?;
     let interrupt = Interrupt::listen()?;
-    let choice = auto(args, (&scene, &camera), present, &interrupt);
+    let choice = auto(args, (&scene, &camera), present, &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
     memory::check(settings, camera.size(), channels(settings, present))?;
     let mut plan = plan::plan(&plan::Wishes::of(&args.job, choice.as_ref()), &scene, &camera, &removed);
-    let mut network = network(&args.job, settings.levels.count)?;
+    let mut ready = ready(&args.job, settings.levels.count)?;
+    let mut settings = settings.clone();
+    if let (Some(ready), Some(time)) = (&mut ready, settings.time) {
+        // The finish is part of the time that was asked for.
+        let parts = film::names(&shape(&settings, 1, present));
+        let wanted =
+            parts.iter().filter_map(|name| finish::finished_part(name)).filter(|part| selection.wants(part)).count();
+        settings.time = Some(time - ready.reserve(time, camera.size().0 as usize * camera.size().1 as usize, wanted)?);
+    }
+    let settings = &settings;
     let talk = args.progress.for_people();
     if let Some(choice) = choice.as_ref().filter(|_| talk) {
         say(&format!("method: {}", plan::why(choice)));
@@ -78,24 +86,23 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
 
     let mut header = rendered.account((!args.reproducible).then_some(threads));
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let combined_layer = |name: &str| COMBINED_LAYERS.iter().any(|stem| name.starts_with(stem));
-    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (network.is_some() && combined_layer(name));
+    let read = |name: &str| finish::READS.iter().any(|stem| name.starts_with(stem));
+    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (ready.is_some() && read(name));
     let mut set = rendered.layers(present, wanted)?;
     let mut attributes = cryptomattes(&scene, &rendered, args, selection, &mut set)?;
     let summary = Summary::of(&rendered);
     let (size, pictures) = ((set.width, set.height), std::mem::take(&mut rendered.techniques));
     // The pixels are most of the memory, and all that is wanted of them is in the layers now.
     drop(rendered);
-    let mut refusal = None;
-    let mut combined = None;
-    if let Some(network) = &mut network {
-        match network.apply(&mut set) {
-            Ok(facts) => combined = Some(facts),
+    let (mut refusal, mut finished) = (None, None);
+    if let Some(ready) = &mut ready {
+        match ready.finish().apply(&mut set, |name| selection.wants(name)) {
+            Ok(account) => finished = Some(account),
             Err(error) => refusal = Some(error),
         }
     }
-    let combining = clock.seconds();
-    // A render that is still to be combined keeps what the combiner reads.
+    let finishing = clock.seconds();
+    // A render that is still to be finished keeps what that reads.
     if refusal.is_none() {
         set = selection.apply(set)?;
     }
@@ -103,14 +110,20 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     // As `caustique plan` tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
     header.insert("plan".into(), json!(plan));
-    let name = combined.as_ref().and(network.as_ref()).map(|network| (network.name.as_str(), combining));
-    complete(&mut header, args, &scene, combined, cpu_seconds() - cpu_start);
+    let name = finished.as_ref().and(ready.as_ref()).map(Ready::name);
+    let facts = finished.as_ref().zip(ready.as_ref()).map(|(account, ready)| ready.facts(account));
+    complete(&mut header, args, &scene, facts, cpu_seconds() - cpu_start);
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let written = write(args, &set, &attributes);
     let pictured = args.picture.write_png(&set);
     let debugged = techniques::write(args, size, &pictures);
     if talk {
-        summary.tell(name);
+        summary.tell();
+        if let Some(name) = name {
+            let told = finished.as_ref().and_then(|account| account.told).map(|told| told.half);
+            let error = told.map(|error| format!("; its quarters tell an error of {}", percent(error)));
+            say(&format!("finished with {name} in {}{}", duration(finishing), error.unwrap_or_default()));
+        }
     }
     summary.tell_full();
     summary.tell_rejected(args);
@@ -123,7 +136,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     if let Some(error) = refusal {
         let output = args.output.display();
         return Err(error.hint(format!(
-            "the uncombined render is in {output}: 'caustique combine {output} -o OUT.exr' runs the combiner again"
+            "the unfinished render is in {output}: 'caustique combine {output} -o OUT.exr' finishes it"
         )));
     }
     summary.interrupted(args)
@@ -135,12 +148,13 @@ fn auto(
     (scene, camera): (&Scene, &Camera),
     present: Present,
     interrupt: &Interrupt,
-) -> Option<Choice> {
+) -> Result<Option<Choice>> {
+    if args.job.method != Method::Auto {
+        return Ok(None);
+    }
     let layers = |settings: &Settings| selection(args, settings, present).is_ok();
     let make = |way| args.allowed(way, camera.size()).filter(layers);
-    (args.job.method == Method::Auto)
-        .then(|| choose((scene, camera), args.job.free(), make, || interrupt.asked()))
-        .flatten()
+    Ok(choose((scene, camera), &mut args.job.pilot_finish()?, make, || interrupt.asked()))
 }
 
 /// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
@@ -164,6 +178,7 @@ fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Result<(
 /// Channels that a render with these settings can have.
 fn channels(settings: &Settings, present: Present) -> usize {
     let mut names = film::names(&shape(settings, 1, present));
+    names.extend(names.iter().filter_map(|name| finish::finished_part(name)).collect::<Vec<_>>());
     names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
     names.iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
@@ -214,31 +229,18 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
 fn selection(args: &RenderArgs, settings: &Settings, present: Present) -> Result<Selection> {
     let selection = Selection::parse(&args.layers)?;
     let mut names = film::names(&shape(settings, 1, present));
+    if !args.job.no_combine {
+        names.extend(names.iter().filter_map(|name| finish::finished_part(name)).collect::<Vec<_>>());
+    }
     names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
     let layers = names.into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;
     Ok(selection)
 }
 
-/// The combiner, if it is to run.
-pub fn network(args: &Job, levels: usize) -> Result<Option<Named>> {
-    // A single level leaves nothing to combine.
-    if args.no_combine || (levels == 1 && args.model.is_none()) {
-        return Ok(None);
-    }
-    let network = Named::open(args.model.as_deref().unwrap_or(DEFAULT_MODEL)).map_err(|mut error| {
-        if error.kind == Kind::Library {
-            let advice = "or add --no-combine to do without the combiner";
-            error.hint = Some(error.hint.map_or(advice.into(), |hint| format!("{hint}; {advice}")));
-        }
-        error
-    })?;
-    if network.levels() == levels {
-        return Ok(Some(network));
-    }
-    let cause = format!("the network {} combines {} levels, not {}", network.name, network.levels(), levels);
-    let error = Error::new(Kind::Usage, "command line", cause);
-    Err(error.hint(format!("add --no-combine, or render with --levels {}", network.levels())))
+/// The finish, if there is to be one.
+pub fn ready(args: &Job, levels: usize) -> Result<Option<Ready>> {
+    if args.no_combine { Ok(None) } else { args.finish.open(Some(levels)).map(Some) }
 }
 
 /// What the header says besides the render's own account.
@@ -246,19 +248,19 @@ fn complete(
     header: &mut Map<String, Value>,
     args: &RenderArgs,
     scene: &Scene,
-    combined: Option<Value>,
+    finished: Option<Value>,
     core_seconds: f64,
 ) {
     let mut put = |key: &str, value: Value| header.insert(key.into(), value);
     put("arguments", json!(args));
     put("warnings", json!(scene.warnings));
-    // The combined picture has no error estimate of its own.
+    // That of the finished picture is in `combined`.
     put("error_of", "Noisy".into());
-    put("combined", combined.unwrap_or(Value::Null));
+    put("combined", finished.unwrap_or(Value::Null));
     if !args.reproducible
         && let Some(Value::Object(phases)) = header.get_mut("phases")
     {
-        phases.insert("layers_and_combiner".into(), core_seconds.into());
+        phases.insert("layers_and_finish".into(), core_seconds.into());
         header.insert("peak_memory".into(), peak_memory().into());
     }
 }

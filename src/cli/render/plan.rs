@@ -5,7 +5,6 @@ use crate::cli::progress::percent;
 use crate::cli::say;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
-use caustique::estimator::InitialBandwidth;
 use caustique::plan::switch::Removed;
 use caustique::plan::{Asked, Plan, Switches};
 use caustique::render;
@@ -59,18 +58,14 @@ pub fn why(choice: &Choice) -> String {
     let because = choice.because.map(|because| format!(", for {because}")).unwrap_or_default();
     let Some(trial) = choice.trial() else { return format!("auto: {}{because}", choice.way.name()) };
     let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.way != trial.way).collect();
-    others.sort_by(|a, b| a.expected.total_cmp(&b.expected));
-    let error = |trial: &Trial| {
-        if trial.expected.is_finite() { percent(trial.expected.sqrt()) } else { "not all of the caustics".into() }
+    others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
+    let error = |trial: &Trial| match trial.squared_error {
+        squared if squared.is_infinite() => "nothing seen".into(),
+        squared if squared <= 0.0 => "too little to tell".into(),
+        _ => percent(trial.error()),
     };
     let others: Vec<String> = others.iter().map(|other| format!("{} {}", other.way.name(), error(other))).collect();
-    let name = trial.way.name();
-    let settings = &choice.settings;
-    let with = match settings.initial {
-        InitialBandwidth::Nearest(k) => format!(" with {} light paths and {k} neighbours", settings.photons),
-        _ => String::new(),
-    };
-    format!("auto: {name}{with} is expected to reach an error of {} ({}){because}", error(trial), others.join("; "))
+    format!("auto: {}, whose finished pilot has an error of {} ({})", trial.way.name(), error(trial), others.join("; "))
 }
 
 /// Whether the method can do without what media scatter, or finds it.

@@ -41,8 +41,8 @@ impl Summary {
         }
     }
 
-    /// For people: `combined` is the network that ran and its wall-clock seconds.
-    pub fn tell(&self, combined: Option<(&str, f64)>) {
+    /// For people.
+    pub fn tell(&self) {
         let mut line = format!("{} iterations in {} ({})", self.iterations, duration(self.seconds), self.phases);
         if self.light_paths > 0 {
             let rate = count(self.light_paths as f64 / self.seconds.max(1e-9));
@@ -50,10 +50,7 @@ impl Summary {
         }
         say(&line);
         if let Some(error) = self.error {
-            say(&format!("estimated relative error before combining {}", percent(error)));
-        }
-        if let Some((name, seconds)) = combined {
-            say(&format!("combined with {name} in {}", duration(seconds)));
+            say(&format!("estimated relative error before the finish {}", percent(error)));
         }
         say(&format!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30)));
     }

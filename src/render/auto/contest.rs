@@ -1,72 +1,226 @@
-//! Candidates against each other: all for a few iterations, those that may still turn out best for as many more as the pilot may take.
+//! Candidates against each other, each by the finished picture that it makes of the same counted work.
+//!
+//! The first half of a candidate's iterations is finished as the render will be. All pictures are judged alike, by the second halves of candidates that
+//! find all light, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
+//! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
-use super::missing::Caustics;
-use super::trial::{Plan, Running, Trial};
+use super::Way;
+use super::trial::WORST;
+use crate::error::Result;
+use crate::film::LayerSet;
+use crate::finish::{Estimate, Finish, quarters, told};
+use crate::light::Guide;
+use crate::render::cost::Cost;
 use crate::render::method::Method;
+use crate::render::session::{Session, Stage};
+use rayon::prelude::*;
 
-/// Iterations of a candidate: as many as its share of the pilot allows.
-pub(super) const ITERATIONS: (u64, u64) = (6, 64);
-/// Share of the pilot that may go to all candidates alike.
-const FIRST: f64 = 0.25;
-/// Those that are expected to leave so many times the squared error of the best after that are out: a few iterations tell it to a third or so.
+/// Iterations of a candidate: one for each quarter, and as many as its share of the pilot allows.
+pub(super) const ITERATIONS: (u64, u64) = (4, 256);
+/// Share of the pilot that goes to all candidates alike.
+const FIRST: f64 = 0.4;
+/// Those whose picture has so many times the squared error of the best after that are out.
 const UNCLEAR: f64 = 2.0;
-/// A candidate that finds less than this share of the caustics that photons find has not seen them all, and its noise is not known.
-const FOUND: f64 = 0.7;
-/// The same for one that sends photons, of the caustics that guided ones find: those of either kind are a few bright discs where they are rare.
-const SENT: f64 = 0.25;
+/// Standard errors that a difference has to stand out by.
+const TOLD: f64 = 2.0;
+/// A judge has to have seen this share of the caustics that any other has.
+const SEEN: f64 = 0.5;
 
-/// Lets candidates run for so many core-seconds at most and tells how they did. What is clear after the first iterations costs no more. Those are all there are once
-/// `stop` holds.
-pub(super) fn hold(running: &mut [Running<'_>], plan: &Plan, allowed: f64, stop: &dyn Fn() -> bool) -> Vec<Trial> {
-    let share = FIRST * allowed / running.len() as f64;
-    running.iter_mut().for_each(|running| running.advance(share, ITERATIONS, stop));
-    let values = running[0].values();
-    let trials = compare(running, plan, &values);
-    let least = trials.iter().map(|trial| trial.expected).fold(f64::INFINITY, f64::min);
-    let spent: f64 = running.iter().map(Running::spent).sum();
-    let mut open: Vec<&mut Running<'_>> = running
-        .iter_mut()
-        .zip(&trials)
-        .filter_map(|(running, trial)| (trial.expected < UNCLEAR * least).then_some(running))
+/// A candidate and how it did.
+#[derive(Clone, Copy, Debug)]
+pub struct Trial {
+    /// The candidate.
+    pub way: Way,
+    /// relMSE without the worst pixels of the pilot's finished picture, from half of its iterations. Noise around a small one may make it negative; infinite where
+    /// nothing was seen.
+    pub squared_error: f64,
+    /// Counted core-seconds of an iteration of the whole picture.
+    pub seconds_per_iteration: f64,
+    /// The counts behind it.
+    pub(super) cost: Cost,
+}
+
+/// A candidate being tried.
+pub(super) struct Candidate<'a> {
+    way: Way,
+    session: Session<'a>,
+    cost: Cost,
+    /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what comes before iterations.
+    once: f64,
+    whole: f64,
+    spent: f64,
+}
+
+/// What a candidate's iterations show.
+struct Shown {
+    finished: Vec<[f32; 3]>,
+    judges: [Vec<[f32; 3]>; 2],
+    /// Relative variance of the judges, without the worst pixels, and the mean of their caustics.
+    noise: f64,
+    caustics: f64,
+}
+
+impl Trial {
+    /// The relative error: the root of [`Trial::squared_error`], 0 where noise hides it.
+    pub fn error(&self) -> f64 {
+        self.squared_error.max(0.0).sqrt()
+    }
+}
+
+impl<'a> Candidate<'a> {
+    /// Nothing done yet but what comes before iterations. `count` counts work with the guide that is learnt here, if any, and says what an
+    /// iteration costs in the small picture and the whole one.
+    pub fn new(stage: &'a Stage<'a>, way: Way, count: impl Fn(Option<&Guide>) -> (Cost, f64, f64)) -> Candidate<'a> {
+        let session = Session::new(stage);
+        let (cost, once, whole) = count(session.guide());
+        Candidate { way, session, cost, once, whole, spent: 0.0 }
+    }
+
+    /// Goes on until so many core-seconds are spent; no further than the least number of iterations once `stop` holds.
+    fn advance(&mut self, seconds: f64, stop: &dyn Fn() -> bool) {
+        let to = ((seconds / self.once) as u64).clamp(ITERATIONS.0, ITERATIONS.1);
+        while self.session.iterations() < to && !(self.session.iterations() >= ITERATIONS.0 && stop()) {
+            self.session.step();
+            self.spent += self.once;
+        }
+    }
+
+    /// The layers that a finish reads.
+    fn layers(&mut self) -> Result<LayerSet> {
+        const READ: [&str; 5] = ["Noisy", "Variance", "Quarter", "albedo", "normal"];
+        self.session.layers(|name| READ.iter().any(|stem| name.starts_with(stem)))
+    }
+
+    /// `None` where a quarter of it is black, or it cannot be finished.
+    fn show(&mut self, finish: &mut Finish) -> Option<Shown> {
+        let set = self.layers().ok()?;
+        let quarters = quarters(&set)?;
+        let estimate = Estimate::of(&set).ok()?;
+        let finished = finish.picture(&estimate.first_half(&quarters)).ok()?;
+        let [_, _, a, b] = quarters;
+        let caustics: f64 =
+            self.session.pixels().iter().map(|p| p.parts.caustic.element_sum() / f64::from(p.iterations.max(1))).sum();
+        let noise = variance(&a, &b, &finished);
+        Some(Shown { finished, judges: [a, b], noise, caustics })
+    }
+}
+
+/// Relative squared difference of two pictures, without the worst pixels.
+fn variance(a: &[[f32; 3]], b: &[[f32; 3]], values: &[[f32; 3]]) -> f64 {
+    let square = |index: usize| -> f64 {
+        let apart: f64 = (0..3).map(|c| f64::from(a[index][c] - b[index][c]).powi(2)).sum();
+        let value = values[index].iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
+        apart / 3.0 * super::trial::scale(value)
+    };
+    let mut squares: Vec<f64> = (0..a.len()).into_par_iter().map(square).collect();
+    squares.sort_unstable_by(f64::total_cmp);
+    squares.truncate(squares.len() - (squares.len() as f64 * WORST) as usize);
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
+}
+
+/// Whether a way finds all light of a scene: connections do where no glass focuses any, which they find too rarely; merging and gathering do everywhere.
+fn is_complete(way: Way, focuses: bool) -> bool {
+    match way.method {
+        Method::Path | Method::Bdpt => !focuses,
+        Method::Vcm => true,
+        _ => false,
+    }
+}
+
+/// The judges, and the candidate whose finished picture says what pixels are worth: means of those of the candidates that find all light, by what their noise is; where these have not seen the caustics that another shows, that one.
+fn judges(candidates: &[Candidate<'_>], shown: &[Option<Shown>], focuses: bool) -> Option<([Vec<[f32; 3]>; 2], usize)> {
+    let all =
+        || candidates.iter().zip(shown).enumerate().filter_map(|(k, (c, shown))| Some((k, c.way, shown.as_ref()?)));
+    let most = all()
+        .filter(|(_, way, _)| way.method.gathers() || way.guided)
+        .max_by(|a, b| a.2.caustics.total_cmp(&b.2.caustics));
+    let seen = |shown: &Shown| most.as_ref().is_none_or(|(.., most)| shown.caustics >= SEEN * most.caustics);
+    let mut chosen: Vec<(usize, &Shown)> = all()
+        .filter(|(_, way, shown)| is_complete(*way, focuses) && seen(shown))
+        .map(|(k, _, shown)| (k, shown))
         .collect();
-    if open.len() < 2 {
+    if chosen.is_empty() {
+        chosen.extend(most.map(|(k, _, shown)| (k, shown)).or_else(|| all().next().map(|(k, _, shown)| (k, shown))));
+    }
+    let least = chosen.iter().min_by(|a, b| a.1.noise.total_cmp(&b.1.noise))?.0;
+    let weights: Vec<f64> = chosen.iter().map(|(_, shown)| 1.0 / shown.noise.max(f64::MIN_POSITIVE)).collect();
+    let total: f64 = weights.iter().sum();
+    let mean = |judge: usize| {
+        let pixel = |index: usize| {
+            std::array::from_fn(|c| {
+                let parts =
+                    chosen.iter().zip(&weights).map(|((_, shown), w)| w * f64::from(shown.judges[judge][index][c]));
+                (parts.sum::<f64>() / total) as f32
+            })
+        };
+        (0..chosen[0].1.finished.len()).map(pixel).collect()
+    };
+    Some(([mean(0), mean(1)], least))
+}
+
+/// Lets candidates run for so many core-seconds at most and tells how they did. What is clear after the first share costs no more. Those are all there are once
+/// `stop` holds.
+pub(super) fn hold(
+    candidates: &mut [Candidate<'_>],
+    finish: &mut Finish,
+    focuses: bool,
+    allowed: f64,
+    stop: &dyn Fn() -> bool,
+) -> Vec<Trial> {
+    let share = FIRST * allowed / candidates.len() as f64;
+    candidates.iter_mut().for_each(|candidate| candidate.advance(share, stop));
+    let (trials, open) = compare(candidates, finish, focuses, share);
+    let count = open.iter().filter(|open| **open).count();
+    if count < 2 {
         return trials;
     }
-    let share = (allowed - spent).max(0.0) / open.len() as f64;
-    open.iter_mut().for_each(|running| running.advance(share, ITERATIONS, stop));
-    compare(running, plan, &values)
+    let closed: f64 =
+        candidates.iter().zip(&open).map(|(candidate, open)| if *open { 0.0 } else { candidate.spent }).sum();
+    let share = (allowed - closed) / count as f64;
+    candidates
+        .iter_mut()
+        .zip(&open)
+        .filter(|(_, open)| **open)
+        .for_each(|(candidate, _)| candidate.advance(share, stop));
+    let (again, _) = compare(candidates, finish, focuses, share);
+    // Those that are out stay out: they have had less.
+    trials.into_iter().zip(again).zip(open).map(|((first, again), open)| if open { again } else { first }).collect()
 }
 
-/// How those that are being tried have done so far.
-fn compare(running: &[Running<'_>], plan: &Plan, values: &[f64]) -> Vec<Trial> {
-    let mut trials: Vec<Trial> = running.iter().map(|running| running.trial(plan, values)).collect();
-    let found: Vec<&Caustics> = running.iter().map(Running::found).collect();
-    rule_out(&mut trials);
-    add_missing(&mut trials, &found, (values, running[0].width()));
-    trials
-}
-
-/// Adds what connections leave out of what merging finds: `found` has the caustics of each. `values` are what the pixels of the pilot's picture are worth, which is so wide.
-fn add_missing(trials: &mut [Trial], found: &[&Caustics], (values, width): (&[f64], usize)) {
-    let Some(merging) = trials.iter().position(|trial| trial.way.method == Method::Vcm) else { return };
-    for (trial, own) in trials.iter_mut().zip(found) {
-        if matches!(trial.way.method, Method::Path | Method::Bdpt) {
-            trial.expected += own.missing(found[merging], values, width);
-        }
-    }
-}
-
-/// Rules out what has not seen the caustics that photons show.
-fn rule_out(trials: &mut [Trial]) {
-    let most = |guided: bool| {
-        let gathers = |trial: &&Trial| trial.way.method.gathers() && trial.way.guided == guided;
-        trials.iter().filter(gathers).map(|trial| trial.caustics).fold(0.0, f64::max)
+/// How all have done by `share` core-seconds each, and which may still turn out best.
+fn compare(
+    candidates: &mut [Candidate<'_>],
+    finish: &mut Finish,
+    focuses: bool,
+    share: f64,
+) -> (Vec<Trial>, Vec<bool>) {
+    let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
+    let judged = judges(candidates, &shown, focuses);
+    let values = judged.as_ref().and_then(|(_, worth)| shown[*worth].as_ref()).map(|shown| &shown.finished);
+    let errors = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Vec<f64>> {
+        let (shown, ([a, b], _)) = (shown.as_ref()?, judged.as_ref()?);
+        // Of what has cost more, since the least number of iterations does, as much as the same work would have left.
+        let more = (candidate.spent / share).max(1.0);
+        let errors = told::squared_errors(&shown.finished, [a, b], values?);
+        Some(errors.into_iter().map(|error| error * more).collect())
     };
-    let [unguided, guided] = [false, true].map(most);
-    for trial in trials.iter_mut().filter(|trial| !trial.way.guided) {
-        let least = if trial.way.method.has_bandwidths() { SENT * guided } else { FOUND * unguided.max(guided) };
-        if trial.caustics < least {
-            trial.expected = f64::INFINITY;
-        }
-    }
+    let errors: Vec<Option<Vec<f64>>> = candidates.iter().zip(&shown).map(|(c, shown)| errors(c, shown)).collect();
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+    let squared: Vec<f64> = errors.iter().map(|e| e.as_ref().map_or(f64::INFINITY, |e| mean(e))).collect();
+    let best =
+        (0..squared.len()).min_by(|&a, &b| squared[a].total_cmp(&squared[b])).and_then(|best| errors[best].as_ref());
+    // What two pictures differ by, and what the judges' noise makes of that.
+    let open = |errors: &Option<Vec<f64>>| {
+        let (Some(errors), Some(best)) = (errors, best) else { return false };
+        let apart: Vec<f64> = errors.iter().zip(best).map(|(a, b)| a - b).collect();
+        let squares: Vec<f64> = apart.iter().map(|apart| apart * apart).collect();
+        let noise = (mean(&squares) / apart.len() as f64).sqrt();
+        mean(&apart) < ((UNCLEAR - 1.0) * mean(best)).max(TOLD * noise)
+    };
+    let open = errors.iter().map(open).collect();
+    let trial = |(candidate, squared_error): (&Candidate<'_>, f64)| {
+        let Candidate { way, cost, whole, .. } = *candidate;
+        Trial { way, squared_error, seconds_per_iteration: whole, cost }
+    };
+    (candidates.iter().zip(squared).map(trial).collect(), open)
 }

@@ -1,15 +1,13 @@
 //! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
 
-use super::contest;
-use super::trial::{self, Plan, Running, Trial};
+use super::Way;
+use super::contest::{self, Candidate, Trial};
+use super::trial;
 use super::weights::{self, Weighed};
-use super::{Free, Way};
 use crate::camera::Camera;
-use crate::estimator::InitialBandwidth;
-use crate::light::Guide;
+use crate::finish::Finish;
 use crate::plan::Presence;
 use crate::render::cost::Cost;
-use crate::render::guiding::ROUNDS;
 use crate::render::method::Method;
 use crate::render::session::Stage;
 use crate::render::settings::Settings;
@@ -22,8 +20,13 @@ const SHARE: f64 = 0.05;
 const WEIGHING: f64 = 0.2;
 /// Share of the render's cost that the least of all pilots may take: in a render that short a wrong way costs more.
 const LEAST_SHARE: f64 = 0.1;
-/// Pixels of the pilot's picture.
-const PIXELS: (f64, f64) = (768.0, 4096.0);
+/// Pixels of the pilot's picture: fewer show a denoiser nothing, more would take their time from iterations.
+const PIXELS: (f64, f64) = (1024.0, 16384.0);
+/// Pixels of the picture by which effects are weighed.
+const WEIGHED: f64 = 768.0;
+/// Iterations of a candidate over those of the render: near to the render's own, so that what they leave is what the render will, and few enough that the picture
+/// is not much smaller.
+const ITERATIONS: f64 = 0.25;
 /// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of it. One core takes twice
 /// that share.
 const CORES: f64 = 2.0;
@@ -34,18 +37,18 @@ fn focuses(scene: &Scene) -> bool {
     !scene.lights.targets().spheres().is_empty()
 }
 
-/// The ways worth trying in a scene; `gathering` is the method where photons bring all light.
-fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
+/// The ways worth trying in a scene.
+fn candidates(scene: &Scene) -> Vec<Way> {
     let focusing = focuses(scene);
     let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering());
     let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
-    let mut ways = vec![plain(gathering)];
+    let mut ways = vec![plain(Method::Sppm)];
     if focusing {
         // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and guided paths take longer.
         if !scattering {
             ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
         }
-        ways.push(plain(Method::Vcm));
+        ways.extend([plain(Method::Cppm), plain(Method::Vcm)]);
     }
     // What photons alone find, these leave out.
     if !(focusing && sizeless) {
@@ -56,19 +59,7 @@ fn candidates(scene: &Scene, gathering: Method) -> Vec<Way> {
 
 /// The candidates that other wishes leave, with their settings.
 fn ways(scene: &Scene, make: &impl Fn(Way) -> Option<Settings>) -> Vec<(Way, Settings)> {
-    // Bandwidths that shrink only where photons do not look uniform are better ones. Of several levels each would shrink on its own, and the combiner has
-    // learnt on levels that keep their ratios.
-    let counted = make(Way { method: Method::Cppm, ..Way::UNTRIED }).is_some_and(|settings| settings.levels.count == 1);
-    let gathering = if counted { Method::Cppm } else { Method::Sppm };
-    candidates(scene, gathering).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect()
-}
-
-/// What a trial takes before it begins, in iterations of it.
-fn setup((way, settings): &(Way, Settings)) -> f64 {
-    // Learning a guide takes about as much as an iteration every other round; initial bandwidths by neighbours need photons and eye paths.
-    let learning = if way.guided { ROUNDS as f64 / 2.0 } else { 0.0 };
-    let bandwidths = way.method.gathers() && matches!(settings.initial, InitialBandwidth::Nearest(_));
-    learning + if bandwidths { 1.0 } else { 0.0 }
+    candidates(scene).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect()
 }
 
 /// What a pilot is of.
@@ -100,15 +91,15 @@ impl<'a> Pilot<'a> {
         Pilot { scene, camera, untried, cost, pixels, budget }
     }
 
-    /// Pixels of the smallest picture that says anything.
+    /// Pixels of the picture by which effects are weighed.
     fn least(&self) -> f64 {
-        PIXELS.0.min(self.pixels)
+        WEIGHED.min(self.pixels)
     }
 
     /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is too short, only those of light are weighed, or none.
     pub fn weigh(&self) -> (Vec<Weighed>, f64) {
-        let settings = weights::settings(self.untried, trial::PHOTONS.0);
-        let once = self.cost.of(Way::UNTRIED, &settings, self.least()) * contest::ITERATIONS.0 as f64;
+        let settings = weights::settings(self.untried, trial::PHOTONS);
+        let once = self.cost.of(Way::UNTRIED, &settings, self.least()) * weights::ITERATIONS as f64;
         let most = WEIGHING * SHARE * self.budget;
         let mut taken = weights::PICTURES as f64 * once;
         if taken > most {
@@ -131,7 +122,7 @@ impl<'a> Pilot<'a> {
     pub fn try_all(
         &self,
         weighing: f64,
-        free: Free,
+        finish: &mut Finish,
         make: &impl Fn(Way) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
@@ -141,49 +132,44 @@ impl<'a> Pilot<'a> {
             return (Vec::new(), Some("the one way that these options leave"));
         }
         let allowed = SHARE * budget - weighing;
-        let Some((small, photons)) = self.size(&ways, allowed, LEAST_SHARE * budget - weighing) else {
+        let Some((small, allowed)) = self.size(&ways, allowed, LEAST_SHARE * budget - weighing) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
         let (width, height) = small.size();
-        let plan = Plan { photons, budget: (1.0 - SHARE) * budget, free, pixels };
-        let stages: Vec<Stage<'_>> =
-            ways.iter().map(|(_, settings)| Stage::new(scene, &small, &trial::settings(settings, photons))).collect();
-        let cost_with =
-            |guide: Option<&Guide>| guide.map_or(cost, |guide| Cost::count(scene, camera, untried, Some(guide)));
-        let mut running: Vec<Running<'_>> = stages
+        let few = f64::from(width) * f64::from(height);
+        // As many light paths for a pixel as in the render.
+        let stages: Vec<Stage<'_>> = ways
+            .iter()
+            .map(|(_, settings)| Stage::new(scene, &small, &trial::settings(settings, few / pixels)))
+            .collect();
+        let mut candidates: Vec<Candidate<'_>> = stages
             .iter()
             .zip(&ways)
-            .map(|(stage, tried @ (way, _))| {
-                let once = cost.of(*way, stage.settings(), f64::from(width) * f64::from(height));
-                Running::new(stage, tried, (once, setup(tried)), cost_with)
+            .map(|(stage, (way, settings))| {
+                Candidate::new(stage, *way, |guide| {
+                    let cost = guide.map_or(cost, |guide| Cost::count(scene, camera, untried, Some(guide)));
+                    (cost, cost.of(*way, stage.settings(), few), cost.of(*way, settings, pixels))
+                })
             })
             .collect();
-        (contest::hold(&mut running, &plan, allowed, stop), None)
+        (contest::hold(&mut candidates, finish, focuses(scene), allowed, stop), None)
     }
 
-    /// The picture that is tried and the share of the render's light paths, where a few iterations of all `ways` take half of what is allowed, or more where that is too
-    /// little; `None` where even the least picture takes more than `most`.
+    /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too little for the smallest picture; `None` where even that takes
+    /// more than `most`.
     fn size(&self, ways: &[(Way, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
-        let trial_cost = |pixels: f64, photons: f64| -> f64 {
-            let each = |tried @ (way, settings): &(Way, Settings)| {
-                let once = self.cost.of(*way, &trial::settings(settings, photons), pixels);
-                (contest::ITERATIONS.0 as f64 + setup(tried)) * once
-            };
-            ways.iter().map(each).sum()
+        let once = |way: &Way, settings: &Settings, pixels: f64| {
+            self.cost.of(*way, &trial::settings(settings, pixels / self.pixels), pixels)
         };
-        let (least, few) = (self.least(), trial::PHOTONS.0);
-        if trial_cost(least, few) > most {
-            return None;
-        }
-        // The cost grows linearly with pixels.
-        let allowed = 0.5 * allowed;
-        let slope = (trial_cost(2.0 * least, few) - trial_cost(least, few)) / least;
-        let pixels = least + (allowed - trial_cost(least, few)).max(0.0) / slope.max(1e-12);
-        let factor = (pixels.clamp(least, PIXELS.1.max(least)) / self.pixels).sqrt().min(1.0);
-        let small = self.camera.sparse(factor);
-        let (width, height) = small.size();
-        // What is left makes the light paths as many as in the render, so that bandwidths are as wide.
-        let spare = allowed / trial_cost(f64::from(width) * f64::from(height), few);
-        Some((small, (few * spare).clamp(few, trial::PHOTONS.1)))
+        let dearest = |pixels: f64| ways.iter().map(|(way, settings)| once(way, settings, pixels)).fold(0.0, f64::max);
+        let count = ways.len() as f64;
+        // Work per pixel is the same as in the render, so iterations and pixels share what there is.
+        let wanted = self.pixels * allowed / (count * ITERATIONS * self.budget);
+        let least = PIXELS.0.min(self.pixels);
+        let pixels = wanted.clamp(least, PIXELS.1.max(least)).min(self.pixels);
+        let needed = |pixels: f64| count * contest::ITERATIONS.0 as f64 * dearest(pixels);
+        let pixels = if needed(pixels) > allowed { least } else { pixels };
+        (needed(pixels) <= most)
+            .then(|| (self.camera.smaller((pixels / self.pixels).sqrt()), allowed.max(needed(pixels))))
     }
 }

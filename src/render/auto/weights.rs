@@ -5,7 +5,6 @@
 //! halves of the iterations, whose noise is not the same: what they have in common is the light.
 
 use super::Way;
-use super::contest::ITERATIONS;
 use super::trial::{self, WORST, mean, scale, values};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
@@ -20,8 +19,9 @@ use crate::scene::Scene;
 const WHOLE: [Effect; 5] = [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];
 /// Effects that are in parts of others.
 const APART: [Effect; 2] = [Effect::Glossy, Effect::Sds];
-/// Iterations of each half of a picture.
-const HALF: u64 = ITERATIONS.0 / 2;
+/// Iterations of a picture, and of each half of it.
+pub(super) const ITERATIONS: u64 = 6;
+const HALF: u64 = ITERATIONS / 2;
 /// Standard errors that a difference has to stand out by.
 const TOLD: f64 = 2.0;
 /// Core-seconds that a triangle takes to be committed to Embree (one core, 250,000 of them: 0.4 us).
@@ -105,7 +105,7 @@ fn light(of: &Halves, less: Option<&Halves>) -> [Vec<DVec3>; 2] {
 
 /// All classes of light paths are weighed, those too that are switched off: what that leaves out is told.
 pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
-    Settings { classes: ClassSet::ALL, ..trial::settings(of, photons) }
+    Settings { classes: ClassSet::ALL, ..trial::with_levels(of, photons) }
 }
 
 /// What light of so many pixels means to pictures that are worth `values`.

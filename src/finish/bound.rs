@@ -1,0 +1,147 @@
+//! The bounded displacement: what a denoiser may change, by how sure the estimate is.
+//!
+//! ```text
+//! out = M + clip(D - M, -c s, c s)
+//! ```
+//!
+//! `M` is the estimate, `D` the denoiser's picture, `s` the larger of the pixel's own standard error and a high percentile of those around
+//! it, which stand in where a pixel has not met the rare bright sample yet. As `s` falls with the iterations, so does the displacement:
+//! whatever `D` is, the picture tends to what `M` tends to (`docs/theory.md`).
+//! The result stays between zero and the brightest estimate around.
+
+use super::window::{Size, window};
+use rayon::prelude::*;
+
+/// `c`: how many standard errors a pixel may be moved.
+pub const LIMIT: f32 = 3.0;
+/// Pixels to each side of the window in which standard errors are ranked.
+pub const REACH: usize = 3;
+/// Share of the window's standard errors that are no larger than the one taken.
+const RANK: f32 = 0.8;
+
+/// The larger of each pixel's standard error and the one of rank [`RANK`] around it, by channel; not finite ones count as unknown,
+/// larger than all.
+pub fn spread(deviation: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
+    let of_pixel = |ranked: &mut Vec<f32>, index: usize| {
+        std::array::from_fn(|c| {
+            let known = |value: f32| if value.is_finite() { value.max(0.0) } else { f32::INFINITY };
+            ranked.clear();
+            ranked.extend(window(size, index, REACH).map(|other| known(deviation[other][c])));
+            let rank = (RANK * (ranked.len() - 1) as f32).round() as usize;
+            let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
+            known(deviation[index][c]).max(*around)
+        })
+    };
+    (0..deviation.len()).into_par_iter().map_init(Vec::new, of_pixel).collect()
+}
+
+/// `mean` displaced towards `denoised` by at most [`LIMIT`] of `spread`; not below zero, not above the largest estimate within [`REACH`].
+///
+/// A value of `denoised` that is no number changes nothing; where `mean` is none, `denoised` stands alone.
+pub fn bounded(mean: &[[f32; 3]], denoised: &[[f32; 3]], spread: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
+    let displaced = |index: usize, c: usize| {
+        let (m, d) = (mean[index][c], denoised[index][c]);
+        match (m.is_finite(), d.is_finite()) {
+            (true, true) => {
+                let most = LIMIT * spread[index][c];
+                m + (d - m).clamp(-most, most)
+            }
+            (true, false) => m,
+            (false, true) => d,
+            (false, false) => 0.0,
+        }
+    };
+    let of_pixel = |index: usize| {
+        let mut brightest = [0f32; 3];
+        for other in window(size, index, REACH) {
+            for (most, value) in brightest.iter_mut().zip(mean[other]) {
+                *most = most.max(if value.is_finite() { value } else { 0.0 });
+            }
+        }
+        std::array::from_fn(|c| displaced(index, c).min(brightest[c]).max(0.0))
+    };
+    (0..mean.len()).into_par_iter().map(of_pixel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Domain, Purpose, Stream};
+
+    const SIZE: Size = Size { width: 40, height: 30 };
+
+    fn noise(seed: u64, index: usize) -> f32 {
+        Stream::new(seed, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel)
+    }
+
+    fn plane(of: impl Fn(usize) -> f32) -> Vec<[f32; 3]> {
+        (0..SIZE.pixels()).map(|index| [of(index), 2.0 * of(index), 0.5 * of(index)]).collect()
+    }
+
+    /// A denoiser that returns nonsense moves no pixel by more than the bound, and what it returns where it is not a number is not used.
+    #[test]
+    fn nonsense_is_bounded() {
+        let mean = plane(|index| 1.0 + 0.1 * noise(1, index));
+        let deviation = plane(|index| 0.01 + 0.01 * noise(2, index));
+        let spread = spread(&deviation, SIZE);
+        for nonsense in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e30, 1e30, 0.0] {
+            let out = bounded(&mean, &plane(|_| nonsense), &spread, SIZE);
+            for (index, out) in out.iter().enumerate() {
+                for c in 0..3 {
+                    let (moved, most) = ((out[c] - mean[index][c]).abs(), LIMIT * spread[index][c]);
+                    assert!(moved <= most * 1.0001, "{nonsense}: moved by {moved}, allowed {most}");
+                    assert!(nonsense.is_finite() || out[c] == mean[index][c]);
+                }
+            }
+        }
+    }
+
+    /// The consistency of `docs/theory.md`: with standard errors that fall as 1/sqrt(n), the squared distance to the truth of the estimate with a
+    /// fixed wrong denoiser falls with a slope of -1 in n over two decades. Without the bound it would not fall at all.
+    #[test]
+    fn whatever_the_denoiser_the_error_falls_as_that_of_its_input() {
+        let wrong = plane(|index| 7.0 * noise(5, index));
+        let error = |n: f32| {
+            let deviation = plane(|_| n.sqrt().recip());
+            // Uniform noise of that deviation.
+            let mean = plane(|index| 3.0 + (12f32 / n).sqrt() * (noise(n as u64, index) - 0.5));
+            let out = bounded(&mean, &wrong, &spread(&deviation, SIZE), SIZE);
+            out.iter().map(|out| f64::from((out[0] - 3.0).powi(2))).sum::<f64>() / SIZE.pixels() as f64
+        };
+        let slope = (error(1e5).ln() - error(1e3).ln()) / 100f64.ln();
+        assert!((slope + 1.0).abs() < 0.05, "{slope}");
+    }
+
+    /// A bright sample is let go where the pixel itself is as unsure as it is bright; its neighbours, sure of themselves, do not take it over.
+    #[test]
+    fn a_firefly_goes_and_its_neighbours_stay() {
+        let at = 15 * SIZE.width + 20;
+        let mean = plane(|index| if index == at { 100.0 } else { 1.0 });
+        let deviation = plane(|index| if index == at { 100.0 } else { 0.1 });
+        let smeared = plane(|_| 5.0);
+        let out = bounded(&mean, &smeared, &spread(&deviation, SIZE), SIZE);
+        assert_eq!(out[at][0], 5.0);
+        assert!(out.iter().enumerate().all(|(index, out)| index == at || out[0] < 1.31));
+        // Nor is anything brighter than what was estimated around.
+        let far = bounded(&mean, &plane(|_| 1e6), &plane(|_| 1e6), SIZE);
+        assert!(far.iter().all(|out| out[0] <= 100.0) && far[0][0] == 1.0);
+        let dark = bounded(&mean, &plane(|_| -1e6), &plane(|_| 1e6), SIZE);
+        assert!(dark.iter().flatten().all(|value| *value == 0.0));
+    }
+
+    #[test]
+    fn pictures_of_any_shape() {
+        for (width, height) in [(0, 0), (1, 1), (1, 50), (50, 1), (3, 2)] {
+            let size = Size { width, height };
+            let values = vec![[1.0; 3]; size.pixels()];
+            assert_eq!(bounded(&values, &values, &spread(&values, size), size), values);
+        }
+    }
+
+    #[test]
+    fn what_is_unknown_may_be_anything_and_no_estimate_is_replaced() {
+        let size = Size { width: 2, height: 1 };
+        let out = bounded(&[[f32::NAN; 3], [4.0; 3]], &[[3.0; 3]; 2], &[[f32::INFINITY; 3], [0.0; 3]], size);
+        assert_eq!(out, [[3.0; 3], [4.0; 3]]);
+    }
+}

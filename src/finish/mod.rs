@@ -1,0 +1,260 @@
+//! What is delivered: the estimate, denoised within what its own standard errors allow.
+//!
+//! 1. The estimate `M`: the usual single-bandwidth image, or what equation (6) of the 2021 paper combines from levels where its network was asked for.
+//! 2. A denoiser's picture `D` of it ([`denoiser`]).
+//! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent whatever `D` is.
+//! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
+//! 5. The error of the result, told by independent quarters of the iterations ([`told`]).
+//!
+//! All of it reads and writes named layers, so that a stored picture, also one of another renderer, is finished as a fresh one is.
+
+pub mod bound;
+pub mod denoiser;
+pub mod parts;
+pub mod statistical;
+pub mod told;
+mod window;
+
+pub use denoiser::{Choice, Denoiser, Quality};
+pub use window::Size;
+
+use crate::combine::{Combiner, LevelStack};
+use crate::error::{Error, Kind, Result};
+use crate::film::{Layer, LayerSet, Role};
+use parts::Part;
+use rayon::prelude::*;
+
+/// The additive parts of our layers, the last one the one that light of no part goes to.
+const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
+/// Quarters of the iterations.
+const QUARTERS: usize = 4;
+
+/// Layers of ours that finishing reads, by the beginnings of their names.
+pub const READS: [&str; 11] = [
+    "Noisy", "Level", "Variance", "Quarter", "albedo", "normal", "Direct", "Indirect", "Caustic", "Emission", "Volume",
+];
+
+/// The layer of a finished part; `None` for layers that are no parts.
+pub fn finished_part(name: &str) -> Option<String> {
+    PARTS.contains(&name).then(|| format!("Combined{name}"))
+}
+
+/// A picture with its noise and what guides a denoiser, row by row from the top.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// Width and height of all planes.
+    pub size: Size,
+    /// Radiance.
+    pub mean: Vec<[f32; 3]>,
+    /// Standard error of `mean`; infinite where nothing is known.
+    pub deviation: Vec<[f32; 3]>,
+    /// Reflectance at the first rough hit, 0 to 1.
+    pub albedo: Option<Vec<[f32; 3]>>,
+    /// Normal there, world space.
+    pub normal: Option<Vec<[f32; 3]>>,
+}
+
+/// The number of the level that is the method's own image: the second largest.
+fn own_level(set: &LayerSet) -> usize {
+    let count = (1..).take_while(|level| set.get(&format!("Variance{level}")).is_some()).count();
+    count.saturating_sub(1).max(1)
+}
+
+impl Estimate {
+    /// The estimate in a picture of ours (`Noisy`, `Variance1`, ...), or in one of another renderer: its beauty, and its layer `Variance`
+    /// (of the mean) or two independent halves, `Half1` and `Half2` or `HalfA` and `HalfB`. Albedo and normal by the names that renderers give them.
+    ///
+    /// # Errors
+    /// There is no picture, or nothing tells its noise.
+    pub fn of(set: &LayerSet) -> Result<Estimate> {
+        let size = Size { width: set.width, height: set.height };
+        let mean = set.get("Noisy").map_or_else(|| set.beauty(), |layer| Ok(layer.triples()))?;
+        let variance = set.get(&format!("Variance{}", own_level(set))).or_else(|| set.get("Variance"));
+        let halves = [["Half1", "Half2"], ["HalfA", "HalfB"]].iter().find_map(|names| {
+            let [a, b] = names.map(|name| set.get(name).map(Layer::triples));
+            a.zip(b)
+        });
+        let deviation = match (variance, halves) {
+            (Some(variance), _) => {
+                let root = |rgb: [f32; 3]| rgb.map(|v| if v >= 0.0 { v.sqrt() } else { f32::INFINITY });
+                variance.triples().into_par_iter().map(root).collect()
+            }
+            // Half the difference of two halves has the variance of their mean.
+            (None, Some((a, b))) => {
+                a.par_iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] - b[c]).abs())).collect()
+            }
+            (None, None) => {
+                let error = Error::new(
+                    Kind::Image,
+                    "",
+                    "nothing tells how noisy the picture is: there is no layer Variance1, Variance, or Half1 and Half2",
+                );
+                return Err(
+                    error.hint("render with --layers all, or add the variance of the mean, or two independent halves")
+                );
+            }
+        };
+        let guide = |role| set.find(role).filter(|layer| layer.planes.len() >= 3).map(Layer::triples);
+        Ok(Estimate { size, mean, deviation, albedo: guide(Role::Albedo), normal: guide(Role::Normal) })
+    }
+
+    /// The estimate by the first two quarters alone.
+    #[must_use]
+    pub fn first_half(&self, quarters: &[Vec<[f32; 3]>; QUARTERS]) -> Estimate {
+        let deviation = self.deviation.iter().map(|s| s.map(|s| s * std::f32::consts::SQRT_2)).collect();
+        Estimate { mean: told::first_half(quarters), deviation, ..self.clone() }
+    }
+}
+
+/// The pictures of the four quarters of the iterations; `None` where one is missing or black.
+pub fn quarters(set: &LayerSet) -> Option<[Vec<[f32; 3]>; QUARTERS]> {
+    let layers: Vec<Vec<[f32; 3]>> =
+        (1..=QUARTERS).filter_map(|k| set.get(&format!("Quarter{k}"))).map(Layer::triples).collect();
+    let quarters = <[Vec<[f32; 3]>; QUARTERS]>::try_from(layers).ok()?;
+    let black = |quarter: &Vec<[f32; 3]>| quarter.iter().flatten().all(|value| *value == 0.0);
+    (!quarters.iter().any(black)).then_some(quarters)
+}
+
+/// The error of a finished picture as its quarters tell it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Told {
+    /// Root of the trimmed relMSE of a picture finished from half of the iterations at the least quality, which the delivered one is better than; zero where noise hides it.
+    /// Bias that all quarters have in common is not in it.
+    pub half: f64,
+}
+
+/// What finishes pictures.
+pub struct Finish {
+    denoiser: Denoiser,
+    /// Quality of Open Image Denoise.
+    pub quality: Quality,
+    network: Option<Combiner>,
+}
+
+/// What was done.
+#[derive(Clone, Debug)]
+pub struct Account {
+    /// The denoiser.
+    pub denoiser: String,
+    /// Levels that equation (6) has combined, if it has.
+    pub combined: Option<usize>,
+    /// The error, where the picture has quarters.
+    pub told: Option<Told>,
+}
+
+impl Finish {
+    /// With a denoiser, and perhaps the network of equation (6).
+    pub fn new(denoiser: Denoiser, network: Option<Combiner>) -> Finish {
+        Finish { denoiser, quality: Quality::High, network }
+    }
+
+    /// The denoiser's name.
+    pub fn denoiser(&self) -> String {
+        self.denoiser.name()
+    }
+
+    /// Denoises a grey picture at the least quality, so that somebody can see how long that takes; the first time loads what later ones find ready.
+    ///
+    /// # Errors
+    /// The denoiser fails.
+    pub fn rehearse(&mut self, size: Size) -> Result<()> {
+        let plane = || vec![[0.5; 3]; size.pixels()];
+        let (albedo, normal) = (Some(plane()), Some(plane()));
+        let estimate = Estimate { size, mean: plane(), deviation: plane(), albedo, normal };
+        self.denoiser.run(&estimate, Quality::Fast).map(|_| ())
+    }
+
+    /// Whether the denoiser has qualities.
+    pub fn has_qualities(&self) -> bool {
+        matches!(self.denoiser, Denoiser::Oidn { .. })
+    }
+
+    /// The finished picture of an estimate.
+    ///
+    /// # Errors
+    /// The denoiser fails.
+    pub fn picture(&mut self, estimate: &Estimate) -> Result<Vec<[f32; 3]>> {
+        self.with_spread(estimate).map(|(picture, _)| picture)
+    }
+
+    fn with_spread(&mut self, estimate: &Estimate) -> Result<(Vec<[f32; 3]>, Vec<[f32; 3]>)> {
+        let denoised = self.denoiser.run(estimate, self.quality)?;
+        let spread = bound::spread(&estimate.deviation, estimate.size);
+        let picture = bound::bounded(&estimate.mean, &denoised, &spread, estimate.size);
+        Ok((picture, spread))
+    }
+
+    /// Finishes the picture of `set` and makes the result its beauty; alpha stays. Adds `CombinedDirect` and the other parts where the picture has
+    /// parts and they are wanted by name. Rows of pixels do not depend on the number of threads, but for what [`caustique_oidn`] says of its own.
+    ///
+    /// # Errors
+    /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is as it was then.
+    pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Account> {
+        let mut estimate = Estimate::of(set)?;
+        let combined = match &mut self.network {
+            Some(network) => {
+                estimate.mean = network.run(&LevelStack::of(set)?)?;
+                Some(network.facts().levels)
+            }
+            None => None,
+        };
+        let (picture, spread) = self.with_spread(&estimate)?;
+        let told = self.told(set, &estimate)?;
+        let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
+        let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
+        set.layers.retain(|layer| layer.name != "Combined");
+        set.push(match alpha {
+            Some(alpha) => {
+                let pixels = picture.into_iter().zip(alpha).map(|([r, g, b], a)| [r, g, b, a]);
+                Layer::interleaved("", "RGBA", pixels)
+            }
+            None => Layer::interleaved("", "RGB", picture),
+        })?;
+        for (name, values) in parts {
+            set.push(Layer::interleaved(name, "RGB", values))?;
+        }
+        Ok(Account { denoiser: self.denoiser.name(), combined, told })
+    }
+
+    /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is missing or empty.
+    fn told(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Option<Told>> {
+        let Some(quarters) = quarters(set) else { return Ok(None) };
+        let quality = std::mem::replace(&mut self.quality, Quality::Fast);
+        let picture = self.picture(&estimate.first_half(&quarters));
+        self.quality = quality;
+        let picture = picture?;
+        let squared = told::squared_error(&picture, [&quarters[2], &quarters[3]], &picture);
+        Ok(Some(Told { half: squared.max(0.0).sqrt() }))
+    }
+
+    /// The finished parts that are wanted, with their layers' names: all or none are worked out, for they sum to the picture together.
+    fn parts(
+        &mut self,
+        set: &LayerSet,
+        estimate: &Estimate,
+        (picture, spread): (&[[f32; 3]], &[[f32; 3]]),
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<Vec<(String, Vec<[f32; 3]>)>> {
+        let there: Vec<(&str, Vec<[f32; 3]>)> =
+            PARTS.iter().filter_map(|name| set.get(name).map(|layer| (*name, layer.triples()))).collect();
+        let name = |part: &str| finished_part(part).unwrap_or_default();
+        if !there.iter().any(|(part, _)| wanted(&name(part))) {
+            return Ok(Vec::new());
+        }
+        let mut parts = Vec::with_capacity(there.len());
+        for (part, mean) in &there {
+            let dark = mean.iter().flatten().all(|value| *value == 0.0);
+            // Lamps that are seen have no noise but at their edges.
+            let denoised = if dark || *part == "Emission" {
+                mean.clone()
+            } else {
+                // Parts are looked at less closely than the picture.
+                self.denoiser.run(&Estimate { mean: mean.clone(), ..estimate.clone() }, Quality::Fast)?
+            };
+            parts.push(Part { mean: mean.clone(), denoised });
+        }
+        let finished = parts::shared(&parts, picture, spread, estimate.size);
+        let named = there.iter().map(|(part, _)| name(part)).zip(finished);
+        Ok(named.filter(|(name, _)| wanted(name)).collect())
+    }
+}
