@@ -9,8 +9,6 @@ use clap::ValueEnum;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Times of qualities over that of the least (Open Image Denoise 2.5.1, 1280x720, two cores).
-const TIMES: [(Quality, f64); 3] = [(Quality::High, 4.1), (Quality::Balanced, 1.9), (Quality::Fast, 1.0)];
 /// Share of a render's time that denoising the picture may take at more than the least quality.
 const SHARE: f64 = 0.07;
 /// Side of the picture by which the denoiser is timed.
@@ -120,21 +118,29 @@ impl Ready {
     /// # Errors
     /// The denoiser fails.
     pub fn reserve(&mut self, seconds: f64, pixels: usize, parts: usize) -> Result<f64> {
+        let has_qualities = self.finish.has_qualities();
         let small = Size { width: TIMED, height: TIMED };
-        self.finish.rehearse(small)?;
-        let clock = Clock::start();
-        self.finish.rehearse(small)?;
-        let fast = clock.seconds() * pixels as f64 / small.pixels() as f64;
-        let times = if self.finish.has_qualities() {
-            let fits = |(_, times): &(Quality, f64)| times * fast <= SHARE * seconds;
-            let (quality, times) = TIMES.into_iter().find(fits).unwrap_or(TIMES[2]);
-            self.finish.quality = quality;
-            times
-        } else {
-            1.0
+        let mut time = |quality: Quality| -> Result<f64> {
+            // The first run loads what the second finds ready.
+            self.finish.rehearse(small, quality)?;
+            let clock = Clock::start();
+            self.finish.rehearse(small, quality)?;
+            Ok(clock.seconds() * pixels as f64 / small.pixels() as f64)
         };
+        let fast = time(Quality::Fast)?;
+        let mut picture = (Quality::Fast, fast);
+        if has_qualities {
+            for quality in [Quality::High, Quality::Balanced] {
+                let seconds_taken = time(quality)?;
+                if seconds_taken <= SHARE * seconds {
+                    picture = (quality, seconds_taken);
+                    break;
+                }
+            }
+        }
+        self.finish.quality = picture.0;
         // The picture, half of it for its error, and its parts.
-        Ok((fast * (times + 1.0 + parts as f64)).min(MOST * seconds))
+        Ok((picture.1 + fast * (1.0 + parts as f64)).min(MOST * seconds))
     }
 
     /// The finish alone.

@@ -153,15 +153,15 @@ impl Finish {
         self.denoiser.name()
     }
 
-    /// Denoises a grey picture at the least quality, so that somebody can see how long that takes; the first time loads what later ones find ready.
+    /// Denoises a grey picture, so that somebody can see how long that takes; the first time loads what later ones find ready.
     ///
     /// # Errors
     /// The denoiser fails.
-    pub fn rehearse(&mut self, size: Size) -> Result<()> {
+    pub fn rehearse(&mut self, size: Size, quality: Quality) -> Result<()> {
         let plane = || vec![[0.5; 3]; size.pixels()];
         let (albedo, normal) = (Some(plane()), Some(plane()));
         let estimate = Estimate { size, mean: plane(), deviation: plane(), albedo, normal };
-        self.denoiser.run(&estimate, Quality::Fast).map(|_| ())
+        self.denoiser.run(&estimate, quality).map(|_| ())
     }
 
     /// Whether the denoiser has qualities.
