@@ -1,8 +1,12 @@
 //! Owen-scrambled Sobol' points in padded pairs of dimensions \[Burley 2020, "Practical Hash-based Owen Scrambling"\].
 //!
-//! Each pair of dimensions is the (0,2)-sequence of the first two Sobol' dimensions with its own shuffle of
-//! the index and its own scramble, both keyed by a seed that must change every pass: points that repeat from pass to
-//! pass would make per-pass variances lie.
+//! Each pair of dimensions is the (0,2)-sequence of the first two Sobol' dimensions with its own shuffle of the index
+//! and its own scramble, both keyed by a seed. Pairs of different seeds are independent. Sums that are taken for
+//! independent must not share a seed: points of one sequence avoid each other, and a variance told from them would
+//! lie.
+//!
+//! A scramble works on bits in reverse order, least significant first; where one follows another the reversals between
+//! them cancel.
 
 use super::mix;
 use glam::Vec2;
@@ -19,28 +23,23 @@ fn tree_hash(mut x: u32, seed: u32) -> u32 {
     x
 }
 
+/// Second Sobol' dimension of `index`, bits least significant first.
+///
+/// Its generator matrix is Pascal's triangle modulo 2: the bit of weight 2^(-1-j) is the sum modulo 2 of those bits k
+/// of the index for which the binomial coefficient of k over j is odd, that is (Lucas 1878) for which the binary
+/// digits of j are among those of k. Such sums over supersets of a set of five digits are made one digit after the
+/// other.
 #[inline]
-fn nested_uniform_scramble(x: u32, seed: u32) -> u32 {
-    tree_hash(x.reverse_bits(), seed).reverse_bits()
+fn sobol_second(index: u32) -> u32 {
+    let mut x = index;
+    x ^= (x >> 1) & 0x5555_5555;
+    x ^= (x >> 2) & 0x3333_3333;
+    x ^= (x >> 4) & 0x0f0f_0f0f;
+    x ^= (x >> 8) & 0x00ff_00ff;
+    x ^ (x >> 16)
 }
 
-/// Second Sobol' dimension of `index`, bits most significant first.
-#[inline]
-fn sobol_second(mut index: u32) -> u32 {
-    // Direction numbers of the primitive polynomial x + 1: v_k = v_{k-1} ^ (v_{k-1} >> 1).
-    let mut direction = 0x8000_0000u32;
-    let mut x = 0;
-    while index != 0 {
-        if index & 1 != 0 {
-            x ^= direction;
-        }
-        direction ^= direction >> 1;
-        index >>= 1;
-    }
-    x
-}
-
-/// One scrambled pair of dimensions; make one per pass and dimension pair.
+/// One scrambled pair of dimensions.
 #[derive(Clone, Copy, Debug)]
 pub struct SobolPair {
     shuffle: u32,
@@ -48,20 +47,49 @@ pub struct SobolPair {
 }
 
 impl SobolPair {
-    /// The pair keyed by `seed` (64 hashed bits, different for every pass and pair).
+    /// The pair keyed by `seed`, which may be any number.
     pub fn new(seed: u64) -> SobolPair {
         let a = mix(seed);
         let b = mix(a ^ 0x5851_f42d_4c95_7f2d);
         SobolPair { shuffle: a as u32, scramble: [b as u32, (b >> 32) as u32] }
     }
 
+    /// A pair keyed by 64 bits that are random already. Of its first dimension alone, it costs no further hash.
+    #[inline]
+    pub(super) fn keyed(bits: u64) -> SobolPair {
+        let second = mix(bits ^ 0x5851_f42d_4c95_7f2d);
+        SobolPair { shuffle: bits as u32, scramble: [(bits >> 32) as u32, second as u32] }
+    }
+
     /// Point `index` of the sequence, in `[0, 1)^2`.
     #[inline]
     pub fn point(&self, index: u32) -> Vec2 {
-        let index = nested_uniform_scramble(index, self.shuffle);
-        let x = nested_uniform_scramble(index.reverse_bits(), self.scramble[0]);
-        let y = nested_uniform_scramble(sobol_second(index), self.scramble[1]);
-        Vec2::new(super::unit(x), super::unit(y))
+        self.point_reversed(index.reverse_bits())
+    }
+
+    /// The point whose index has these bits in reverse order.
+    #[inline]
+    pub(super) fn point_reversed(&self, reversed: u32) -> Vec2 {
+        let index = self.shuffled(reversed);
+        let y = tree_hash(sobol_second(index), self.scramble[1]).reverse_bits();
+        Vec2::new(self.first_of(index), super::unit(y))
+    }
+
+    /// Its first coordinate.
+    #[inline]
+    pub(super) fn first_reversed(&self, reversed: u32) -> f32 {
+        self.first_of(self.shuffled(reversed))
+    }
+
+    #[inline]
+    fn shuffled(&self, reversed: u32) -> u32 {
+        tree_hash(reversed, self.shuffle).reverse_bits()
+    }
+
+    /// The first dimension is the radical inverse: bits least significant first, it is the index itself.
+    #[inline]
+    fn first_of(&self, index: u32) -> f32 {
+        super::unit(tree_hash(index, self.scramble[0]).reverse_bits())
     }
 }
 
@@ -92,6 +120,22 @@ mod tests {
                     assert!(seen.iter().all(|&c| c == 1), "seed {seed}, {nx} x {ny}");
                 }
             }
+        }
+    }
+
+    /// By the direction numbers of the primitive polynomial x + 1: v_k = v_{k-1} ^ (v_{k-1} >> 1).
+    #[test]
+    fn the_second_dimension_is_that_of_its_direction_numbers() {
+        for k in 0..100_000u64 {
+            let index = mix(k) as u32;
+            let (mut direction, mut x) = (0x8000_0000u32, 0);
+            for bit in 0..32 {
+                if index >> bit & 1 != 0 {
+                    x ^= direction;
+                }
+                direction ^= direction >> 1;
+            }
+            assert_eq!(sobol_second(index).reverse_bits(), x, "{index:#x}");
         }
     }
 }

@@ -134,6 +134,8 @@ impl<'a> Passes<'a> {
         let (width, height) = self.camera.size();
         let Settings { seed, max_depth, .. } = *self.settings;
         let pass = LightPass::new(seed, i, pair.light, width * height, max_depth).guided(guide);
+        // Each belongs to a pixel, and so its passes can take the points of a sequence.
+        let pass = pass.drawing(Streams::in_sequence(seed, i, pair.light));
         // Others put paths together of one hue alone, whichever it is.
         let merges = self.shared.is_some_and(|shared| shared.strategies.merge);
         if merges { pass.with(Comb::slow(seed, i)) } else { pass }
@@ -195,7 +197,7 @@ impl<'a> Passes<'a> {
         let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
-            let streams = Streams::new(seed, i, pair.eye);
+            let streams = Streams::in_sequence(seed, i, pair.eye);
             let left: Vec<(Vec<Splat>, Vec<MergePhoton>)> = measures
                 .par_chunks_mut(TILE_PIXELS)
                 .zip(watches.par_iter_mut())
@@ -241,7 +243,7 @@ impl<'a> Passes<'a> {
     /// Path tracing.
     fn paths<W: Watch>(&mut self, i: u64, watches: &mut [W]) {
         let (eye, tiles, seed) = (self.eye(), self.tiles, self.settings.seed);
-        let streams = Streams::new(seed, i, self.pairs[0].eye);
+        let streams = Streams::in_sequence(seed, i, self.pairs[0].eye);
         let parts = self.measures[0].par_chunks_mut(TILE_PIXELS).zip(watches);
         parts.enumerate().for_each(|(tile, (measures, watch))| {
             let mut arena = Bump::new();

@@ -190,7 +190,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
         // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: what one point of the film sees, all of it if it is by glass.
         let film = if self.settings.method == Method::Ppm { 1 } else { i };
-        [film, i].map(|pass| Streams::new(self.settings.seed, pass, domain))
+        [film, i].map(|pass| Streams::in_sequence(self.settings.seed, pass, domain))
     }
 
     /// `maps` holds the photons, or those of each channel.

@@ -147,7 +147,7 @@ impl Iterate for Pm<'_> {
             _ => self.settings.method.neighbours(1),
         };
         let least = LEAST * eye.scene.lights.sky().radius;
-        let streams = Streams::new(self.settings.seed, i, Domain::EyeIndependent);
+        let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
             pixels.par_chunks_mut(band(camera.size().0)),

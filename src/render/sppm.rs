@@ -82,7 +82,7 @@ fn eye_pass(
     let levels = settings.levels;
     let factor = radius2_factor(i, settings.alpha) as f32;
     let [independent, correlated] =
-        [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::new(settings.seed, i, domain));
+        [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::in_sequence(settings.seed, i, domain));
     par_pixels(pixels.par_chunks_mut(band(size.0)), size, Scratch::default, |scratch, pixels, places| {
         let waiting = places.iter().flatten().map(|place| pixels[place.at].touch()).sum::<f64>();
         std::hint::black_box(waiting);

@@ -10,7 +10,7 @@ use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{Rgb, Vec2};
 use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
-use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, mix};
+use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
 use crate::spectrum::{Band, Comb, Hue};
 use bumpalo::Bump;
@@ -18,9 +18,7 @@ use bumpalo::Bump;
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
 #[derive(Clone, Copy)]
 pub struct LightPass<'a> {
-    seed: u64,
-    pass: u64,
-    domain: Domain,
+    streams: Streams,
     paths: u32,
     max_depth: u32,
     choice: SobolPair,
@@ -62,9 +60,7 @@ impl<'a> LightPass<'a> {
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
         let (choice, point, direction) = (pair(1), pair(2), pair(3));
         LightPass {
-            seed,
-            pass,
-            domain,
+            streams: Streams::new(seed, pass, domain),
             paths,
             max_depth,
             choice,
@@ -86,6 +82,12 @@ impl<'a> LightPass<'a> {
     #[must_use]
     pub fn lighting(self, region: Option<Region>) -> LightPass<'a> {
         LightPass { region, ..self }
+    }
+
+    /// The same with other draws for all but emission, whose points are spread over the paths of a pass.
+    #[must_use]
+    pub fn drawing(self, streams: Streams) -> LightPass<'a> {
+        LightPass { streams, ..self }
     }
 
     /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those of caustics, or with those alone.
@@ -117,8 +119,9 @@ impl<'a> LightPass<'a> {
         self.paths
     }
 
+    #[inline]
     fn stream(&self, index: u64) -> Stream {
-        Stream::new(self.seed, self.pass, self.domain, index)
+        self.streams.path(index)
     }
 
     /// The beginning of path `index`, its flux divided by the number of paths.

@@ -95,6 +95,9 @@ pub enum Next {
 
 /// Receives the vertices of a walk.
 pub trait Visitor<'a> {
+    /// Share of its first weight down to which a path is spared roulette (but for what is trapped); below it goes on
+    /// with the probability of what it has left of that share.
+    const SPARED: f32 = 1.0;
     /// The walk takes media by splitting (`flight.rs`) and does not scatter at their vertices.
     const SPLITS: bool = false;
     /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
@@ -206,7 +209,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, far, channel, hue } = *start;
     let weight = channel.map_or(1.0, |channel| throughput[channel]);
     let mut known = first;
-    let mut survival_scale = 1.0 / throughput.max_element();
+    let mut survival_scale = 1.0 / (V::SPARED * throughput.max_element());
     if !survival_scale.is_finite() {
         return;
     }
