@@ -394,6 +394,25 @@ def sky(color=None, file=None, strength=1.0):
     return world
 
 
+def dome(radiance, width=96):
+    """The environment as an image of `radiance(x, y, z)`: unit vectors (height, width) in, colours (height, width, 3) out."""
+    v, u = numpy.mgrid[0:width // 2, 0:width] + 0.5
+    turn, lift = (0.5 - u / width) * 2 * math.pi, (v / (width // 2) - 0.5) * math.pi
+    whole = numpy.ones((width // 2, width, 4), numpy.float32)
+    whole[..., :3] = radiance(numpy.cos(lift) * numpy.cos(turn), numpy.cos(lift) * numpy.sin(turn), numpy.sin(lift))
+    raw = bpy.data.images.new("dome", width, width // 2, float_buffer=True)
+    raw.colorspace_settings.name = "Non-Color"  # save the numbers as they are
+    raw.pixels.foreach_set(whole.ravel())
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "dome.exr")
+        raw.file_format = "OPEN_EXR"
+        raw.save(filepath=path)
+        bpy.data.images.remove(raw)
+        world = sky(file=path)
+        bpy.data.images["dome.exr"].pack()
+    return world
+
+
 def camera(at, to, lens=35.0, fstop=None, focus=None, name="Camera"):
     """Look from `at` to `to` through a lens (mm on 36 mm film); `fstop` opens it, focused at the point `focus`. The first one is the scene's."""
     eye = bpy.data.cameras.new(name)

@@ -10,6 +10,7 @@ import unittest
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
 import bpy  # noqa: E402
+import build  # noqa: E402
 import export  # noqa: E402
 import glb  # noqa: E402
 import lighting  # noqa: E402
@@ -302,6 +303,15 @@ class Export(unittest.TestCase):
             lighting._baked(bpy.context.scene, self.path, 64)
             seen = pixels(os.path.join(self.folder.name, "scene.environment.exr")) / 2
             numpy.testing.assert_allclose(seen[1:-1], self.gradient(said["rotation_deg"])[1:-1, :, :3], atol=0.03, err_msg=f"{kind} {degrees}")
+
+    def test_dome_puts_colours_where_cycles_sees_them(self):
+        build.dome(lambda x, y, z: numpy.stack([2 + x, 2 + y, 2 + z], -1), 64)
+        document, warnings = self.write()
+        self.assertEqual(warnings, [])
+        said = document["scenes"][0]["extras"]["caustique"]["environment"]
+        written = pixels(os.path.join(self.folder.name, said["file"]))
+        numpy.testing.assert_allclose(written[16, [0, 16, 32, 48]], [(1, 2, 2), (2, 3, 2), (3, 2, 2), (2, 1, 2)], atol=0.1)
+        numpy.testing.assert_allclose(written[[0, 31], 0, 2], (1, 3), atol=0.1)
 
     def test_procedural_world_is_baked(self):
         self.world(self.image())

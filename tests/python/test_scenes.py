@@ -1,5 +1,6 @@
-"""The scenes in scenes/: each exported by Blender, small, closed where it is glass, and with well-formed extras."""
+"""The scenes in scenes/ and scenes/second/: each exported by Blender, small, closed where it is glass, and with well-formed extras."""
 
+import glob
 import math
 import os
 import struct
@@ -11,10 +12,10 @@ sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
 import glb  # noqa: E402
 
 SCENES = os.path.join(ROOT, "scenes")
-NAMES = sorted(f[:-4] for f in os.listdir(SCENES) if f.endswith(".glb"))
+NAMES = sorted(f[:-4] for f in [*glob.glob("*.glb", root_dir=SCENES), *glob.glob("second/*.glb", root_dir=SCENES)])
 #: Scenes without solid glass, and glass that is a sheet on purpose.
-WITHOUT_SOLIDS = {"interior", "blocks", "slide"}
-SHEETS = {("slide", "slide")}
+WITHOUT_SOLIDS = {"interior", "blocks", "slide", "second/fairground", "second/stairwell", "second/still"}
+SHEETS = {("slide", "slide"), ("second/dining", "pane")}
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 CODES = {5121: "B", 5123: "H", 5125: "I", 5126: "f"}
 
@@ -88,8 +89,9 @@ def each_scene(check):
 
 
 class EveryScene(unittest.TestCase):
-    def test_the_six_are_there_with_their_scripts(self):
+    def test_both_sets_are_there_with_their_scripts(self):
         self.assertLessEqual({"cornell", "pool", "torus", "interior", "lamp", "gems"}, set(NAMES))
+        self.assertGreaterEqual(sum(name.startswith("second/") for name in NAMES), 9)
         for name in NAMES:
             self.assertTrue(os.path.isfile(os.path.join(SCENES, name + ".py")), name)
 
@@ -144,7 +146,7 @@ class EveryScene(unittest.TestCase):
         said = document["scenes"][0].get("extras", {}).get("caustique", {})
         self.assertLessEqual(set(said), {"environment", "medium"})
         if "environment" in said:
-            self.assertIsNone(environment_faults(said["environment"], SCENES))
+            self.assertIsNone(environment_faults(said["environment"], os.path.dirname(os.path.join(SCENES, name))))
         if "medium" in said:
             self.assertIsNone(medium_faults(said["medium"]))
         for camera in document["cameras"]:
