@@ -51,12 +51,9 @@ def program():
 
 def scene_key(path):
     """A scene's folder: its name, and the digest of its bytes, so that a scene drawn anew is another one."""
-    name = (
-        "-".join(path.relative_to(ROOT / "scenes").with_suffix("").parts)
-        if path.is_relative_to(ROOT / "scenes")
-        else path.stem
-    )
-    return f"{name}-{digest(path)}"
+    inside = path.is_relative_to(ROOT / "scenes")
+    parts = path.relative_to(ROOT / "scenes").with_suffix("").parts if inside else ("twin", path.stem)
+    return f"{'-'.join(parts)}-{digest(path)}"
 
 
 @contextlib.contextmanager

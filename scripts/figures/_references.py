@@ -9,6 +9,7 @@ them is taken, whichever program rendered it; reference.json beside says which.
 import math
 import os
 
+import _twins
 from _cache import BIN, CACHE, THREADS, WIDTH, Failed, load, making, program, save, scene_key, timed
 from _iteration import read
 from record import ROOT
@@ -21,38 +22,53 @@ SET = os.environ.get("SET", "first")
 SURELY = {"blocks": ["bdpt"], "interior": ["bdpt"], "stadium": ["vcm", "--guide", "on"]}
 # A bulb seen through fluted glass has a bright sample in hundreds, whatever the method.
 LONGER = {"lamp": 2}
-SETS = {"first": ["scenes"], "second": ["scenes/second"], "all": ["scenes", "scenes/second"]}
+SETS = {"first": ["scenes"], "second": ["scenes/second"], "all": ["scenes", "scenes/second"], "twins": []}
 
 
 def scenes():
-    """The scenes asked for, as paths: those of the set, or those that SCENES names (second/NAME of the second set)."""
+    """The scenes asked for, as paths: those of the set, or those that SCENES names (second/NAME, twin/NAME)."""
     if SET not in SETS:
         raise SystemExit(f"SET={SET} is not one of {', '.join(SETS)}")
     if "SCENES" in os.environ:
-        found = [ROOT / "scenes" / f"{name}.glb" for name in os.environ["SCENES"].split(",") if name]
-        missing = [path for path in found if not path.exists()]
+        found = [path(name) for name in os.environ["SCENES"].split(",") if name]
+        missing = [file for file in found if not file.exists()]
         if missing:
             raise SystemExit(f"{missing[0]} is not there: SCENES names files below scenes without .glb")
         return found
-    return [path for folder in SETS[SET] for path in sorted((ROOT / folder).glob("*.glb"))]
+    found = [file for folder in SETS[SET] or SETS["all"] for file in sorted((ROOT / folder).glob("*.glb"))]
+    return found if SET != "twins" else [file for file in map(_twins.twin, found) if file]
+
+
+def path(text):
+    """The file of a scene by its name in tables."""
+    if not text.startswith("twin/"):
+        return ROOT / "scenes" / f"{text}.glb"
+    originals = [ROOT / folder / f"{text[5:]}.glb" for folder in SETS["all"]]
+    originals = [original for original in originals if original.exists()]
+    if not originals:
+        raise SystemExit(f"SCENES: {text}: there is no scene of that name")
+    return _twins.twin(originals[0]) or originals[0]
 
 
 def name(scene):
     """A scene's name in tables."""
+    if not scene.is_relative_to(ROOT / "scenes"):
+        return f"twin/{scene.stem}"
     return scene.relative_to(ROOT / "scenes").with_suffix("").as_posix()
 
 
 def method(scene):
     """The method of a scene's reference, with options: merging where caustics are seen in mirrors or through glass."""
-    if name(scene) in SURELY:
-        return SURELY[name(scene)]
+    known = name(scene).removeprefix("twin/")
+    if known in SURELY:
+        return SURELY[known]
     effects = {effect["name"]: effect["simulated"] for effect in read("plan", str(scene))["effects"]}
     return ["vcm"] if effects.get("sds", True) else ["bdpt"]
 
 
 def seconds(scene):
     """Core-seconds of a half."""
-    return SECONDS * LONGER.get(name(scene), 1)
+    return SECONDS * LONGER.get(name(scene).removeprefix("twin/"), 1)
 
 
 def folder(scene):

@@ -226,14 +226,18 @@ class Translation:
             "environment": None if self.environment is None else {"file": "environment.exr"},
         }
         (folder / f"{name}.json").write_text(json.dumps(settings), encoding="utf-8")
-        self.document["buffers"][0]["byteLength"] = len(self.binary)
-        text = json.dumps(self.document).encode()
-        text, binary = text + b" " * (-len(text) % 4), bytes(self.binary) + bytes(-len(self.binary) % 4)
-        with open(folder / f"{name}.glb", "wb") as sink:
-            sink.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary)))
-            sink.write(
-                struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-            )
+        pack(folder / f"{name}.glb", self.document, self.binary)
+
+
+def pack(path, document, binary):
+    """Writes a .glb file."""
+    document["buffers"][0]["byteLength"] = len(binary)
+    text = json.dumps(document).encode()
+    text, binary = text + b" " * (-len(text) % 4), bytes(binary) + bytes(-len(binary) % 4)
+    with open(path, "wb") as sink:
+        sink.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary)))
+        sink.write(struct.pack("<I4s", len(text), b"JSON") + text)
+        sink.write(struct.pack("<I4s", len(binary), b"BIN\0") + binary)
 
 
 def sample(image, u, v):

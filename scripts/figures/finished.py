@@ -9,8 +9,8 @@ goes on.
 
   CAUSTIQUE_BIN       the program
   CAUSTIQUE_CACHE     where all is kept [out/finished]
-  SET                 first, second or all [first]
-  SCENES              names below scenes, such as pool,second/still [those of SET]
+  SET                 first, second, all, or twins: scenes without what the peers' drivers cannot say [first]
+  SCENES              names below scenes, such as pool,second/still,twin/pool [those of SET]
   BUDGETS             seconds [15,60,240]
   SEEDS               renders of each [1]
   WIDTH, THREADS      [320, 2]
@@ -51,6 +51,9 @@ BUDGETS = [float(x) for x in os.environ.get("BUDGETS", "10" if SHORT else "15,60
 SEEDS = int(os.environ.get("SEEDS", "1"))
 METHODS = os.environ.get("METHODS", "auto,path,bdpt,sppm,vcm" if SHORT else "auto,path,bdpt,vcm,sppm,cppm").split(",")
 DENOISE = ["" if x == "default" else x for x in os.environ.get("DENOISE", "default").split(",")]
+# A render on the wall clock that got a smaller share of its cores than this is told apart.
+LITTLE = 0.8
+KINDS = {"second": "second", "twin": "twins"}
 COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}{'mean':>8}"
 
 
@@ -96,7 +99,9 @@ def ours(scene, budget, reference, halves, cell):
                 print(f"    {name:<32}{failed}", flush=True)
                 continue
             cell["ours"][name], cell["core_seconds"][name] = pictures, spent
-            line(name, spent, pictures["delivered"])
+            if spent < LITTLE * budget * THREADS:
+                cell["notes"][name] = f"spent {spent:.1f} of {budget * THREADS:g} core-seconds: try CLOCK=cpu"
+            line(name, spent, pictures["delivered"], cell["notes"].get(name, ""))
             line("  its input", spent, pictures["noisy"])
             if len(inputs(pictures)) > 1:
                 line("  best level", spent, min(inputs(pictures), key=lambda figures: figures["relmse_trimmed"]))
@@ -171,10 +176,10 @@ def count(cells):
     """The goals of each set and budget, printed and returned."""
     counts = {}
     delivered = f"{'auto' if 'auto' in METHODS else METHODS[0]} {DENOISE[0]}".strip()
-    for kind in ("first", "second"):
+    for kind in ("first", "second", "twins"):
         for budget in BUDGETS:
             chosen = [cell for cell in cells if cell["budget"] == budget]
-            chosen = [cell for cell in chosen if cell["scene"].startswith("second/") == (kind == "second")]
+            chosen = [cell for cell in chosen if KINDS.get(cell["scene"].partition("/")[0], "first") == kind]
             found = goals(chosen, delivered)
             if found:
                 title = f"{kind} set, {budget:g} s"
