@@ -58,7 +58,11 @@ def goals(cells, main):
             found[f"{name} / best of its own inputs, within 1.02: {figure}"] = summary(own, 1.02)
         fixed = []
         for cell in whole:
-            others = [pictures["delivered"] for name, pictures in cell["ours"].items() if name.split()[0] != "auto"]
+            others = [
+                pictures["delivered"]
+                for name, pictures in cell["ours"].items()
+                if name.split()[0] != "auto" and name.split()[1:] == main.split()[1:]
+            ]
             if others:
                 fixed.append(ratio(cell["ours"][main]["delivered"], best(others, figure), figure, floor(cell)))
         found[f"{main} / best fixed method, within 1.1: {figure}"] = summary(fixed, 1.1)

@@ -5,6 +5,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -14,6 +15,7 @@ sys.path.append(str(support.ROOT / "scripts" / "figures"))
 import _goals  # noqa: E402
 import _pictures  # noqa: E402
 import _translate  # noqa: E402
+import _twins  # noqa: E402
 
 SCENES = support.ROOT / "scenes"
 
@@ -97,6 +99,20 @@ class Translation(unittest.TestCase):
         self.assertIn('material "glass" absorbs', _translate.Translation(SCENES / "torus.glb").blockers)
         self.assertIn("a medium fills the space", _translate.Translation(SCENES / "fog.glb").blockers)
         self.assertIn("depth of field", _translate.Translation(SCENES / "gems.glb").blockers)
+
+    def test_twins_are_what_drivers_take(self):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(_twins, "CACHE", Path(folder)):
+            for name in ("torus", "prism", "interior"):
+                twin = _twins.twin(SCENES / f"{name}.glb")
+                found = _translate.Translation(twin)
+                self.assertEqual(found.blockers, [], name)
+                self.assertFalse([text for text in found.approximations if "material" in text], name)
+                said = json.loads(support.run(["info", twin, "--json"], check=0).stdout)
+                original = json.loads(support.run(["info", SCENES / f"{name}.glb", "--json"], check=0).stdout)
+                self.assertEqual(said["triangles"], original["triangles"], name)
+            # Nothing is to be taken from the one, no driver has what is left of the other.
+            self.assertIsNone(_twins.twin(SCENES / "cornell.glb"))
+            self.assertIsNone(_twins.twin(SCENES / "fog.glb"))
 
     def test_a_lamp_keeps_its_light_as_a_ball(self):
         found = _translate.Translation(SCENES / "interior.glb")
