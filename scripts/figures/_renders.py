@@ -60,19 +60,28 @@ def _render(scene, method, denoise, budget, seed, file):
         THREADS,
     ]
     command += ["--progress", "none", *(["--denoise", denoise] if denoise else []), *OPTIONS]
-    seconds = budget
+    seconds, stop = budget, ["--time", f"{budget:.3f}"]
     for _ in range(TIMES if CLOCK == "cpu" else 1):
         try:
-            _, wall, spent = timed([*command, "--time", f"{seconds:.3f}"], 600 + 20 * budget)
+            _, wall, spent = timed([*command, *stop], 600 + 20 * budget)
         except Failed as failed:
             if "photons in media" not in str(failed):
                 raise
             return {"refused": f"not available: {failed}"}
         said = read("info", str(file))
         last = said["history"][-1]
-        if abs(last["cpu_seconds"] / (budget * THREADS) - 1) < NEAR:
+        longer = budget * THREADS / max(last["cpu_seconds"], 1e-3)
+        if abs(1 / longer - 1) < NEAR:
             break
-        seconds *= min(max(budget * THREADS / max(last["cpu_seconds"], 1e-3), 0.5), 4)
+        # auto chooses by the seconds it is given; the others take as many core-seconds for an iteration as before.
+        if method == "auto":
+            seconds *= min(max(longer, 0.5), 4)
+            stop = ["--time", f"{seconds:.3f}"]
+        else:
+            wanted = max(round(last["iterations"] * longer), 1)
+            if wanted == last["iterations"]:
+                break
+            stop = ["--iterations", wanted]
     known = {key: last[key] for key in ("seconds", "cpu_seconds", "iterations")}
     return {
         **known,
