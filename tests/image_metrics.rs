@@ -105,6 +105,54 @@ fn trimming_leaves_out_the_worst_thousandth() {
     assert!(result.relmse > 1e4);
 }
 
+/// White noise of variance 1 with mean 0: the sum of four uniform numbers of SplitMix64, less its mean, times the root of three.
+fn white(i: usize, channel: usize) -> f32 {
+    let uniform = |k: usize| {
+        let mut z = (((i * 3 + channel) * 4 + k) as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) as f64 / 2f64.powi(64)
+    };
+    (3f64.sqrt() * ((0..4).map(uniform).sum::<f64>() - 2.0)) as f32
+}
+
+#[test]
+fn grain_in_closed_form() {
+    let (width, height) = (200, 150);
+    let b = picture(width, height, |_| [1.0, 2.0, 3.0]);
+    let grain = |pixel: &dyn Fn(usize) -> [f32; 3]| compare(&picture(width, height, pixel), &b).unwrap().grain;
+    assert_eq!(grain(&|_| [1.0, 2.0, 3.0]), 0.0);
+    // An offset is no grain, up to the rounding of its blur; a ramp is none but at the rim.
+    assert!(grain(&|_| [1.5, 2.25, 2.0]) < 1e-25);
+    assert!(grain(&|i| [1.0 + (i % width) as f32 * 0.25, 2.0, 3.0]) < 0.25 / 4.01 / 3.0 * 2.0 / width as f64);
+    // White noise: a share 1 - 1/n of its variance is left where n pixels are averaged. 90,000 numbers: five standard errors are 2.4 %.
+    let noisy = |i: usize| [0, 1, 2].map(|c| 1.0 + c as f32 + 0.1 * white(i, c));
+    let (rim, corners) = ((2 * (width + height) - 8) as f64, 4.0);
+    let inside = (width * height) as f64 - rim - corners;
+    let kept = (inside * 8.0 / 9.0 + rim * 5.0 / 6.0 + corners * 3.0 / 4.0) / (width * height) as f64;
+    let expected = 0.01 * kept / 4.01;
+    assert!((grain(&noisy) / expected - 1.0).abs() < 0.024, "{} for {expected}", grain(&noisy));
+    // One pixel off by 0.9 in one channel: 8/9 of it there, a ninth in each of eight neighbours.
+    let planted = grain(&|i| if i == 75 * width + 100 { [1.9, 2.0, 3.0] } else { [1.0, 2.0, 3.0] });
+    let squares = (0.8f64.powi(2) + 8.0 * 0.1f64.powi(2)) / 3.0 / 4.01;
+    assert!((planted / (squares / (width * height) as f64) - 1.0).abs() < 1e-6, "{planted}");
+    // In a corner: three quarters of it there, a sixth in the two pixels beside, a ninth in the one across.
+    let planted = grain(&|i| if i == 0 { [1.9, 2.0, 3.0] } else { [1.0, 2.0, 3.0] });
+    let shares = 0.75f64.powi(2) + 1.0 / 81.0 + 2.0 / 36.0;
+    let expected = 0.81 * shares / 3.0 / 4.01 / (width * height) as f64;
+    assert!((planted / expected - 1.0).abs() < 1e-6, "{planted} for {expected}");
+}
+
+#[test]
+fn grain_leaves_out_what_is_not_finite() {
+    // Without the hole, which would spread, nothing but an offset is left.
+    let b = picture(9, 7, |i| if i == 30 { [f32::INFINITY; 3] } else { [1.0; 3] });
+    let a = picture(9, 7, |i| if i == 12 { [f32::NAN, 1.5, 1.5] } else { [1.5; 3] });
+    assert!(compare(&a, &b).unwrap().grain < 1e-25);
+    assert_eq!(metrics::grain(&[[f32::NAN; 3]; 6], &[[1.0; 3]; 6], 3, 2), None);
+    assert_eq!(metrics::grain(&[[1.0; 3]; 6], &[[1.0; 3]; 6], 2, 2), None);
+}
+
 #[test]
 fn pixels_that_are_not_finite_are_counted_and_left_out() {
     let b = picture(10, 10, |i| if i == 3 { [0.0, f32::INFINITY, 0.0] } else { [1.0; 3] });
@@ -132,7 +180,7 @@ fn the_json_has_the_promised_keys() {
     let b = picture(2, 2, |_| [0.0; 3]);
     let json = serde_json::to_value(compare(&b, &b).unwrap()).unwrap();
     let keys: Vec<&str> = json.as_object().unwrap().keys().map(String::as_str).collect();
-    let mut expected = ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "pixels_not_finite"];
+    let mut expected = ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "grain", "pixels_not_finite"];
     expected.sort_unstable();
     let mut found = keys.clone();
     found.sort_unstable();

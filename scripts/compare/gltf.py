@@ -97,7 +97,7 @@ def read(path):
     path = Path(path)
     data = path.read_bytes()
     if data[:4] == b"glTF":
-        document, binary = _chunks(data)
+        document, binary = chunks(data)
     else:
         document, binary = json.loads(data), None
     unknown = set(document.get("extensionsUsed", [])) - EXTENSIONS
@@ -120,7 +120,8 @@ def read(path):
     return scene
 
 
-def _chunks(data):
+def chunks(data):
+    """The document and the binary buffer of a .glb file."""
     document, binary, at = None, b"", 12
     while at < len(data):
         length, kind = struct.unpack_from("<I4s", data, at)
@@ -160,7 +161,8 @@ def accessor(scene, index):
     return values
 
 
-def _matrix(node):
+def matrix(node):
+    """A node's own transform."""
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
     x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
@@ -176,7 +178,7 @@ def _matrix(node):
 
 
 def _visit(scene, node, parent, divisor):
-    to_world = parent @ _matrix(node)
+    to_world = parent @ matrix(node)
     if "skin" in node or extension(node, "EXT_mesh_gpu_instancing"):
         raise Unsupported(f"node {node.get('name')}: skins and instancing")
     if "mesh" in node:

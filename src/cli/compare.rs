@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 /// Measure the error of an image against a reference
 ///
 /// relMSE is the mean over pixels of the squared difference over the squared reference plus 0.01; trimmed leaves out the worst 0.1 %
-/// of pixels. FLIP estimates the difference that people see when they switch between the two.
+/// of pixels. FLIP estimates the difference that people see when they switch between the two. Grain is the part of relMSE that
+/// neighbouring pixels do not share: of the error its mean over 3 x 3 pixels is taken off.
 #[derive(clap::Args)]
 pub struct CompareArgs {
     /// EXR to judge
@@ -70,7 +71,12 @@ fn text(comparison: &Comparison) -> String {
     let ratio = comparison.mean_ratio.map_or("the reference is black".into(), |ratio| format!("{ratio:.6}"));
     format!(
         "relMSE            {:.6e}\nrelMSE, trimmed   {:.6e}\nMSE               {:.6e}\nmean ratio        {ratio}\n\
-         FLIP              {:.6}\npixels not finite {}\n",
-        comparison.relmse, comparison.relmse_trimmed, comparison.mse, comparison.flip, comparison.pixels_not_finite
+         FLIP              {:.6}\ngrain             {:.6e}\npixels not finite {}\n",
+        comparison.relmse,
+        comparison.relmse_trimmed,
+        comparison.mse,
+        comparison.flip,
+        comparison.grain,
+        comparison.pixels_not_finite
     )
 }

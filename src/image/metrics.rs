@@ -22,6 +22,8 @@ pub struct Comparison {
     pub mean_ratio: Option<f64>,
     /// Mean over pixels of HDR-FLIP, see [`flip::hdr`].
     pub flip: f64,
+    /// What of the error changes from pixel to pixel, see [`grain`].
+    pub grain: f64,
     /// Pixels with a channel that is not finite, in either picture.
     pub pixels_not_finite: u64,
     /// HDR-FLIP per pixel, rows from the top; 1 where a pixel is not finite.
@@ -63,13 +65,54 @@ pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<Errors> {
 
 /// Mean over RGB of (x - r)^2, over (mean of r over RGB)^2 + 0.01.
 pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
+    squared_error(x, r) / weight(r)
+}
+
+/// (mean of r over RGB)^2 + 0.01.
+fn weight(r: [f32; 3]) -> f64 {
     let mean = r.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-    squared_error(x, r) / (mean * mean + 0.01)
+    mean * mean + 0.01
 }
 
 /// Mean over RGB of (x - r)^2.
 pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(x[c]) - f64::from(r[c])).powi(2)).sum::<f64>() / 3.0
+}
+
+/// The part of the error of `a` against `b` that neighbours do not share: noise, and edges out of place, but no error that is smooth.
+///
+/// The error of a channel less its mean over the 3 x 3 pixels around, fewer at the rim, is squared and weighed as relMSE weighs; the
+/// mean over pixels and channels counts. White noise keeps 8/9 of its relMSE, an offset nothing. Pixels that are not finite in both
+/// pictures are left out, as neighbours too; `None` if there is no other, or if the sizes are not `width * height`.
+pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Option<f64> {
+    if a.len() != width * height || b.len() != width * height {
+        return None;
+    }
+    let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
+    let error = |i: usize| -> Option<[f64; 3]> {
+        finite(i).then(|| std::array::from_fn(|c| f64::from(a[i][c]) - f64::from(b[i][c])))
+    };
+    let errors: Vec<Option<[f64; 3]>> = (0..a.len()).map(error).collect();
+    let (mut sum, mut pixels) = (0.0, 0_usize);
+    for y in 0..height {
+        for x in 0..width {
+            let i = y * width + x;
+            let Some(own) = errors[i] else { continue };
+            let (mut around, mut count) = ([0.0; 3], 0.0);
+            for row in y.saturating_sub(1)..(y + 2).min(height) {
+                for error in
+                    errors[row * width + x.saturating_sub(1)..row * width + (x + 2).min(width)].iter().flatten()
+                {
+                    (0..3).for_each(|c| around[c] += error[c]);
+                    count += 1.0;
+                }
+            }
+            let square = (0..3).map(|c| (own[c] - around[c] / count).powi(2)).sum::<f64>() / 3.0;
+            sum += square / weight(b[i]);
+            pixels += 1;
+        }
+    }
+    (pixels > 0).then(|| sum / pixels as f64)
 }
 
 /// Compares the pictures (see [`LayerSet::beauty`]) of two files, `b` being the reference.
@@ -91,7 +134,9 @@ pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usiz
     }
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
-    let Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }) = errors(a, b) else {
+    let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
+        (errors(a, b), grain(a, b, width, height))
+    else {
         return Err(Error::new(Kind::Image, "", "the pictures have no pixel with finite values in common"));
     };
 
@@ -108,6 +153,7 @@ pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usiz
         mse,
         mean_ratio,
         flip,
+        grain,
         pixels_not_finite: (a.len() - pixels.len()) as u64,
         flip_map,
     })

@@ -88,7 +88,7 @@ fn comparisons() {
     assert_eq!((json["relmse"].as_f64(), json["mean_ratio"].as_f64()), (Some(0.0), Some(1.0)));
     let outcome = folder.run("compare a.exr b.exr --json --png heat.png");
     let json = outcome.json();
-    for key in ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip"] {
+    for key in ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "grain"] {
         assert!(json[key].as_f64().is_some_and(|x| x > 0.0), "{key} in {json}");
     }
     assert_eq!(json["pixels_not_finite"], 0);

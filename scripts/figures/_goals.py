@@ -1,0 +1,69 @@
+"""Finished pictures beside what they are to beat: ratios of errors, smaller than 1 where ours is the better one."""
+
+import math
+
+FIGURES = ("relmse", "relmse_trimmed", "flip", "grain", "grain_trimmed")
+
+
+def ratio(ours, other, figure, floor):
+    """Ours over the other. `floor`: below that an error is not told from none."""
+    return max(ours[figure], floor) / max(other[figure], floor)
+
+
+def summary(ratios, limit=1.0):
+    """Geometric mean, worst, and how many are at most `limit`."""
+    if not ratios:
+        return None
+    mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
+    return {
+        "geometric_mean": round(mean, 4),
+        "worst": round(max(ratios), 4),
+        "within": sum(r <= limit for r in ratios),
+        "of": len(ratios),
+    }
+
+
+def best(candidates, figure):
+    """The one with the smallest error."""
+    return min(candidates, key=lambda one: one[figure])
+
+
+def inputs(pictures):
+    """What a finish began with."""
+    return [figures for name, figures in pictures.items() if name == "noisy" or name.startswith("level")]
+
+
+def goals(cells, main):
+    """The counts of one set and budget. `main`: whose delivered picture it is about.
+
+    `cells`: a scene each, {"floor": .., "ours": {name: pictures}, "peers": {name: pictures}}.
+    """
+    found = {}
+    for figure in FIGURES:
+        floor = (lambda cell: cell["floor"]) if figure != "flip" else (lambda cell: 1e-6)
+        whole = [cell for cell in cells if main in cell["ours"]]
+        beside = []
+        for cell in whole:
+            rivals = [pictures["oidn"] for pictures in cell["peers"].values() if "oidn" in pictures]
+            if rivals:
+                beside.append(ratio(cell["ours"][main]["delivered"], best(rivals, figure), figure, floor(cell)))
+        found[f"{main} / best peer with OIDN: {figure}"] = summary(beside)
+        for name, chosen in ((main, [main]), ("all methods", None)):
+            pairs = [(cell, cell["ours"][m]) for cell in cells for m in (chosen or cell["ours"]) if m in cell["ours"]]
+            alone = [ratio(p["delivered"], p["oidn"], figure, floor(cell)) for cell, p in pairs if "oidn" in p]
+            found[f"{name} / OIDN alone: {figure}"] = summary(alone)
+            own = [
+                ratio(p["delivered"], best(inputs(p), figure), figure, floor(cell)) for cell, p in pairs if inputs(p)
+            ]
+            found[f"{name} / best of its own inputs, within 1.02: {figure}"] = summary(own, 1.02)
+        fixed = []
+        for cell in whole:
+            others = [
+                pictures["delivered"]
+                for name, pictures in cell["ours"].items()
+                if name.split()[0] != "auto" and name.split()[1:] == main.split()[1:]
+            ]
+            if others:
+                fixed.append(ratio(cell["ours"][main]["delivered"], best(others, figure), figure, floor(cell)))
+        found[f"{main} / best fixed method, within 1.1: {figure}"] = summary(fixed, 1.1)
+    return {name: value for name, value in found.items() if value}

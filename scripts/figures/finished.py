@@ -1,0 +1,218 @@
+#!/usr/bin/env python3
+"""The finished picture at equal time: our methods as delivered, what they were finished from, Intel OIDN alone on that,
+and public renderers with OIDN.
+
+Every picture is measured against two independent halves of a reference, so that the reference's own noise drops out:
+relMSE of all pixels and without the worst 0.5 %, HDR-FLIP (which keeps the noise of the reference), and grain (see
+`caustique compare`) of all pixels and without the worst 0.5 %. All that takes long is kept: a run that was cut off
+goes on.
+
+  CAUSTIQUE_BIN       the program
+  CAUSTIQUE_CACHE     where all is kept [out/finished]
+  SET                 first, second, all, or twins: scenes without what the peers' drivers cannot say [first]
+  SCENES              names below scenes, such as pool,second/still,twin/pool [those of SET]
+  BUDGETS             seconds [15,60,240]
+  SEEDS               renders of each [1]
+  WIDTH, THREADS      [320, 2]
+  METHODS             [auto,path,bdpt,vcm,sppm,cppm]
+  DENOISE             what --denoise is given, a render each; `default` gives none [default]
+  OPTIONS             more options of our renders
+  CLOCK               wall, or cpu: budgets are core-seconds over threads [wall]
+  REFERENCE_SECONDS   core-seconds of each half [240]
+  PEERS               [mitsuba_path,lux_bidir,lux_path_caustic,lux_bidirvm,cycles_path]
+  CAUSTIQUE_PEERS     the folder of the peers' drivers; without it peers are left out
+  PEERS_PYTHON, PEERS_PYTHON_BPY   their interpreters [those of .venv-peers and .venv-bpy]
+  SHORT=1             half an hour on two cores: width 240, budget 10, methods auto,path,bdpt,sppm,vcm, references of
+                      60 core-seconds a half
+
+scripts/figures/peers.sh installs the peers, and OIDN. Peers always have the budget in core-seconds (seconds times
+threads), ours on the wall clock at most as many: rows say what was spent.
+"""
+
+import os
+import sys
+
+from record import ROOT
+
+for variable, python in (("PEERS_PYTHON", ".venv-peers"), ("PEERS_PYTHON_BPY", ".venv-bpy")):
+    if not os.environ.get(variable) and (ROOT / python / "bin" / "python").exists():
+        os.environ[variable] = str(ROOT / python / "bin" / "python")
+
+import _peers  # noqa: E402
+import _references  # noqa: E402
+import _renders  # noqa: E402
+from _cache import CACHE, THREADS, WIDTH, Failed, load, program, save  # noqa: E402
+from _goals import FIGURES, goals, inputs  # noqa: E402
+from _pictures import Reference  # noqa: E402
+from record import record  # noqa: E402
+
+SHORT = os.environ.get("SHORT") == "1"
+BUDGETS = [float(x) for x in os.environ.get("BUDGETS", "10" if SHORT else "15,60,240").split(",")]
+SEEDS = int(os.environ.get("SEEDS", "1"))
+METHODS = os.environ.get("METHODS", "auto,path,bdpt,sppm,vcm" if SHORT else "auto,path,bdpt,vcm,sppm,cppm").split(",")
+DENOISE = ["" if x == "default" else x for x in os.environ.get("DENOISE", "default").split(",")]
+# A render on the wall clock that got a smaller share of its cores than this is told apart.
+LITTLE = 0.8
+KINDS = {"second": "second", "twin": "twins"}
+COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}{'mean':>8}"
+
+
+def mean(runs):
+    """The figures of some seeds' pictures, averaged."""
+    names = set.intersection(*(set(run) for run in runs))
+    average = {}
+    for name in sorted(names):
+        keys = [key for key, value in runs[0][name].items() if value is not None]
+        average[name] = {key: sum(run[name][key] for run in runs) / len(runs) for key in keys}
+    return average
+
+
+def line(label, spent, figures, note=""):
+    """A row of the table."""
+    values = "".join(f"{figures[key]:>9.4f}" if key == "flip" else f"{figures[key]:>11.3g}" for key in FIGURES)
+    values += f"{figures.get('mean_ratio', 1):>8.3f}"
+    print(f"    {label:<32}{spent:>8.1f}{values}{'  ' + note if note else ''}", flush=True)
+
+
+def seeds(make, figures):
+    """Renders every seed; returns the averaged figures by picture and the mean core-seconds."""
+    runs, spent = [], []
+    for seed in range(1, SEEDS + 1):
+        folder = make(seed)
+        runs.append(figures(folder))
+        spent.append(load(folder / "run.json")["cpu_seconds"])
+    return mean(runs), sum(spent) / len(spent)
+
+
+def ours(scene, budget, reference, halves, cell):
+    """Our renders of a scene at a budget."""
+    for denoise in DENOISE:
+        for method in METHODS:
+            name = f"{method} {denoise}".strip()
+            try:
+                pictures, spent = seeds(
+                    lambda seed: _renders.render(scene, method, denoise, budget, seed),
+                    lambda folder: _renders.figures(folder, reference, halves, _renders.pictures),
+                )
+            except Failed as failed:
+                cell["notes"][name] = str(failed)
+                print(f"    {name:<32}{failed}", flush=True)
+                continue
+            cell["ours"][name], cell["core_seconds"][name] = pictures, spent
+            if spent < LITTLE * budget * THREADS:
+                cell["notes"][name] = f"spent {spent:.1f} of {budget * THREADS:g} core-seconds: try CLOCK=cpu"
+            line(name, spent, pictures["delivered"], cell["notes"].get(name, ""))
+            line("  its input", spent, pictures["noisy"])
+            if len(inputs(pictures)) > 1:
+                line("  best level", spent, min(inputs(pictures), key=lambda figures: figures["relmse_trimmed"]))
+            if "oidn" in pictures:
+                line("  OIDN alone", spent, pictures["oidn"])
+
+
+def others(peers, names, budget, reference, halves, cell):
+    """The peers' renders of a scene at a budget."""
+    for name in names:
+        try:
+            pictures, spent = seeds(
+                lambda seed: peers.render(name, budget, seed),
+                lambda folder: _renders.figures(folder, reference, halves, peers.pictures),
+            )
+        except Failed as failed:
+            cell["notes"][name] = str(failed)
+            print(f"    {name:<32}{failed}", flush=True)
+            if peers.blockers:
+                cell["notes"] = {key: note for key, note in cell["notes"].items() if key not in names} | {
+                    "peers": str(failed)
+                }
+                return
+            continue
+        note = _peers.stranger(pictures["noisy"])
+        if note:
+            cell["notes"][name] = note
+        else:
+            cell["peers"][name] = pictures
+        cell["core_seconds"][name] = spent
+        line(name, spent, pictures["noisy"], note or "")
+        if "oidn" in pictures:
+            line("  with OIDN", spent, pictures["oidn"])
+
+
+def short(cell):
+    """A cell for the record: the figures of a picture, to four digits."""
+
+    def pictures(some):
+        return {
+            name: {picture: [float(f"{figures[key]:.4g}") for key in FIGURES] for picture, figures in found.items()}
+            for name, found in some.items()
+        }
+
+    spent = {name: round(value, 1) for name, value in cell["core_seconds"].items()}
+    return {**cell, "ours": pictures(cell["ours"]), "peers": pictures(cell["peers"]), "core_seconds": spent}
+
+
+def measure(scene, names):
+    """All of a scene: a cell for each budget, and what its reference is."""
+    halves, made = _references.reference(scene)
+    reference = Reference.read(halves)
+    known = {"error": reference.error, **{key: made[key] for key in ("options", "core_seconds", "program")}}
+    peers = _peers.Peers(scene, reference.mean.shape[0]) if names else None
+    cells = []
+    for budget in BUDGETS:
+        # Errors below a fiftieth of the reference's own are taken for that.
+        cell = {"scene": _references.name(scene), "budget": budget, "floor": max(reference.error / 50, 1e-9)}
+        cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes")})
+        own = f"reference by {made['options'][1]}, its own relMSE {reference.error:.2g}"
+        print(f"\n{cell['scene']}, {budget:g} s, {own}\n{COLUMNS}", flush=True)
+        ours(scene, budget, reference, halves, cell)
+        if peers:
+            others(peers, names, budget, reference, halves, cell)
+            if peers.approximations and cell["peers"]:
+                cell["notes"]["approximated for peers"] = "; ".join(peers.approximations)
+        cells.append(cell)
+    return cells, known
+
+
+def count(cells):
+    """The goals of each set and budget, printed and returned."""
+    counts = {}
+    delivered = f"{'auto' if 'auto' in METHODS else METHODS[0]} {DENOISE[0]}".strip()
+    for kind in ("first", "second", "twins"):
+        for budget in BUDGETS:
+            chosen = [cell for cell in cells if cell["budget"] == budget]
+            chosen = [cell for cell in chosen if KINDS.get(cell["scene"].partition("/")[0], "first") == kind]
+            found = goals(chosen, delivered)
+            if found:
+                title = f"{kind} set, {budget:g} s"
+                counts[title] = found
+                print(f"\n{title:<66}{'geometric mean':>15}{'worst':>9}{'within':>9}")
+            for text, value in found.items():
+                within = f"{value['within']}/{value['of']}"
+                print(f"    {text:<62}{value['geometric_mean']:>15.3f}{value['worst']:>9.2f}{within:>9}")
+    return counts
+
+
+def main():
+    scenes = _references.scenes()
+    names, reason = _peers.chosen()
+    if reason:
+        print(reason, file=sys.stderr)
+    if not _renders.PYTHON:
+        print("OIDN alone is left out: there is no .venv-peers; make it by scripts/figures/peers.sh", file=sys.stderr)
+    if not scenes:
+        print(f"SET={_references.SET} has no scenes yet", file=sys.stderr)
+        return
+    cells, known = [], {}
+    for scene in scenes:
+        try:
+            found, known[_references.name(scene)] = measure(scene, names)
+            cells += found
+        except Failed as failed:
+            print(f"\n{_references.name(scene)}: no reference: {failed}", flush=True)
+    said = {"program": program(), "width": WIDTH, "threads": THREADS, "clock": _renders.CLOCK, "seeds": SEEDS}
+    said.update({"options": _renders.OPTIONS, "figures": FIGURES, "counts": count(cells), "references": known})
+    save(CACHE / "last.json", {**said, "cells": cells})
+    record("finished", {**said, "cells": [short(cell) for cell in cells]})
+
+
+if __name__ == "__main__":
+    main()

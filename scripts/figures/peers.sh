@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Installs the renderers that scripts/figures/finished.py measures beside: Mitsuba, LuxCore and Intel OIDN in .venv-peers, Cycles in
+# .venv-bpy (as scripts/setup.sh test makes it; what reads EXR files for it lies apart, in .venv-peers/bpy), and an LLVM that Mitsuba's
+# vectorised variant loads. Runs again in a second when nothing is missing. Without an LLVM Mitsuba renders a third as fast.
+
+set -euo pipefail
+
+# shellcheck source=scripts/setup.sh
+. "$(dirname "${BASH_SOURCE[0]}")/../setup.sh"
+
+# LLVM 15 and 16 abort on kernels of Mitsuba 3.9.
+llvm_is_new() { at_least 17 "$1"; }
+
+find_llvm() {
+    [ -z "${DRJIT_LIBLLVM_PATH:-}" ] || return 0
+    local version
+    for version in $(find /usr/lib -name 'libLLVM*.so*' 2>/dev/null | sed -n 's/.*libLLVM[-.a-z]*\([0-9][0-9]*\).*/\1/p'); do
+        if llvm_is_new "$version"; then return; fi
+    done
+    return 1
+}
+
+need_llvm() {
+    local package
+    find_llvm && return
+    apt_update
+    package=$(apt-cache pkgnames libllvm | grep -E '^libllvm[0-9]+$' | sort -V | tail -n 1 || true)
+    if [ -n "$package" ] && llvm_is_new "${package#libllvm}"; then
+        apt_install "$package"
+    else
+        say "apt has no LLVM of 17 or later: Mitsuba renders with its slow scalar variant"
+    fi
+}
+
+# Blender's module does not come with OpenEXR; its environment stays as scripts/setup.sh makes it.
+need_exr_for_bpy() {
+    local directory=$ROOT/.venv-peers/bpy requirement stamp
+    requirement=$(sed -n '/^OpenEXR==/p' "$ROOT/scripts/requirements-peers.txt")
+    stamp="$("$ROOT/.venv-bpy/bin/python" --version) $requirement"
+    [ "$(cat "$directory/.complete" 2>/dev/null)" != "$stamp" ] || return 0
+    say "installing $requirement beside Blender's module"
+    rm -rf "$directory"
+    "$ROOT/.venv-bpy/bin/python" -m pip install -q --disable-pip-version-check --no-deps --target "$directory" "$requirement" >&2 ||
+        fail "pip could not install $requirement" "check the network and the disk, then run this script again"
+    printf '%s\n' "$stamp" >"$directory/.complete"
+}
+
+need_python
+need_llvm
+need_venv_module
+need_venv .venv-peers "$PYTHON" requirements-peers.txt
+need_bpy
+need_exr_for_bpy

@@ -1,0 +1,163 @@
+"""What the figures of finished pictures rest on: errors against noisy references, goals, scenes in other terms."""
+
+import json
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+import support
+
+sys.path.append(str(support.ROOT / "scripts" / "figures"))
+import _goals  # noqa: E402
+import _pictures  # noqa: E402
+import _translate  # noqa: E402
+import _twins  # noqa: E402
+
+SCENES = support.ROOT / "scenes"
+
+
+class Errors(unittest.TestCase):
+    def setUp(self):
+        self.random = np.random.default_rng(5)
+        self.truth = np.broadcast_to(np.array([1.0, 2.0, 3.0]), (120, 160, 3))
+
+    def noisy(self, size):
+        return self.truth + size * self.random.standard_normal(self.truth.shape)
+
+    def test_noise_of_the_reference_drops_out(self):
+        reference = _pictures.Reference(self.noisy(0.2), self.noisy(0.2))
+        found = reference.measure(self.noisy(0.1))
+        # 57600 values: five standard errors of a product of two errors are 8 %.
+        self.assertAlmostEqual(found["relmse"] / (0.01 / 4.01), 1, delta=0.08)
+        self.assertAlmostEqual(found["grain"] / (0.01 / 4.01) * 9 / 8, 1, delta=0.1)
+        self.assertAlmostEqual(reference.error / (0.02 / 4.01), 1, delta=0.03)
+        self.assertLess(abs(found["mean_ratio"] - 1), 5 * found["mean_ratio_error"])
+
+    def test_an_offset_has_no_grain(self):
+        found = _pictures.Reference(self.truth, self.truth).measure(self.truth + 0.3)
+        self.assertAlmostEqual(found["relmse"], 0.09 / 4.01)
+        self.assertLess(found["grain"], 1e-20)
+
+    def test_the_worst_are_left_out_and_holes_are_counted(self):
+        picture = self.truth + 0.3
+        picture[3, 4] = 1e3
+        picture[7, 8] = np.nan
+        found = _pictures.Reference(self.truth, self.truth).measure(picture)
+        self.assertAlmostEqual(found["relmse_trimmed"], 0.09 / 4.01)
+        self.assertLess(found["grain_trimmed"], 1e-20)
+        self.assertGreater(found["relmse"], 1)
+        self.assertEqual(found["pixels_not_finite"], 1)
+
+    def test_the_program_says_the_same(self):
+        picture, truth = self.noisy(0.1).astype(np.float32), self.truth.astype(np.float32)
+        found = _pictures.Reference(truth, truth).measure(picture)
+        with tempfile.TemporaryDirectory() as folder:
+            paths = [Path(folder) / name for name in ("a.exr", "b.exr")]
+            _pictures.write(paths[0], picture=picture)
+            _pictures.write(paths[1], picture=truth)
+            said = json.loads(support.run(["compare", *paths, "--json"]).stdout)
+        for key in ("relmse", "grain", "mean_ratio"):
+            self.assertAlmostEqual(found[key] / said[key], 1, delta=1e-5, msg=key)
+        self.assertAlmostEqual(found["flip"] / said["flip"], 1, delta=2e-2)
+
+
+class Goals(unittest.TestCase):
+    def test_ratios_are_counted(self):
+        def figures(value):
+            return dict.fromkeys(_goals.FIGURES, value)
+
+        ours = {
+            "auto": {
+                "delivered": figures(0.02),
+                "noisy": figures(0.08),
+                "level1": figures(0.019),
+                "oidn": figures(0.04),
+            }
+        }
+        ours["path"] = {"delivered": figures(0.01), "noisy": figures(0.01), "oidn": figures(0.01)}
+        cell = {
+            "floor": 1e-9,
+            "ours": ours,
+            "peers": {"other": {"oidn": figures(0.05)}, "worse": {"oidn": figures(0.5)}},
+        }
+        found = _goals.goals([cell], "auto")
+        self.assertEqual(found["auto / best peer with OIDN: flip"]["geometric_mean"], 0.4)
+        self.assertEqual(found["auto / OIDN alone: grain"], {"geometric_mean": 0.5, "worst": 0.5, "within": 1, "of": 1})
+        self.assertEqual(found["all methods / OIDN alone: grain"]["of"], 2)
+        self.assertEqual(found["auto / best fixed method, within 1.1: relmse"]["within"], 0)
+        self.assertEqual(found["auto / best of its own inputs, within 1.02: relmse"]["within"], 0)
+        self.assertEqual(found["all methods / best of its own inputs, within 1.02: relmse"]["within"], 1)
+
+
+class Translation(unittest.TestCase):
+    def test_what_drivers_lack_is_named(self):
+        self.assertEqual(_translate.Translation(SCENES / "cornell.glb").blockers, [])
+        self.assertIn('material "glass" absorbs', _translate.Translation(SCENES / "torus.glb").blockers)
+        self.assertIn("a medium fills the space", _translate.Translation(SCENES / "fog.glb").blockers)
+        self.assertIn("depth of field", _translate.Translation(SCENES / "gems.glb").blockers)
+
+    def test_twins_are_what_drivers_take(self):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(_twins, "CACHE", Path(folder)):
+            for name in ("torus", "prism", "interior"):
+                twin = _twins.twin(SCENES / f"{name}.glb")
+                found = _translate.Translation(twin)
+                self.assertEqual(found.blockers, [], name)
+                self.assertFalse([text for text in found.approximations if "material" in text], name)
+                said = json.loads(support.run(["info", twin, "--json"], check=0).stdout)
+                original = json.loads(support.run(["info", SCENES / f"{name}.glb", "--json"], check=0).stdout)
+                self.assertEqual(said["triangles"], original["triangles"], name)
+            # Nothing is to be taken from the one, no driver has what is left of the other.
+            self.assertIsNone(_twins.twin(SCENES / "cornell.glb"))
+            self.assertIsNone(_twins.twin(SCENES / "fog.glb"))
+
+    def test_a_lamp_keeps_its_light_as_a_ball(self):
+        found = _translate.Translation(SCENES / "interior.glb")
+        with tempfile.TemporaryDirectory() as folder:
+            found.save(Path(folder) / "interior", 64, 36)
+            scene = _translate.gltf.read(Path(folder) / "interior" / "interior.glb")
+        self.assertEqual(scene.lights, [])
+        balls = [mesh for mesh in scene.meshes if mesh.name == "lamp" and len(mesh.triangles) == 1280]
+        before = _translate.gltf.read(SCENES / "interior.glb").lights
+        self.assertEqual(len(balls), len(before))
+        for ball, light in zip(balls, before):
+            a, b, c = ball.positions[ball.triangles].transpose(1, 0, 2)
+            surface = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+            material = scene.document["materials"][ball.material]
+            strength = material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"]
+            np.testing.assert_allclose(
+                np.array(material["emissiveFactor"]) * strength * surface / 4, light.intensity, rtol=1e-5
+            )
+            self.assertAlmostEqual(surface / (4 * np.pi * light.radius**2), 1, delta=0.01)
+            np.testing.assert_allclose(ball.positions.mean(0), light.to_world[:3, 3], atol=1e-5)
+
+    def test_a_ball_is_closed_and_faces_outward(self):
+        points, triangles = _translate.icosphere(2)
+        self.assertEqual(len(triangles), 320)
+        self.assertGreater(np.linalg.det(points[triangles]).min(), 0)
+
+    def test_the_sun_stands_where_it_shines_from(self):
+        toward = np.array([0.6, 0.64, -0.48])
+        sun = _translate.disc(toward, np.radians(0.265), np.array([1.0, 2.0, 3.0]), 512, 1024)
+        polar, turn = (np.arange(512) + 0.5) / 512 * np.pi, (np.arange(1024) + 0.5) / 1024 * 2 * np.pi
+        solid = np.sin(polar)[:, None] * (np.pi / 512) * (2 * np.pi / 1024)
+        np.testing.assert_allclose((sun * solid[..., None]).sum((0, 1)), [1, 2, 3])
+        # The drivers' u is atan2(x, -z) / 2 pi.
+        x, y, z = np.sin(polar)[:, None] * np.sin(turn), np.cos(polar)[:, None], -np.sin(polar)[:, None] * np.cos(turn)
+        middle = [(sun[..., 0] * solid * axis).sum() for axis in (x, y, z)]
+        np.testing.assert_allclose(middle, toward, atol=2e-3)
+
+    def test_environments_are_turned(self):
+        # +X is in the middle where u is 1/2 + atan2(z, x) / 2 pi, and a quarter in where u is atan2(x, -z) / 2 pi.
+        image = np.zeros((4, 64, 3), np.float32)
+        image[:, 32] = 1
+        at = (np.arange(64) + 0.5) / 64
+        turned = _translate.sample(image, at + 0.25, (np.arange(4) + 0.5) / 4)
+        self.assertEqual(int(turned[0, :, 0].argmax()), 16)
+
+
+if __name__ == "__main__":
+    unittest.main()
