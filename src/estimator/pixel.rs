@@ -3,6 +3,7 @@
 use super::Coverage;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::photon::ByKind;
+use crate::random;
 use crate::stat::Welford;
 use crate::transport::{EyeMeasure, MAX_LEVELS};
 
@@ -25,8 +26,8 @@ pub struct Parts {
     pub volume: DVec3,
 }
 
-/// Independent groups of iterations: iteration `i` (from 1) belongs to quarter `(i - 1) % QUARTERS`.
-pub const QUARTERS: usize = 4;
+/// Independent groups of iterations ([`random::QUARTERS`]).
+pub const QUARTERS: usize = random::QUARTERS as usize;
 
 /// Estimates of one quarter of the iterations, of the level that is the method's own image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -149,7 +150,7 @@ impl Pixel {
                 self.differences[level].add(difference, inverse_count);
             }
         }
-        let quarter = &mut self.quarters[(pass.wrapping_sub(1) % QUARTERS as u64) as usize];
+        let quarter = &mut self.quarters[random::quarter(pass) as usize];
         quarter.sum += values[own].as_dvec3();
         quarter.count += 1;
         let (measure, level) = match correlated {

@@ -43,9 +43,8 @@ fn window_sums(values: &[[f64; 2]], place: impl Fn(usize) -> (usize, usize) + Sy
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::QUARTERS;
     use crate::math::Rgb;
-    use crate::random::{Domain, Purpose, Stream};
+    use crate::random::{Domain, Purpose, QUARTERS, Stream, quarter};
     use crate::transport::EyeMeasure;
 
     /// A picture whose iterations are uniform; `antithetic` ones of a quarter come in pairs that cancel, as low-discrepancy points do.
@@ -53,7 +52,7 @@ mod tests {
         let pixel = |index: u64| {
             let mut pixel = Pixel::new([0.0; 2]);
             for pass in 1..=32u64 {
-                let (quarter, at) = ((pass - 1) % QUARTERS as u64, (pass - 1) / QUARTERS as u64);
+                let (quarter, at) = (quarter(pass), (pass - 1) / QUARTERS);
                 let pair = if antithetic { at / 2 } else { at };
                 let draw = Stream::new(3, quarter * 100 + pair, Domain::Test, index).vertex(0).one(Purpose::Pixel);
                 let value = if antithetic && at % 2 == 1 { 1.0 - draw } else { draw };
