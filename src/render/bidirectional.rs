@@ -134,11 +134,10 @@ impl<'a> Passes<'a> {
         let (width, height) = self.camera.size();
         let Settings { seed, max_depth, .. } = *self.settings;
         let pass = LightPass::new(seed, i, pair.light, width * height, max_depth).guided(guide);
-        // Each belongs to a pixel, and so its passes can take the points of a sequence.
-        let pass = pass.drawing(Streams::in_sequence(seed, i, pair.light));
-        // Others put paths together of one hue alone, whichever it is.
+        // Others put paths together of one hue alone, whichever it is. There each light path is its pixel's own, and its
+        // passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
         let merges = self.shared.is_some_and(|shared| shared.strategies.merge);
-        if merges { pass.with(Comb::slow(seed, i)) } else { pass }
+        if merges { pass.with(Comb::slow(seed, i)) } else { pass.drawing(Streams::in_sequence(seed, i, pair.light)) }
     }
 
     /// The photons that pass `i` leaves, where it was not rendered here.
