@@ -14,10 +14,10 @@ import os
 import shutil
 from pathlib import Path
 
+import _translate
 from _cache import CACHE, THREADS, WIDTH, Failed, digest, load, making, save, scene_key, timed
 from _pictures import Layers, write
 from _renders import PYTHON, denoised
-from _translate import Translation
 from record import ROOT
 
 DRIVERS = os.environ.get("CAUSTIQUE_PEERS", "")
@@ -68,8 +68,9 @@ class Peers:
     """The peers on one scene."""
 
     def __init__(self, scene, height):
-        self.place = CACHE / "peers" / digest(*sorted(Path(DRIVERS).glob("*.py"))) / scene_key(scene) / str(WIDTH)
-        translation = Translation(scene)
+        tools = [*sorted(Path(DRIVERS).glob("*.py")), Path(_translate.__file__)]
+        self.place = CACHE / "peers" / digest(*tools) / scene_key(scene) / str(WIDTH)
+        translation = _translate.Translation(scene)
         self.blockers = list(dict.fromkeys(translation.blockers))
         self.approximations = translation.approximations
         self.folder = self.place / "scene" / scene.stem

@@ -18,6 +18,8 @@ import gltf  # noqa: E402
 
 # How wide an environment with a sun's disc in it is made: half a degree is three pixels.
 WIDE = 2048
+# The largest number in its image.
+HALF = 30000.0
 PLAIN = {
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
@@ -217,14 +219,13 @@ class Translation:
         """Writes the files that the drivers read."""
         name = folder.name
         folder.mkdir(parents=True)
+        environment = None
         if self.environment is not None:
-            write(folder / "environment.exr", picture=self.environment)
-        settings = {
-            "width": width,
-            "height": height,
-            "max_path_segments": 32,
-            "environment": None if self.environment is None else {"file": "environment.exr"},
-        }
+            # Cycles and LuxCore keep images in half precision, whose largest number a sun surpasses.
+            scale = max(float(self.environment.max()) / HALF, 1.0)
+            write(folder / "environment.exr", picture=self.environment / scale)
+            environment = {"file": "environment.exr", "scale": scale}
+        settings = {"width": width, "height": height, "max_path_segments": 32, "environment": environment}
         (folder / f"{name}.json").write_text(json.dumps(settings), encoding="utf-8")
         pack(folder / f"{name}.glb", self.document, self.binary)
 

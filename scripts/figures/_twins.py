@@ -1,9 +1,11 @@
 """Twins of scenes: without what the peers' drivers cannot say, so that they and we render the same.
 
-Glass does not absorb and has one index; coats, sheen and the lens's opening are gone; highlights are whole or none. What makes a
-scene another one stays: a twin that a driver cannot take even so (media, spots, nested glass) is none.
+Glass does not absorb and has one index; coats, sheen and the lens's opening are gone. What is neither metal nor glass
+is matte, for LuxCore's glossy coat is a darker one. What makes a scene another one stays: a twin that the drivers cannot
+take even so (media, spots, nested glass) is none.
 """
 
+import json
 import shutil
 
 from _cache import CACHE
@@ -12,36 +14,34 @@ from _translate import PLAIN, Translation, gltf, pack
 
 def plain(document):
     """Takes from a document what can go; returns whether there was any."""
-    before = repr(document)
+    before = json.dumps(document, sort_keys=True)
     for material in document.get("materials", []):
         extensions = material.get("extensions", {})
         for name in set(extensions) - PLAIN:
             del extensions[name]
         for key in ("attenuationDistance", "attenuationColor"):
             extensions.get("KHR_materials_volume", {}).pop(key, None)
-        specular = extensions.get("KHR_materials_specular", {})
-        specular.pop("specularColorFactor", None)
-        if specular.get("specularFactor", 1):
-            extensions.pop("KHR_materials_specular", None)
-        if not extensions.get("KHR_materials_transmission"):
+        metallic = material.get("pbrMetallicRoughness", {}).get("metallicFactor", 1)
+        if not metallic and "KHR_materials_transmission" not in extensions:
             extensions.pop("KHR_materials_ior", None)
+            if extensions.get("KHR_materials_specular", {}).get("specularFactor", 1):
+                material.setdefault("extensions", extensions)["KHR_materials_specular"] = {"specularFactor": 0}
     for part in [*document.get("cameras", []), *document["nodes"]]:
         gltf.extras(part).pop("aperture_radius", None)
         gltf.extras(part).pop("focus_distance", None)
     used = {name for material in document.get("materials", []) for name in material.get("extensions", {})}
     for key in ("extensionsUsed", "extensionsRequired"):
-        kept = [name for name in document.get(key, []) if not name.startswith("KHR_materials_") or name in used]
-        document[key] = kept
-        if not kept:
-            del document[key]
-    return repr(document) != before
+        named = document.pop(key, [])
+        kept = [name for name in named if not name.startswith("KHR_materials_") or name in used]
+        if key == "extensionsUsed":
+            kept += sorted(used - set(kept))
+        if kept:
+            document[key] = kept
+    return json.dumps(document, sort_keys=True) != before
 
 
 def twin(scene):
-    """The twin of a scene as a file of its own; nothing where the drivers take the scene itself, or not even its twin."""
-    found = Translation(scene)
-    if not found.blockers and not any("material" in text for text in found.approximations):
-        return None
+    """The twin of a scene as a file of its own; nothing where that is the scene itself, or no scene for the drivers."""
     document, binary = gltf.chunks(scene.read_bytes())
     if not plain(document):
         return None

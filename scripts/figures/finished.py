@@ -9,7 +9,7 @@ goes on.
 
   CAUSTIQUE_BIN       the program
   CAUSTIQUE_CACHE     where all is kept [out/finished]
-  SET                 first, second, all, or twins: scenes without what the peers' drivers cannot say [first]
+  SET                 first, second, all, or twins: scenes as far as peers' drivers can say them [first]
   SCENES              names below scenes, such as pool,second/still,twin/pool [those of SET]
   BUDGETS             seconds [15,60,240]
   SEEDS               renders of each [1]

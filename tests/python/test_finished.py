@@ -102,16 +102,18 @@ class Translation(unittest.TestCase):
 
     def test_twins_are_what_drivers_take(self):
         with tempfile.TemporaryDirectory() as folder, mock.patch.object(_twins, "CACHE", Path(folder)):
-            for name in ("torus", "prism", "interior"):
+            for name in ("torus", "prism", "interior", "cornell"):
                 twin = _twins.twin(SCENES / f"{name}.glb")
                 found = _translate.Translation(twin)
                 self.assertEqual(found.blockers, [], name)
                 self.assertFalse([text for text in found.approximations if "material" in text], name)
+                kinds = {m["name"]: m.get("extensions", {}) for m in found.document["materials"]}
+                self.assertEqual(set.union(*map(set, kinds.values())) - _translate.PLAIN, set())
                 said = json.loads(support.run(["info", twin, "--json"], check=0).stdout)
                 original = json.loads(support.run(["info", SCENES / f"{name}.glb", "--json"], check=0).stdout)
                 self.assertEqual(said["triangles"], original["triangles"], name)
             # Nothing is to be taken from the one, no driver has what is left of the other.
-            self.assertIsNone(_twins.twin(SCENES / "cornell.glb"))
+            self.assertIsNone(_twins.twin(SCENES / "blocks.glb"))
             self.assertIsNone(_twins.twin(SCENES / "fog.glb"))
 
     def test_a_lamp_keeps_its_light_as_a_ball(self):
