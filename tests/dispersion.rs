@@ -542,14 +542,14 @@ fn a_rainbow_behind_dispersive_glass_agrees() {
     let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(150, seed));
     agree("rainbow behind glass, bdpt", &bdpt, &path, 2e-3, 0.5);
     for method in [Method::Vcm, Method::Bpm] {
-        let other = seeds(&scene, method, |seed| merging(80, seed));
+        let other = seeds(&scene, method, |seed| merging(320, seed));
         agree(&format!("rainbow behind glass, {method:?}"), &other, &path, 0.02, 0.4);
     }
     for method in [Method::Sppm, Method::Cppm, Method::Pm] {
         let other = seeds(&scene, method, |seed| photons(20_000, 0.06, 20, seed));
         agree(&format!("rainbow behind glass, {method:?}"), &other, &path, 0.02, 0.4);
     }
-    let other = seeds(&scene, Method::Cppm, |seed| plus(photons(20_000, 0.06, 20, seed)));
+    let other = seeds(&scene, Method::Cppm, |seed| plus(photons(20_000, 0.06, 60, seed)));
     agree("rainbow behind glass, cppm plus", &other, &path, 0.02, 0.4);
 }
 

@@ -178,7 +178,8 @@ fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&Pixel) -
     let settings = Settings { levels: Levels::new(1), iterations: Some(12), ..settings };
     let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
     let light: f64 = rendered.pixels.iter().map(|p| part(p).element_sum() / 12.0).sum();
-    let variance: f64 = rendered.pixels.iter().map(|p| p.levels[0].variance_of_mean(12.0).element_sum()).sum();
+    let variance: f64 =
+        rendered.pixels.iter().map(|p| p.variance_by_quarters().expect("twelve iterations").element_sum()).sum();
     println!("guided {}, {:?}: light {light:.3}, variance {variance:.6}", settings.guided, settings.indirect);
     (light, variance)
 }
@@ -444,7 +445,8 @@ fn a_pilot_can_be_stopped() {
     };
     let (stopped, whole) = (asked(true), asked(false));
     println!("asked {stopped} times where the answer is to stop, {whole} times where it is not");
-    assert!(stopped <= 10 && whole > 40);
+    // Once a candidate in each of two rounds.
+    assert!(stopped <= 12 && whole > 40, "{stopped}, {whole}");
 }
 
 /// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor the light: what guided ones find tells.

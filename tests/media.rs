@@ -405,8 +405,8 @@ fn a_volumetric_caustic_agrees() {
     // The ball is above the picture: what it shows, no connection finds.
     description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.15, 0.0), 25.0));
     let scene = build(description);
-    let light = seeds(&scene, Method::Light, 10, |seed| settings(24, seed));
-    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(14, seed));
+    let light = seeds(&scene, Method::Light, 10, |seed| settings(48, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(56, seed));
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(8_000, 0.12, 12, seed));
     agree("volumetric caustic, bdpt", &bdpt, &light, 5e-3, 0.25);
     agree("volumetric caustic, sppm", &sppm, &bdpt, 0.04, 0.3);

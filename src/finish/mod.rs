@@ -30,8 +30,9 @@ const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"]
 const QUARTERS: usize = 4;
 
 /// Layers of ours that finishing reads, by the beginnings of their names.
-pub const READS: [&str; 11] = [
-    "Noisy", "Level", "Variance", "Quarter", "albedo", "normal", "Direct", "Indirect", "Caustic", "Emission", "Volume",
+pub const READS: [&str; 12] = [
+    "Noisy", "Level", "Variance", "Quarter", "albedo", "normal", "depth", "Direct", "Indirect", "Caustic", "Emission",
+    "Volume",
 ];
 
 /// The layer of a finished part; `None` for layers that are no parts.

@@ -44,7 +44,7 @@ fn finishing_later_is_finishing_at_once() {
 #[test]
 fn pictures_of_other_renderers_are_finished() {
     let folder = Folder::new();
-    folder.render("-o own.exr --iterations 8 --no-combine --layers beauty,Quarter,albedo,normal --method path");
+    folder.render("-o own.exr --iterations 8 --no-combine --layers beauty,Quarter,albedo,normal --levels 1");
     let (own, _) = folder.read("own.exr");
     let quarters: Vec<Vec<[f32; 3]>> = (1..=4).map(|k| values(&own, &format!("Quarter{k}"))).collect();
     let half = |a: usize| -> Vec<[f32; 3]> {

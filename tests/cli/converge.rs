@@ -65,7 +65,7 @@ fn the_report_of_a_small_comparison() {
     // A row per run, seed and moment: 1, 2, 3, 4, 6, 8, 11 and the last, and the target's 10 of one run.
     let csv = text(&folder, "out/points.csv");
     let mut lines = csv.lines();
-    let header = "run,method,seed,iterations,light_paths,seconds,cpu_seconds,combine_seconds,figure,relmse,relmse_trimmed,mse,mean_ratio,estimated_error";
+    let header = "run,method,seed,iterations,light_paths,seconds,cpu_seconds,finish_seconds,figure,relmse,relmse_trimmed,mse,mean_ratio,estimated_error";
     assert_eq!(lines.next(), Some(header));
     assert_eq!(lines.clone().count(), 2 * (4 * 8 + 1));
     let json: Value = serde_json::from_str(&text(&folder, "out/points.json")).expect("it is JSON");
@@ -85,8 +85,8 @@ fn the_report_of_a_small_comparison() {
         let errors = of(run, "relmse");
         assert!(errors[errors.len() - 1] < errors[0], "{run} {errors:?}");
     }
-    assert!(of("five", "combine_seconds").iter().all(|seconds| *seconds > 0.0));
-    assert!(points.iter().all(|p| p["combine_seconds"].is_null() == (p["run"] != "five")));
+    assert!(of("five", "finish_seconds").iter().all(|seconds| *seconds > 0.0));
+    assert!(points.iter().all(|p| p["finish_seconds"].is_null() == (p["run"] != "five" && p["run"] != "one")));
     let own = json["reference"]["error"]["relmse"].as_f64().expect("a number");
     assert!(own > 0.0 && own < of("five", "relmse")[0], "{own}");
     for point in points {
@@ -103,7 +103,7 @@ fn the_report_of_a_small_comparison() {
     assert_eq!(json["targets"][1]["of"], "one after 10 iterations");
     assert_eq!(json["runs"][0]["theory"]["exponent"], -1.0);
     assert_eq!((&json["runs"][3]["combiner"], &json["runs"][3]["levels"]), (&"compact".into(), &5.into()));
-    assert!(json["runs"][3]["overhead"]["combine_seconds"].as_f64().is_some_and(|seconds| seconds > 0.0));
+    assert!(json["runs"][3]["overhead"]["finish_seconds"].as_f64().is_some_and(|seconds| seconds > 0.0));
 
     // The page holds everything, fetches nothing, and shows names as they are.
     let page = text(&folder, "out/index.html");
@@ -123,13 +123,13 @@ fn the_report_of_a_small_comparison() {
     assert!(csv.starts_with(header) && !csv.contains("NaN") && !page.contains("NaN") && !page.contains("inf "));
 }
 
-/// Turns change nothing: after as many iterations the picture is the one that `render` makes, combined or not; and a reference that was made tells its
+/// Turns change nothing: after as many iterations the picture is the one that `render` makes, finished or not; and a reference that was made tells its
 /// error when it is read again.
 #[test]
 fn pictures_are_those_of_render_and_references_know_their_error() {
     let folder = Folder::new();
     let options = [
-        ("one", "--method sppm --levels 1 --photons 2000"),
+        ("one", "--method sppm --levels 1 --photons 2000 --no-combine"),
         ("five", "--method sppm --photons 2000"),
         ("cppm", "--method cppm --levels 1 --photons 2000"),
     ];
@@ -239,7 +239,7 @@ fn what_is_refused_word_for_word() {
             &["x: --method sppm --width 3"],
             2,
             "--run \"x\": --width cannot differ from run to run",
-            "a run has the method and combiner options of 'caustique render'; the others, where there are such, concern all runs",
+            "a run has the method and finish options of 'caustique render'; the others, where there are such, concern all runs",
         ),
         (
             small,

@@ -13,7 +13,7 @@ fn a_render_leaves_all_layers_and_its_account() {
         "method: auto: sppm, for the render is too short to try others\n",
         "\niteration 6 of 6, ",
         "\npeak memory ",
-        "\nout.exr: 64 x 48, 98 channels\n",
+        "\nout.exr: 64 x 48, 110 channels\n",
     ] {
         assert!(outcome.stderr.contains(part), "{part:?} in {}", outcome.stderr);
     }
@@ -339,14 +339,14 @@ fn levels_layers_names_and_bandwidths_as_asked() {
     folder.render("-o one.exr --iterations 2 --levels 1 --layers beauty,Radius1 --initial-bandwidth 0.25 --alpha 1");
     let (set, header) = folder.read("one.exr");
     let names: Vec<&str> = set.layers.iter().map(|layer| layer.name.as_str()).collect();
-    assert_eq!((names, &header["combined"]), (vec!["", "Radius1"], &Value::Null));
+    assert_eq!((names, &header["combined"]["model"]), (vec!["", "Radius1"], &Value::Null));
     assert!(values(&set, "Radius1").iter().all(|r| r[0] == 0.25));
     folder.render("-o three.exr --iterations 2 --levels 3 --no-combine --exr-naming blender --compression piz");
     let (set, _) = folder.read("three.exr");
     assert!(set.get("ViewLayer.Combined").is_some() && set.get("ViewLayer.Level3").is_some());
     assert!(set.get("ViewLayer.Level4").is_none());
-    let refused = folder.run("render scene.glb -o no.exr --levels 3");
-    let error = "command line: the network compact combines 5 levels, not 3\nhint: add --no-combine, or render with --levels 5\n";
+    let refused = folder.run("render scene.glb -o no.exr --levels 3 --model compact");
+    let error = "command line: the network compact combines 5 levels, not 3\nhint: leave --model out, or render with --levels 5\n";
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
 }
 

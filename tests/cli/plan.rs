@@ -38,7 +38,7 @@ fn the_plan_as_json() {
     let outcome = folder.run("plan scene.glb --json --env 1,1,1 --effects -environment");
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
     let plan = outcome.json();
-    assert_eq!((&plan["scene"], &plan["method"]), (&"scene.glb".into(), &"sppm".into()));
+    assert_eq!(plan["scene"], "scene.glb");
     assert!(plan["because"].as_str().is_some_and(|because| because.starts_with("auto: ")), "{plan}");
     let effects = plan["effects"].as_array().expect("a list");
     let names: Vec<&str> = effects.iter().filter_map(|effect| effect["name"].as_str()).collect();
@@ -46,12 +46,13 @@ fn the_plan_as_json() {
     assert_eq!(names.join(" "), all);
     let effect = |name: &str| effects.iter().find(|effect| effect["name"] == name).expect("it is listed");
     let unmeasured = |mut effect: Value| {
-        for figure in ["energy", "seconds_per_iteration", "time", "error_if_off"] {
+        // Who carries it is the method's, which is auto's to choose.
+        for figure in ["energy", "seconds_per_iteration", "time", "error_if_off", "by"] {
             effect[figure] = Value::Null;
         }
         effect
     };
-    let caustic = json!({"name": "caustic", "present": true, "simulated": true, "by": "photons", "energy": null,
+    let caustic = json!({"name": "caustic", "present": true, "simulated": true, "by": null, "energy": null,
         "because": ["material \"silver\" on \"Mirror\" under light \"Lamp\""], "seconds_per_iteration": null, "time": null, "error_if_off": null});
     assert_eq!(unmeasured(effect("caustic").clone()), caustic);
     let environment = effect("environment");

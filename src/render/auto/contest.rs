@@ -55,7 +55,7 @@ pub(super) struct Candidate<'a> {
 struct Shown {
     finished: Vec<[f32; 3]>,
     judges: [Vec<[f32; 3]>; 2],
-    /// Relative variance of the judges, without the worst pixels, and the mean of their caustics.
+    /// Relative variance of the judges and the mean of all caustics, both without the worst pixels.
     noise: f64,
     caustics: f64,
 }
@@ -98,8 +98,9 @@ impl<'a> Candidate<'a> {
         let estimate = Estimate::of(&set).ok()?;
         let finished = finish.picture(&estimate.first_half(&quarters)).ok()?;
         let [_, _, a, b] = quarters;
-        let caustics: f64 =
-            self.session.pixels().iter().map(|p| p.parts.caustic.element_sum() / f64::from(p.iterations.max(1))).sum();
+        let caustics =
+            self.session.pixels().iter().map(|p| p.parts.caustic.element_sum() / f64::from(p.iterations.max(1)));
+        let caustics = without_worst(caustics.collect());
         let noise = variance(&a, &b, &finished);
         Some(Shown { finished, judges: [a, b], noise, caustics })
     }
@@ -112,10 +113,14 @@ fn variance(a: &[[f32; 3]], b: &[[f32; 3]], values: &[[f32; 3]]) -> f64 {
         let value = values[index].iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
         apart / 3.0 * super::trial::scale(value)
     };
-    let mut squares: Vec<f64> = (0..a.len()).into_par_iter().map(square).collect();
-    squares.sort_unstable_by(f64::total_cmp);
-    squares.truncate(squares.len() - (squares.len() as f64 * WORST) as usize);
-    squares.iter().sum::<f64>() / squares.len().max(1) as f64
+    without_worst((0..a.len()).into_par_iter().map(square).collect())
+}
+
+/// The mean without the largest: one bright sample is all that some have.
+fn without_worst(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.truncate(values.len() - (values.len() as f64 * WORST) as usize);
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Whether a way finds all light of a scene: connections do where no glass focuses any, which they find too rarely; merging and gathering do everywhere.
