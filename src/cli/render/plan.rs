@@ -61,11 +61,15 @@ pub fn why(choice: &Choice) -> String {
     others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
     let error = |trial: &Trial| match trial.squared_error {
         squared if squared.is_infinite() => "nothing seen".into(),
-        squared if squared <= 0.0 => "too little to tell".into(),
         _ => percent(trial.error()),
     };
     let others: Vec<String> = others.iter().map(|other| format!("{} {}", other.way.name(), error(other))).collect();
-    format!("auto: {}, whose finished pilot has an error of {} ({})", trial.way.name(), error(trial), others.join("; "))
+    format!(
+        "auto: {}, whose finished picture is expected to have an error of {} ({})",
+        trial.way.name(),
+        error(trial),
+        others.join("; ")
+    )
 }
 
 /// Whether the method can do without what media scatter, or finds it.

@@ -1,6 +1,7 @@
 //! Candidates against each other, each by the finished picture that it makes of the same counted work.
 //!
-//! The first half of a candidate's iterations is finished as the render will be. All pictures are judged alike, by the second halves of candidates that
+//! The first half of a candidate's iterations is finished as the render will be, and so is each quarter of them: what more iterations bring is told by both, and
+//! carried on to the end of the render as the power of their number that they show. All pictures are judged alike, by the second halves of candidates that
 //! find all light, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
@@ -31,8 +32,7 @@ const SEEN: f64 = 0.5;
 pub struct Trial {
     /// The candidate.
     pub way: Way,
-    /// relMSE without the worst pixels of the pilot's finished picture, from half of its iterations. Noise around a small one may make it negative; infinite where
-    /// nothing was seen.
+    /// relMSE without the worst pixels that the finished picture is expected to have; infinite where nothing was seen.
     pub squared_error: f64,
     /// Counted core-seconds of an iteration of the whole picture.
     pub seconds_per_iteration: f64,
@@ -53,7 +53,10 @@ pub(super) struct Candidate<'a> {
 
 /// What a candidate's iterations show.
 struct Shown {
+    /// Finished from the first half.
     finished: Vec<[f32; 3]>,
+    /// Finished from either quarter of it.
+    earlier: [Vec<[f32; 3]>; 2],
     judges: [Vec<[f32; 3]>; 2],
     /// Relative variance of the judges and the mean of all caustics, both without the worst pixels.
     noise: f64,
@@ -61,9 +64,9 @@ struct Shown {
 }
 
 impl Trial {
-    /// The relative error: the root of [`Trial::squared_error`], 0 where noise hides it.
+    /// The relative error: the root of [`Trial::squared_error`].
     pub fn error(&self) -> f64 {
-        self.squared_error.max(0.0).sqrt()
+        self.squared_error.sqrt()
     }
 }
 
@@ -97,12 +100,16 @@ impl<'a> Candidate<'a> {
         let quarters = quarters(&set)?;
         let estimate = Estimate::of(&set).ok()?;
         let finished = finish.picture(&estimate.first_half(&quarters)).ok()?;
-        let [_, _, a, b] = quarters;
+        let [first, second, a, b] = quarters;
+        let deviation: Vec<[f32; 3]> = estimate.deviation.iter().map(|s| s.map(|s| 2.0 * s)).collect();
+        let mut quarter =
+            |mean| finish.picture(&Estimate { mean, deviation: deviation.clone(), ..estimate.clone() }).ok();
+        let earlier = [quarter(first)?, quarter(second)?];
         let caustics =
             self.session.pixels().iter().map(|p| p.parts.caustic.element_sum() / f64::from(p.iterations.max(1)));
         let caustics = without_worst(caustics.collect());
         let noise = variance(&a, &b, &finished);
-        Some(Shown { finished, judges: [a, b], noise, caustics })
+        Some(Shown { finished, earlier, judges: [a, b], noise, caustics })
     }
 }
 
@@ -163,18 +170,18 @@ fn judges(candidates: &[Candidate<'_>], shown: &[Option<Shown>], focuses: bool) 
     Some(([mean(0), mean(1)], least))
 }
 
-/// Lets candidates run for so many core-seconds at most and tells how they did. What is clear after the first share costs no more. Those are all there are once
+/// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's `budget`. What is clear after the first share costs no more. Those are all there are once
 /// `stop` holds.
 pub(super) fn hold(
     candidates: &mut [Candidate<'_>],
     finish: &mut Finish,
     focuses: bool,
-    allowed: f64,
+    (allowed, budget): (f64, f64),
     stop: &dyn Fn() -> bool,
 ) -> Vec<Trial> {
     let share = FIRST * allowed / candidates.len() as f64;
     candidates.iter_mut().for_each(|candidate| candidate.advance(share, stop));
-    let (trials, open) = compare(candidates, finish, focuses, share);
+    let (trials, open) = compare(candidates, finish, focuses, budget);
     let count = open.iter().filter(|open| **open).count();
     if count < 2 {
         return trials;
@@ -187,30 +194,38 @@ pub(super) fn hold(
         .zip(&open)
         .filter(|(_, open)| **open)
         .for_each(|(candidate, _)| candidate.advance(share, stop));
-    let (again, _) = compare(candidates, finish, focuses, share);
+    let (again, _) = compare(candidates, finish, focuses, budget);
     // Those that are out stay out: they have had less.
     trials.into_iter().zip(again).zip(open).map(|((first, again), open)| if open { again } else { first }).collect()
 }
 
-/// How all have done by `share` core-seconds each, and which may still turn out best.
+/// What all are expected to leave after `budget` core-seconds, and which may still turn out best.
 fn compare(
     candidates: &mut [Candidate<'_>],
     finish: &mut Finish,
     focuses: bool,
-    share: f64,
+    budget: f64,
 ) -> (Vec<Trial>, Vec<bool>) {
     let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
     let judged = judges(candidates, &shown, focuses);
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let values = judged.as_ref().and_then(|(_, worth)| shown[*worth].as_ref()).map(|shown| &shown.finished);
     let errors = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Vec<f64>> {
-        let (shown, ([a, b], _)) = (shown.as_ref()?, judged.as_ref()?);
-        // Of what has cost more, since the least number of iterations does, as much as the same work would have left.
-        let more = (candidate.spent / share).max(1.0);
-        let errors = told::squared_errors(&shown.finished, [a, b], values?);
-        Some(errors.into_iter().map(|error| error * more).collect())
+        let (shown, ([a, b], _), values) = (shown.as_ref()?, judged.as_ref()?, values?);
+        let of = |picture: &[[f32; 3]]| told::squared_errors(picture, [a, b], values);
+        let errors = of(&shown.finished);
+        let (half, quarter) =
+            (mean(&errors), 0.5 * shown.earlier.iter().map(|picture| mean(&of(picture))).sum::<f64>());
+        // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is missing.
+        let most = quarter.max(half).max(f64::MIN_POSITIVE);
+        let left = half.clamp(0.5 * quarter.max(0.0), most).max(f64::MIN_POSITIVE);
+        let power = (quarter / left).log2().clamp(0.0, 1.0);
+        // In the render's iterations over those of the half; the least number of iterations may have cost more than the share.
+        let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);
+        let scale = more.max(1.0).powf(-power);
+        Some(errors.into_iter().map(|error| (error + left - half) * scale).collect())
     };
     let errors: Vec<Option<Vec<f64>>> = candidates.iter().zip(&shown).map(|(c, shown)| errors(c, shown)).collect();
-    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let squared: Vec<f64> = errors.iter().map(|e| e.as_ref().map_or(f64::INFINITY, |e| mean(e))).collect();
     let best =
         (0..squared.len()).min_by(|&a, &b| squared[a].total_cmp(&squared[b])).and_then(|best| errors[best].as_ref());

@@ -152,7 +152,7 @@ impl<'a> Pilot<'a> {
                 })
             })
             .collect();
-        (contest::hold(&mut candidates, finish, focuses(scene), allowed, stop), None)
+        (contest::hold(&mut candidates, finish, focuses(scene), (allowed, budget), stop), None)
     }
 
     /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too little for the smallest picture; `None` where even that takes
