@@ -175,14 +175,15 @@ impl Finish {
     /// # Errors
     /// The denoiser fails.
     pub fn picture(&mut self, estimate: &Estimate) -> Result<Vec<[f32; 3]>> {
-        self.with_spread(estimate).map(|(picture, _)| picture)
+        self.with_spread(estimate).map(|[picture, _]| picture)
     }
 
-    fn with_spread(&mut self, estimate: &Estimate) -> Result<(Vec<[f32; 3]>, Vec<[f32; 3]>)> {
+    /// The finished picture, and the spread that bounds it.
+    fn with_spread(&mut self, estimate: &Estimate) -> Result<[Vec<[f32; 3]>; 2]> {
         let denoised = self.denoiser.run(estimate, self.quality)?;
         let spread = bound::spread(&estimate.deviation, estimate.size);
         let picture = bound::bounded(&estimate.mean, &denoised, &spread, estimate.size);
-        Ok((picture, spread))
+        Ok([picture, spread])
     }
 
     /// Finishes the picture of `set` and makes the result its beauty; alpha stays. Adds `CombinedDirect` and the other parts where the picture has
@@ -199,7 +200,7 @@ impl Finish {
             }
             None => None,
         };
-        let (picture, spread) = self.with_spread(&estimate)?;
+        let [picture, spread] = self.with_spread(&estimate)?;
         let told = self.told(set, &estimate)?;
         let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
         let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());

@@ -76,7 +76,7 @@ mod tests {
     fn sure_parts_stay() {
         let size = Size { width: 4, height: 4 };
         let part = |value: f32| Part { mean: vec![[value; 3]; 16], denoised: vec![[9.0; 3]; 16] };
-        let finished = shared(&[part(0.25), part(0.5)], &vec![[0.75; 3]; 16], &vec![[0.0; 3]; 16], size);
+        let finished = shared(&[part(0.25), part(0.5)], &[[0.75; 3]; 16], &[[0.0; 3]; 16], size);
         assert_eq!(finished, [vec![[0.25; 3]; 16], vec![[0.5; 3]; 16]]);
     }
 }
