@@ -19,7 +19,7 @@ pub const REACH: usize = 3;
 /// Share of the window's standard errors that are no larger than the one taken.
 const RANK: f32 = 0.8;
 
-/// The larger of each pixel's standard error and the one of rank [`RANK`] around it, by channel; not finite ones count as unknown,
+/// The larger of each pixel's standard error and the one of rank `RANK` around it, by channel; not finite ones count as unknown,
 /// larger than all.
 pub fn spread(deviation: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
     let of_pixel = |ranked: &mut Vec<f32>, index: usize| {
