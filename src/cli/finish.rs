@@ -165,7 +165,7 @@ impl Ready {
             Quality::Fast => "fast",
         };
         json!({
-            "denoiser": account.denoiser,
+            "denoiser": self.finish.denoiser(),
             "quality": quality,
             "model": self.model.as_ref().map(|network| &network.name),
             "levels": account.combined,

@@ -16,24 +16,34 @@ pub mod told;
 mod window;
 
 pub use denoiser::{Choice, Denoiser, Quality};
-pub use window::Size;
+pub use window::{Size, window};
 
 use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Kind, Result};
+use crate::estimator::QUARTERS;
 use crate::film::{Layer, LayerSet, Role};
 use parts::Part;
 use rayon::prelude::*;
 
 /// The additive parts of our layers, the last one the one that light of no part goes to.
 const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
-/// Quarters of the iterations.
-const QUARTERS: usize = 4;
+/// Layers of ours that the picture is finished from, and that the network reads, by the beginnings of their names.
+const PICTURE: [&str; 6] = ["Noisy", "Level", "Variance", "albedo", "normal", "depth"];
 
-/// Layers of ours that finishing reads, by the beginnings of their names.
-pub const READS: [&str; 12] = [
-    "Noisy", "Level", "Variance", "Quarter", "albedo", "normal", "depth", "Direct", "Indirect", "Caustic", "Emission",
-    "Volume",
-];
+/// Whether the picture alone is finished from a layer of ours.
+pub fn reads_for_picture(name: &str) -> bool {
+    PICTURE.iter().any(|stem| name.starts_with(stem))
+}
+
+/// The same of the picture and its error by quarters.
+pub fn reads_for_error(name: &str) -> bool {
+    reads_for_picture(name) || name.starts_with("Quarter")
+}
+
+/// Whether finishing reads a layer of ours at all: for the picture, its error, and its parts.
+pub fn reads(name: &str) -> bool {
+    reads_for_error(name) || PARTS.contains(&name)
+}
 
 /// The layer of a finished part; `None` for layers that are no parts.
 pub fn finished_part(name: &str) -> Option<String> {
@@ -102,8 +112,15 @@ impl Estimate {
     /// The estimate by the first two quarters alone.
     #[must_use]
     pub fn first_half(&self, quarters: &[Vec<[f32; 3]>; QUARTERS]) -> Estimate {
-        let deviation = self.deviation.iter().map(|s| s.map(|s| s * std::f32::consts::SQRT_2)).collect();
-        Estimate { mean: told::first_half(quarters), deviation, ..self.clone() }
+        self.of_some(told::first_half(quarters), 2.0)
+    }
+
+    /// The estimate by some of the iterations, whose mean is given; all are `fewer` times as many.
+    #[must_use]
+    pub fn of_some(&self, mean: Vec<[f32; 3]>, fewer: f32) -> Estimate {
+        let Estimate { size, albedo, normal, .. } = self;
+        let deviation = self.deviation.iter().map(|s| s.map(|s| s * fewer.sqrt())).collect();
+        Estimate { size: *size, mean, deviation, albedo: albedo.clone(), normal: normal.clone() }
     }
 }
 
@@ -135,8 +152,6 @@ pub struct Finish {
 /// What was done.
 #[derive(Clone, Debug)]
 pub struct Account {
-    /// The denoiser.
-    pub denoiser: String,
     /// Levels that equation (6) has combined, if it has.
     pub combined: Option<usize>,
     /// The error, where the picture has quarters.
@@ -215,7 +230,7 @@ impl Finish {
         for (name, values) in parts {
             set.push(Layer::interleaved(name, "RGB", values))?;
         }
-        Ok(Account { denoiser: self.denoiser.name(), combined, told })
+        Ok(Account { combined, told })
     }
 
     /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is missing or empty.
@@ -243,20 +258,24 @@ impl Finish {
         if !there.iter().any(|(part, _)| wanted(&name(part))) {
             return Ok(Vec::new());
         }
-        let mut parts = Vec::with_capacity(there.len());
-        for (part, mean) in &there {
+        // The guides and standard errors of the whole picture serve all parts.
+        let mut of_part = estimate.clone();
+        let (mut names, mut parts) = (Vec::with_capacity(there.len()), Vec::with_capacity(there.len()));
+        for (part, mean) in there {
             let dark = mean.iter().flatten().all(|value| *value == 0.0);
+            of_part.mean = mean;
             // Lamps that are seen have no noise but at their edges.
-            let denoised = if dark || *part == "Emission" {
-                mean.clone()
+            let denoised = if dark || part == "Emission" {
+                of_part.mean.clone()
             } else {
                 // Parts are looked at less closely than the picture.
-                self.denoiser.run(&Estimate { mean: mean.clone(), ..estimate.clone() }, Quality::Fast)?
+                self.denoiser.run(&of_part, Quality::Fast)?
             };
-            parts.push(Part { mean: mean.clone(), denoised });
+            names.push(name(part));
+            parts.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
         }
         let finished = parts::shared(&parts, picture, spread, estimate.size);
-        let named = there.iter().map(|(part, _)| name(part)).zip(finished);
+        let named = names.into_iter().zip(finished);
         Ok(named.filter(|(name, _)| wanted(name)).collect())
     }
 }

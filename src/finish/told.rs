@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// does not depend on `F`.
 pub const WORST: f64 = 0.005;
 /// What is added to squared values that errors are relative to, as relMSE has it.
-const DARK: f64 = 0.01;
+pub const DARK: f64 = 0.01;
 
 /// Squared relative errors of the pixels of `picture`, as two `judges` tell them that share no noise with it or each other: means over RGB of
 /// `(F - J1)(F - J2) / (mean_RGB(V)^2 + 0.01)`, where the picture `values` says what pixels are worth. Without the worst pixels, those where judges differ most; in

@@ -7,14 +7,11 @@ use super::reference::Reference;
 use super::spool::Spool;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::finish::Finish;
+use crate::finish::{Finish, reads_for_picture};
 use crate::image::{Errors, errors};
 use crate::render::{Control, Phases, Rendered, Session, Settings, Spent, Stage, StopReason};
 use crate::scene::Scene;
 use std::path::Path;
-
-/// Layers that a finish reads for the picture alone.
-const READ: [&str; 5] = ["Noisy", "Level", "Variance", "albedo", "normal"];
 
 /// When runs stop and where they are measured.
 #[derive(Clone, Debug)]
@@ -148,7 +145,7 @@ impl Lane<'_> {
         let session = &mut self.session;
         let picture = spent.during(|| {
             // Quarters and parts are for those who look closer.
-            let mut set = session.layers(|name| name.is_empty() || READ.iter().any(|stem| name.starts_with(stem)))?;
+            let mut set = session.layers(|name| name.is_empty() || reads_for_picture(name))?;
             finish.apply(&mut set, |_| false)?;
             set.beauty()
         })?;

@@ -132,6 +132,7 @@ fn pictures_are_those_of_render_and_references_know_their_error() {
     let options = [
         ("one", "--method sppm --levels 1 --photons 2000 --no-combine"),
         ("five", "--method sppm --photons 2000"),
+        ("network", "--method sppm --photons 2000 --model compact"),
         ("cppm", "--method cppm --levels 1 --photons 2000"),
     ];
     let runs = options.map(|(name, options)| format!("{name}: {options}"));

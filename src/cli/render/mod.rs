@@ -86,8 +86,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
 
     let mut header = rendered.account((!args.reproducible).then_some(threads));
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let read = |name: &str| finish::READS.iter().any(|stem| name.starts_with(stem));
-    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (ready.is_some() && read(name));
+    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (ready.is_some() && finish::reads(name));
     let mut set = rendered.layers(present, wanted)?;
     let mut attributes = cryptomattes(&scene, &rendered, args, selection, &mut set)?;
     let summary = Summary::of(&rendered);
@@ -177,9 +176,7 @@ fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Result<(
 
 /// Channels that a render with these settings can have.
 fn channels(settings: &Settings, present: Present) -> usize {
-    let mut names = film::names(&shape(settings, 1, present));
-    names.extend(names.iter().filter_map(|name| finish::finished_part(name)).collect::<Vec<_>>());
-    names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
+    let names = layer_names(settings, present, true);
     names.iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
 
@@ -225,14 +222,20 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
     (0..RANKS / 2).map(move |index| format!("{kind}{index:02}"))
 }
 
-/// `--layers`, checked against what this render will have.
-fn selection(args: &RenderArgs, settings: &Settings, present: Present) -> Result<Selection> {
-    let selection = Selection::parse(&args.layers)?;
+/// Names of the layers that a render with these settings can have, finished or not.
+fn layer_names(settings: &Settings, present: Present, finished: bool) -> Vec<String> {
     let mut names = film::names(&shape(settings, 1, present));
-    if !args.job.no_combine {
+    if finished {
         names.extend(names.iter().filter_map(|name| finish::finished_part(name)).collect::<Vec<_>>());
     }
     names.extend(CRYPTOMATTES.into_iter().flat_map(cryptomatte_layers));
+    names
+}
+
+/// `--layers`, checked against what this render will have.
+fn selection(args: &RenderArgs, settings: &Settings, present: Present) -> Result<Selection> {
+    let selection = Selection::parse(&args.layers)?;
+    let names = layer_names(settings, present, !args.job.no_combine);
     let layers = names.into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;
     Ok(selection)

@@ -7,9 +7,7 @@
 
 use super::Way;
 use super::trial::WORST;
-use crate::error::Result;
-use crate::film::LayerSet;
-use crate::finish::{Estimate, Finish, quarters, told};
+use crate::finish::{Estimate, Finish, quarters, reads_for_error, told};
 use crate::light::Guide;
 use crate::render::cost::Cost;
 use crate::render::method::Method;
@@ -88,22 +86,14 @@ impl<'a> Candidate<'a> {
         }
     }
 
-    /// The layers that a finish reads.
-    fn layers(&mut self) -> Result<LayerSet> {
-        const READ: [&str; 5] = ["Noisy", "Variance", "Quarter", "albedo", "normal"];
-        self.session.layers(|name| READ.iter().any(|stem| name.starts_with(stem)))
-    }
-
     /// `None` where a quarter of it is black, or it cannot be finished.
     fn show(&mut self, finish: &mut Finish) -> Option<Shown> {
-        let set = self.layers().ok()?;
+        let set = self.session.layers(reads_for_error).ok()?;
         let quarters = quarters(&set)?;
         let estimate = Estimate::of(&set).ok()?;
         let finished = finish.picture(&estimate.first_half(&quarters)).ok()?;
         let [first, second, a, b] = quarters;
-        let deviation: Vec<[f32; 3]> = estimate.deviation.iter().map(|s| s.map(|s| 2.0 * s)).collect();
-        let mut quarter =
-            |mean| finish.picture(&Estimate { mean, deviation: deviation.clone(), ..estimate.clone() }).ok();
+        let mut quarter = |mean| finish.picture(&estimate.of_some(mean, 4.0)).ok();
         let earlier = [quarter(first)?, quarter(second)?];
         let caustics =
             self.session.pixels().iter().map(|p| p.parts.caustic.element_sum() / f64::from(p.iterations.max(1)));

@@ -1,6 +1,7 @@
 //! Small renders of the same view: their settings, and what their pixels are worth.
 
 use crate::estimator::{InitialBandwidth, Pixel};
+use crate::finish::{Size, told::DARK, window};
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
 use crate::render::method::Method;
@@ -9,8 +10,6 @@ use crate::transport::MAX_LEVELS;
 
 /// Share of the light paths that are sent to weigh effects.
 pub(super) const PHOTONS: f64 = 0.125;
-/// What is added to squared values that errors are relative to, as relMSE has it.
-const DARK: f64 = 0.01;
 /// Share of the pixels that are left out of means, those of the largest noise: a bright sample in a hundred or so of pixels says next to nothing about how
 /// often there is one.
 pub(super) const WORST: f64 = 0.01;
@@ -62,11 +61,9 @@ pub(super) fn scale(value: f64) -> f64 {
 pub(super) fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
     let smoothest = levels.count - 1;
     const REACH: usize = 2;
-    let (width, height) = (width as usize, height as usize);
+    let size = Size { width: width as usize, height: height as usize };
     let value = |index: usize| {
-        let (x, y) = (index % width, index / width);
-        let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
-        let near = around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x));
+        let near = window(size, index, REACH);
         let mut near: Vec<f64> = near.map(|index| mean(pixels[index].levels[smoothest].mean)).collect();
         let middle = near.len() / 2;
         let median = *near.select_nth_unstable_by(middle, f64::total_cmp).1;
