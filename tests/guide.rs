@@ -306,14 +306,15 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(W
 fn the_choice_does_not_depend_on_threads() {
     let scene = glass_room();
     let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
-    assert_eq!(one.trials.len(), 6, "{:?}", one.because);
+    assert_eq!(one.trials.len(), 5, "{:?}", one.because);
     assert_eq!(one.way, three.way);
     for (a, b) in one.trials.iter().zip(&three.trials) {
         println!("{}: {:.5}", a.way.name(), a.error());
         assert_eq!(a.squared_error.to_bits(), b.squared_error.to_bits(), "{}", a.way.name());
     }
     let chosen = one.trial().expect("a trial");
-    assert!(one.trials.iter().all(|trial| trial.squared_error >= chosen.squared_error));
+    let best = one.trials.iter().all(|trial| trial.squared_error >= chosen.squared_error);
+    assert!(best || chosen.way == Way::USUAL, "{}", chosen.way.name());
     let bits = |choice: &Choice| -> Vec<_> {
         choice.weights.iter().map(|w| (w.effect, w.energy.map(f64::to_bits), w.saved.map(f64::to_bits))).collect()
     };
@@ -354,7 +355,7 @@ fn what_is_left_out_is_weighed_too() {
         let camera = scene.camera(&square(24)).expect("a camera");
         let make = |way| {
             let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
-            (way == Way::UNTRIED).then(|| Settings { classes: off.complement(), ..settings })
+            (way == Way::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
         };
         choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").weights
     };
@@ -440,13 +441,13 @@ fn a_pilot_can_be_stopped() {
             answer
         };
         let choice = choose((&scene, &camera), &mut Finish::new(Denoiser::Own, None), make, stop);
-        assert!(choice.is_some_and(|choice| choice.trials.len() == 6));
+        assert!(choice.is_some_and(|choice| choice.trials.len() == 5));
         times.get()
     };
     let (stopped, whole) = (asked(true), asked(false));
     println!("asked {stopped} times where the answer is to stop, {whole} times where it is not");
     // Once a candidate in each of two rounds.
-    assert!(stopped <= 12 && whole > 40, "{stopped}, {whole}");
+    assert!(stopped <= 10 && whole > 40, "{stopped}, {whole}");
 }
 
 /// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor the light: what guided ones find tells.
@@ -466,7 +467,7 @@ fn rare_caustics_are_left_to_guided_light_paths() {
     for trial in &choice.trials {
         println!("{}: {:.3e}", trial.way.name(), trial.squared_error);
     }
-    assert!(choice.trials.len() == 4 && choice.way.guided, "{}", choice.way.name());
+    assert!(choice.trials.len() == 3 && choice.way.guided, "{}", choice.way.name());
 }
 
 /// What a scene does not call for is not tried, and a short render tries nothing.
@@ -477,7 +478,7 @@ fn only_what_is_called_for_is_tried() {
     let scene = build(description);
     let matte_only = auto(&scene, 2, 20_000);
     let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.way.method).collect();
-    assert_eq!(tried, [Method::Sppm, Method::Path, Method::Bdpt]);
+    assert_eq!(tried, [Method::Vcm, Method::Path, Method::Bdpt]);
     assert!(matte_only.trials.iter().all(|trial| !trial.way.guided));
     // Where nothing has narrow lobes no photons of caustics are sent.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
@@ -490,5 +491,5 @@ fn only_what_is_called_for_is_tried() {
     assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);
     assert!(saved(Effect::Direct) > Some(0.0) && saved(Effect::Direct) < whole, "{:?}", choice.weights);
     let short = auto(&glass_room(), 2, 2);
-    assert!(short.trials.is_empty() && short.way == Way::UNTRIED);
+    assert!(short.trials.is_empty() && short.way == Way::USUAL);
 }

@@ -372,7 +372,7 @@ impl Job {
 
     /// The way to render that the options ask for; with auto that which needs no trial.
     pub fn way(&self) -> Way {
-        let indirect = self.indirect.map_or(Way::UNTRIED.indirect, Into::into);
+        let indirect = self.indirect.map_or(Way::GATHERING.indirect, Into::into);
         Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 

@@ -61,6 +61,8 @@ pub fn why(choice: &Choice) -> String {
     others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
     let error = |trial: &Trial| match trial.squared_error {
         squared if squared.is_infinite() => "nothing seen".into(),
+        // Below what the pilot's own noise can tell.
+        squared if squared == f64::MIN_POSITIVE => "too little to tell".into(),
         _ => percent(trial.error()),
     };
     let others: Vec<String> = others.iter().map(|other| format!("{} {}", other.way.name(), error(other))).collect();

@@ -20,8 +20,11 @@ pub(super) const ITERATIONS: (u64, u64) = (4, 256);
 const FIRST: f64 = 0.4;
 /// Those whose picture has so many times the squared error of the best after that are out.
 const UNCLEAR: f64 = 2.0;
-/// Standard errors that a difference has to stand out by.
+/// Standard errors that a difference has to stand out by before a candidate is out.
 const TOLD: f64 = 2.0;
+/// The usual way is taken where it is within so many standard errors of the best: the rule of one standard error (Breiman et al. 1984,
+/// section 3.4.3), by which the choice leaves a default only for what the data show.
+const CLEAR: f64 = 1.0;
 /// A judge has to have seen this share of the caustics that any other has.
 const SEEN: f64 = 0.5;
 
@@ -34,6 +37,8 @@ pub struct Trial {
     pub squared_error: f64,
     /// Counted core-seconds of an iteration of the whole picture.
     pub seconds_per_iteration: f64,
+    /// It is the one to take.
+    pub chosen: bool,
     /// The counts behind it.
     pub(super) cost: Cost,
 }
@@ -160,8 +165,61 @@ fn judges(candidates: &[Candidate<'_>], shown: &[Option<Shown>], focuses: bool) 
     Some(([mean(0), mean(1)], least))
 }
 
-/// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's `budget`. What is clear after the first share costs no more. Those are all there are once
-/// `stop` holds.
+/// What a candidate is expected to leave: squared errors by pixel, over which the noise of the pilot shows; `None` where nothing was
+/// seen.
+struct Left(Option<Vec<f64>>);
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+impl Left {
+    /// Carries the squared errors of a candidate's half, and of either quarter of it, on to `more` times the half's iterations, as the
+    /// power of their number that the means show. What the pixels mean is linear in both errors: the power's own noise, which grows
+    /// with the logarithm of `more`, is in theirs.
+    fn carried(half: &[f64], quarter: &[f64], more: f64) -> Left {
+        let (h, q) = (mean(half), mean(quarter));
+        let more = more.max(1.0);
+        // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is missing.
+        let (of_half, of_quarter) = match h {
+            _ if h <= 0.5 * q => (0.0, 0.5 / more),
+            _ if h >= q => (1.0, 0.0),
+            _ => {
+                let (doublings, scale) = (more.log2(), more.powf(-(q / h).log2()));
+                (scale * (1.0 + doublings), -scale * doublings * h / q)
+            }
+        };
+        Left(Some(half.iter().zip(quarter).map(|(h, q)| of_half * h + of_quarter * q).collect()))
+    }
+
+    fn squared_error(&self) -> f64 {
+        self.0.as_ref().map_or(f64::INFINITY, |errors| mean(errors).max(f64::MIN_POSITIVE))
+    }
+
+    /// How much more it leaves than another, and the standard error of that: pixel by pixel, for both were judged by the same pictures.
+    fn more_than(&self, other: &Left) -> (f64, f64) {
+        let (Some(errors), Some(others)) = (&self.0, &other.0) else {
+            return (if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY }, 0.0);
+        };
+        let apart: Vec<f64> = errors.iter().zip(others).map(|(a, b)| a - b).collect();
+        let squares: Vec<f64> = apart.iter().map(|apart| apart * apart).collect();
+        (mean(&apart), (mean(&squares) / apart.len().max(1) as f64).sqrt())
+    }
+
+    /// It may still turn out no worse than the best.
+    fn is_open(&self, best: &Left) -> bool {
+        let (more, noise) = self.more_than(best);
+        more < ((UNCLEAR - 1.0) * best.squared_error()).max(TOLD * noise)
+    }
+
+    fn is_clearly_worse(&self, than: &Left) -> bool {
+        let (more, noise) = self.more_than(than);
+        more > CLEAR * noise
+    }
+}
+
+/// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's `budget`. What
+/// is clear after the first share costs no more. Those are all there are once `stop` holds.
 pub(super) fn hold(
     candidates: &mut [Candidate<'_>],
     finish: &mut Finish,
@@ -169,68 +227,53 @@ pub(super) fn hold(
     (allowed, budget): (f64, f64),
     stop: &dyn Fn() -> bool,
 ) -> Vec<Trial> {
-    let share = FIRST * allowed / candidates.len() as f64;
+    let all = candidates.len();
+    let least = |left: &[Left], open: &[bool]| {
+        let open = (0..all).filter(|&k| open[k]);
+        open.min_by(|&a, &b| left[a].squared_error().total_cmp(&left[b].squared_error())).unwrap_or(0)
+    };
+    let share = FIRST * allowed / all as f64;
     candidates.iter_mut().for_each(|candidate| candidate.advance(share, stop));
-    let (trials, open) = compare(candidates, finish, focuses, budget);
+    let mut left = compare(candidates, finish, focuses, budget);
+    let best = least(&left, &vec![true; all]);
+    let open: Vec<bool> = left.iter().map(|one| one.is_open(&left[best])).collect();
     let count = open.iter().filter(|open| **open).count();
-    if count < 2 {
-        return trials;
+    if count > 1 {
+        let spent = |(candidate, open): (&Candidate<'_>, &bool)| if *open { 0.0 } else { candidate.spent };
+        let closed: f64 = candidates.iter().zip(&open).map(spent).sum();
+        let share = (allowed - closed) / count as f64;
+        let again = candidates.iter_mut().zip(&open).filter(|(_, open)| **open);
+        again.for_each(|(candidate, _)| candidate.advance(share, stop));
+        let second = compare(candidates, finish, focuses, budget);
+        // Those that are out stay out: they have had less.
+        let both = left.into_iter().zip(second).zip(&open);
+        left = both.map(|((first, second), open)| if *open { second } else { first }).collect();
     }
-    let closed: f64 =
-        candidates.iter().zip(&open).map(|(candidate, open)| if *open { 0.0 } else { candidate.spent }).sum();
-    let share = (allowed - closed) / count as f64;
-    candidates
-        .iter_mut()
-        .zip(&open)
-        .filter(|(_, open)| **open)
-        .for_each(|(candidate, _)| candidate.advance(share, stop));
-    let (again, _) = compare(candidates, finish, focuses, budget);
-    // Those that are out stay out: they have had less.
-    trials.into_iter().zip(again).zip(open).map(|((first, again), open)| if open { again } else { first }).collect()
+    let best = least(&left, &open);
+    let usual = candidates.iter().position(|candidate| candidate.way == Way::USUAL);
+    let usual = usual.filter(|&usual| open[usual] && !left[usual].is_clearly_worse(&left[best]));
+    let chosen = usual.unwrap_or(best);
+    let trial = |(index, (candidate, left)): (usize, (&Candidate<'_>, &Left))| {
+        let Candidate { way, cost, whole, .. } = *candidate;
+        let squared_error = left.squared_error();
+        Trial { way, squared_error, seconds_per_iteration: whole, chosen: index == chosen, cost }
+    };
+    candidates.iter().zip(&left).enumerate().map(trial).collect()
 }
 
-/// What all are expected to leave after `budget` core-seconds, and which may still turn out best.
-fn compare(
-    candidates: &mut [Candidate<'_>],
-    finish: &mut Finish,
-    focuses: bool,
-    budget: f64,
-) -> (Vec<Trial>, Vec<bool>) {
+/// What all are expected to leave after `budget` core-seconds.
+fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, focuses: bool, budget: f64) -> Vec<Left> {
     let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
     let judged = judges(candidates, &shown, focuses);
-    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let values = judged.as_ref().and_then(|(_, worth)| shown[*worth].as_ref()).map(|shown| &shown.finished);
-    let errors = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Vec<f64>> {
+    let left = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Left> {
         let (shown, ([a, b], _), values) = (shown.as_ref()?, judged.as_ref()?, values?);
         let of = |picture: &[[f32; 3]]| told::squared_errors(picture, [a, b], values);
-        let errors = of(&shown.finished);
-        let (half, quarter) =
-            (mean(&errors), 0.5 * shown.earlier.iter().map(|picture| mean(&of(picture))).sum::<f64>());
-        // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is missing.
-        let most = quarter.max(half).max(f64::MIN_POSITIVE);
-        let left = half.clamp(0.5 * quarter.max(0.0), most).max(f64::MIN_POSITIVE);
-        let power = (quarter / left).log2().clamp(0.0, 1.0);
+        let earlier = shown.earlier.each_ref().map(|picture| of(picture));
+        let quarter: Vec<f64> = earlier[0].iter().zip(&earlier[1]).map(|(a, b)| 0.5 * (a + b)).collect();
         // In the render's iterations over those of the half; the least number of iterations may have cost more than the share.
         let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);
-        let scale = more.max(1.0).powf(-power);
-        Some(errors.into_iter().map(|error| (error + left - half) * scale).collect())
+        Some(Left::carried(&of(&shown.finished), &quarter, more))
     };
-    let errors: Vec<Option<Vec<f64>>> = candidates.iter().zip(&shown).map(|(c, shown)| errors(c, shown)).collect();
-    let squared: Vec<f64> = errors.iter().map(|e| e.as_ref().map_or(f64::INFINITY, |e| mean(e))).collect();
-    let best =
-        (0..squared.len()).min_by(|&a, &b| squared[a].total_cmp(&squared[b])).and_then(|best| errors[best].as_ref());
-    // What two pictures differ by, and what the judges' noise makes of that.
-    let open = |errors: &Option<Vec<f64>>| {
-        let (Some(errors), Some(best)) = (errors, best) else { return false };
-        let apart: Vec<f64> = errors.iter().zip(best).map(|(a, b)| a - b).collect();
-        let squares: Vec<f64> = apart.iter().map(|apart| apart * apart).collect();
-        let noise = (mean(&squares) / apart.len() as f64).sqrt();
-        mean(&apart) < ((UNCLEAR - 1.0) * mean(best)).max(TOLD * noise)
-    };
-    let open = errors.iter().map(open).collect();
-    let trial = |(candidate, squared_error): (&Candidate<'_>, f64)| {
-        let Candidate { way, cost, whole, .. } = *candidate;
-        Trial { way, squared_error, seconds_per_iteration: whole, cost }
-    };
-    (candidates.iter().zip(squared).map(trial).collect(), open)
+    candidates.iter().zip(&shown).map(|(c, shown)| left(c, shown).unwrap_or(Left(None))).collect()
 }

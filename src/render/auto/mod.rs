@@ -1,5 +1,6 @@
-//! Choosing how to render: a short pilot renders every candidate on a small picture of the same view, finishes it as the render will be finished, and takes the one
-//! whose finished picture is closest to the truth.
+//! Choosing how to render: a short pilot renders every candidate on a small picture of the same view and finishes it as the
+//! render will be finished. Vertex connection and merging, which weighs all techniques against each other for every path, is
+//! taken unless another's finished picture is clearly closer to the truth: further than the pilot's own noise can say.
 //!
 //! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times constants (`super::cost`). So the
 //! same arguments give the same choice on any machine and any number of threads. Candidates get the same work, near to the render's own work
@@ -37,8 +38,16 @@ pub struct Way {
 }
 
 impl Way {
-    /// What is done where a render is too short to try anything: stochastic progressive photon mapping, which finds all light.
-    pub const UNTRIED: Way = Way { method: Method::Sppm, indirect: Indirect::Photons, guided: false };
+    /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is left to a
+    /// technique that finds it badly.
+    pub const USUAL: Way = Way::plain(Method::Vcm);
+    /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
+    pub const GATHERING: Way = Way::plain(Method::Sppm);
+
+    /// A method with light paths as they come.
+    pub const fn plain(method: Method) -> Way {
+        Way { method, indirect: Indirect::Photons, guided: false }
+    }
 
     /// A way in words.
     pub fn name(self) -> String {
@@ -75,7 +84,7 @@ impl Choice {
     }
 }
 
-/// Tries the candidates and takes the best, as `finish` makes of them. `make` gives the settings of a way, `None` where other wishes rule it out. Once `stop`
+/// Tries the candidates and takes one by what `finish` makes of them. `make` gives the settings of a way, `None` where other wishes rule it out. Once `stop`
 /// holds, what is tried ends as soon as it can, and the choice is worth nothing.
 pub fn choose(
     (scene, camera): (&Scene, &Camera),
@@ -84,19 +93,20 @@ pub fn choose(
     stop: impl Fn() -> bool,
 ) -> Option<Choice> {
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let untried = make(Way::UNTRIED)?;
-    let pilot = Pilot::new(scene, camera, &untried);
+    let gathering = make(Way::GATHERING)?;
+    let pilot = Pilot::new(scene, camera, &gathering);
     let (weighed, weighing) = pilot.weigh();
     let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
-    let best = (0..trials.len()).min_by(|&a, &b| trials[a].squared_error.total_cmp(&trials[b].squared_error));
-    let way = best.map_or(Way::UNTRIED, |best| trials[best].way);
+    let chosen = trials.iter().position(|trial| trial.chosen);
+    let untried = || if make(Way::USUAL).is_some() { Way::USUAL } else { Way::GATHERING };
+    let way = chosen.map_or_else(untried, |chosen| trials[chosen].way);
     let mut settings = make(way)?;
-    let cost = best.map_or(pilot.cost, |best| trials[best].cost);
+    let cost = chosen.map_or(pilot.cost, |chosen| trials[chosen].cost);
     let saving = |weighed: Weighed| weighed.saving([&cost, &pilot.cost], way, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
-    Some(Choice { settings, way, trials, chosen: best, weights, because, spent })
+    Some(Choice { settings, way, trials, chosen, weights, because, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.

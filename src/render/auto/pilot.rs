@@ -41,18 +41,18 @@ fn focuses(scene: &Scene) -> bool {
 fn candidates(scene: &Scene) -> Vec<Way> {
     let focusing = focuses(scene);
     let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering());
-    let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
-    let mut ways = vec![plain(Method::Sppm)];
+    let mut ways = vec![Way::USUAL];
+    // Photons alone find caustics through glass; where nothing focuses, the usual way has all that they could bring.
     if focusing {
+        ways.push(Way::GATHERING);
         // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and guided paths take longer.
         if !scattering {
             ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
         }
-        ways.extend([plain(Method::Cppm), plain(Method::Vcm)]);
     }
     // What photons alone find, these leave out.
     if !(focusing && sizeless) {
-        ways.extend([plain(Method::Path), plain(Method::Bdpt)]);
+        ways.extend([Way::plain(Method::Path), Way::plain(Method::Bdpt)]);
     }
     ways
 }
@@ -66,8 +66,8 @@ fn ways(scene: &Scene, make: &impl Fn(Way) -> Option<Settings>) -> Vec<(Way, Set
 pub(super) struct Pilot<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
-    /// Settings of [`Way::UNTRIED`].
-    untried: &'a Settings,
+    /// Settings of [`Way::GATHERING`].
+    gathering: &'a Settings,
     pub cost: Cost,
     /// Pixels of the whole picture.
     pub pixels: f64,
@@ -76,19 +76,19 @@ pub(super) struct Pilot<'a> {
 }
 
 impl<'a> Pilot<'a> {
-    pub fn new(scene: &'a Scene, camera: &'a Camera, untried: &'a Settings) -> Pilot<'a> {
+    pub fn new(scene: &'a Scene, camera: &'a Camera, gathering: &'a Settings) -> Pilot<'a> {
         let (width, height) = camera.size();
         let pixels = f64::from(width) * f64::from(height);
-        let cost = Cost::count(scene, camera, untried, None);
-        let budget = match (untried.iterations, untried.time) {
+        let cost = Cost::count(scene, camera, gathering, None);
+        let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let work = n as f64 * cost.of(Way::UNTRIED, untried, pixels);
+                let work = n as f64 * cost.of(Way::GATHERING, gathering, pixels);
                 time.map_or(work, |seconds| work.min(seconds * CORES))
             }
             (None, Some(seconds)) => seconds * CORES,
             (None, None) => UNLIMITED,
         };
-        Pilot { scene, camera, untried, cost, pixels, budget }
+        Pilot { scene, camera, gathering, cost, pixels, budget }
     }
 
     /// Pixels of the picture by which effects are weighed.
@@ -98,8 +98,8 @@ impl<'a> Pilot<'a> {
 
     /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is too short, only those of light are weighed, or none.
     pub fn weigh(&self) -> (Vec<Weighed>, f64) {
-        let settings = weights::settings(self.untried, trial::PHOTONS);
-        let once = self.cost.of(Way::UNTRIED, &settings, self.least()) * weights::ITERATIONS as f64;
+        let settings = weights::settings(self.gathering, trial::PHOTONS);
+        let once = self.cost.of(Way::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
         let most = WEIGHING * SHARE * self.budget;
         let mut taken = weights::PICTURES as f64 * once;
         if taken > most {
@@ -114,7 +114,7 @@ impl<'a> Pilot<'a> {
             affordable
         });
         let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
-        let count = |scene: &Scene, camera: &Camera| Cost::count(scene, camera, self.untried, None);
+        let count = |scene: &Scene, camera: &Camera| Cost::count(scene, camera, self.gathering, None);
         (weights::weigh(self.scene, &small, &settings, &presence, &properties, count), taken)
     }
 
@@ -126,7 +126,7 @@ impl<'a> Pilot<'a> {
         make: &impl Fn(Way) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
-        let Pilot { scene, camera, untried, cost, pixels, budget } = *self;
+        let Pilot { scene, camera, gathering, cost, pixels, budget } = *self;
         let ways = ways(scene, make);
         if ways.len() < 2 {
             return (Vec::new(), Some("the one way that these options leave"));
@@ -147,7 +147,7 @@ impl<'a> Pilot<'a> {
             .zip(&ways)
             .map(|(stage, (way, settings))| {
                 Candidate::new(stage, *way, |guide| {
-                    let cost = guide.map_or(cost, |guide| Cost::count(scene, camera, untried, Some(guide)));
+                    let cost = guide.map_or(cost, |guide| Cost::count(scene, camera, gathering, Some(guide)));
                     (cost, cost.of(*way, stage.settings(), few), cost.of(*way, settings, pixels))
                 })
             })
