@@ -23,6 +23,7 @@ fn surface() -> Surface {
         instance: 0,
         primitive: 0,
         material: 0,
+        touching: false,
     }
 }
 

@@ -25,11 +25,13 @@ pub struct Surface {
     pub primitive: u32,
     /// Index of the material.
     pub material: u32,
+    /// Others lie on it here, and it is known which comes first (`transport/contact.rs`).
+    pub touching: bool,
 }
 
-/// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest coordinate:
-/// 32 units in the last place, the factor that Mitsuba settled on after reports of self-intersection far from the origin.
-const POSITION_ERROR: f32 = 32.0 * f32::EPSILON;
+/// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest coordinate: eight roundings,
+/// where the products and sums of a transform (four), of barycentric coordinates (two), and those of Embree's own corners (two) are.
+const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 
 impl Surface {
     /// The surface at barycentric coordinates (`b1`, `b2`) of triangle `primitive`. `None` for a triangle without area.
@@ -80,7 +82,14 @@ impl Surface {
             instance: instance_index,
             primitive,
             material: instance.material,
+            touching: false,
         })
+    }
+
+    /// How far from the surface its position may be (scene units).
+    #[inline]
+    pub fn error(&self) -> f32 {
+        error(self.p)
     }
 
     /// Where a ray towards `direction` starts: moved off the surface, to the side the direction points to, by the
@@ -91,9 +100,13 @@ impl Surface {
     }
 }
 
+#[inline]
+fn error(p: Vec3) -> f32 {
+    POSITION_ERROR * p.abs().max_element().max(1e-3)
+}
+
 /// [`Surface::spawn`] for a point of a triangle with unit normal `ng`.
 #[inline]
 pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3) -> Vec3 {
-    let error = POSITION_ERROR * p.abs().max_element().max(1e-3);
-    p + ng * error.copysign(direction.dot(ng))
+    p + ng * error(p).copysign(direction.dot(ng))
 }

@@ -72,6 +72,7 @@ impl Scattering {
             instance: 0,
             primitive: 0,
             material: 0,
+            touching: false,
         };
         let interfaces = |material: &Material| {
             if material.unlit || !material.has_plain_interface() {

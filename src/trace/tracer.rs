@@ -155,6 +155,11 @@ impl Tracer {
         self.scene.intersect8(|k| ray(k).as_ref().map(Self::ray), |k, hit| each(k, hit.into()));
     }
 
+    /// Calls `each` with every hit on the segment, in no order. For few and short rays.
+    pub fn each_hit(&self, ray: &Ray, each: &mut dyn FnMut(Hit)) {
+        self.scene.each_hit(&Self::ray(ray), &mut |hit| each(hit.into()));
+    }
+
     /// Whether anything lies on the segment.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {

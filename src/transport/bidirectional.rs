@@ -186,6 +186,15 @@ impl LightVertex<'_> {
         }
     }
 
+    /// The surface it is on, if others lie on that.
+    #[inline]
+    pub fn touching(&self) -> Option<&Surface> {
+        match &self.scatterer {
+            Scatterer::Surface(surface, _) => surface.touching.then_some(surface),
+            Scatterer::Medium(..) => None,
+        }
+    }
+
     /// Geometric cosine of a direction; 1 in a medium.
     #[inline]
     pub fn cos(&self, w: Vec3) -> f32 {

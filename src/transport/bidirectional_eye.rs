@@ -123,7 +123,7 @@ impl<R: Record> EyeWalk<'_, R> {
         if !is_lit(value) {
             return;
         }
-        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha), false);
+        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
         if !is_lit(way.left) {
             return;
         }
@@ -162,7 +162,7 @@ impl<R: Record> EyeWalk<'_, R> {
         }
         // Every pair of vertices has its own decisions at cut-outs.
         let token = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
-        let way = vertex.way(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium());
+        let way = vertex.way_to(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium(), light.touching());
         if !is_lit(way.left) {
             return;
         }

@@ -111,8 +111,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if !is_lit(value) {
             return;
         }
-        let way =
-            vertex.way(eye.scene, sample.wi, Some(sample.lens), token(eye.scene, draws, Purpose::ShadowAlpha), false);
+        let way = vertex.way(eye.scene, sample.wi, Some(sample.lens), token(eye.scene, draws, Purpose::ShadowAlpha));
         if !is_lit(way.left) {
             return;
         }

@@ -5,7 +5,7 @@
 //! a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the path itself, which
 //! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
 
-use super::segment::{End, Known, next_surface, token};
+use super::segment::{End, Start, next_surface, token};
 use super::site::Site;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
@@ -67,7 +67,7 @@ pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) 
     if !is_lit(arriving) {
         return Rgb::ZERO;
     }
-    arriving * vertex.way(scene, sample.wi, sample.target, token(scene, draws, Purpose::ShadowAlpha), false).left
+    arriving * vertex.way(scene, sample.wi, sample.target, token(scene, draws, Purpose::ShadowAlpha)).left
 }
 
 #[inline]
@@ -76,10 +76,11 @@ fn second_strategy(scene: &Scene, vertex: &impl Site, set: LobeSet) -> Rgb {
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
     let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
     let interior = *vertex.interiors()[usize::from(sample.transmitted)];
-    let origin = vertex.spawn(sample.wi);
+    let (origin, token) = (vertex.spawn(sample.wi), token(scene, draws, Purpose::SecondAlpha));
+    let start = Start { origin, direction: sample.wi, interior, leaving: vertex.touching(), token };
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
     let mut light = Rgb::ZERO;
-    match next_surface(scene, origin, sample.wi, interior, token(scene, draws, Purpose::SecondAlpha), &Known::Unknown) {
+    match next_surface(scene, start) {
         End::Surface(arrival) => {
             if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), &arrival.surface) {
                 light = radiance * arrival.transmittance * weight(pdf);

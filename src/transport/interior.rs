@@ -6,6 +6,7 @@
 //! \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path that leaves a solid it never entered
 //! (the eye or a lamp was inside) is taken to have been in it.
 
+use super::contact::Along;
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
 use crate::scene::Scene;
@@ -49,13 +50,12 @@ impl Interior {
         }
         // No axis, so that it grazes no wall of a box.
         let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
-        let mut ray = Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 };
+        let mut along = Along::new(scene, Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, None);
         let mut entered: Vec<u32> = Vec::new();
         let mut left: Vec<u32> = Vec::new();
         for _ in 0..MAX_SURROUNDING_HITS {
-            let Some(hit) = scene.tracer.intersect(&ray) else { break };
-            let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { break };
-            ray.origin = surface.spawn(direction);
+            let Some((surface, _)) = along.next(scene) else { break };
+            along.pass(scene, &surface);
             if !scene.materials.list[surface.material as usize].is_solid_glass() {
                 continue;
             }

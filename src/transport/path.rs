@@ -56,7 +56,7 @@ impl<R: Record> PathTracer<'_, R> {
         if (f * light.radiance).max_element() <= 0.0 {
             return;
         }
-        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha), false);
+        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
         let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);

@@ -1,5 +1,6 @@
 //! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
 
+use super::contact::{self, Along};
 use super::eye::FirstHit;
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
@@ -188,43 +189,43 @@ pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
     if scene.survey.alpha() { draws.token(purpose) } else { 0 }
 }
 
-/// Follows a ray from inside `interior` to the next surface that scatters; media on the way attenuate.
-#[inline(always)]
-pub fn next_surface(
-    scene: &Scene,
-    origin: Vec3,
-    direction: Vec3,
-    interior: Interior,
-    token: u32,
-    known: &Known,
-) -> End {
-    next_vertex(scene, origin, direction, interior, token, known, &mut Attenuate)
+/// A ray from inside `interior`, about to be followed.
+#[derive(Clone, Copy)]
+pub struct Start<'a> {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// The solids around its start.
+    pub interior: Interior,
+    /// The surface that it leaves, if others lie on that.
+    pub leaving: Option<&'a Surface>,
+    /// Decides about cut-outs.
+    pub token: u32,
 }
 
-/// Follows a ray from inside `interior` to the next surface that scatters, `through` whatever media.
+/// Follows a ray to the next surface that scatters; media on the way attenuate.
 #[inline(always)]
-pub(super) fn next_vertex<T: Through>(
-    scene: &Scene,
-    origin: Vec3,
-    direction: Vec3,
-    interior: Interior,
-    token: u32,
-    known: &Known,
-    through: &mut T,
-) -> End {
-    let mut ray = Ray { origin, direction, tmax: f32::INFINITY, token };
-    let mut interior = interior;
+pub fn next_surface(scene: &Scene, start: Start<'_>) -> End {
+    next_vertex(scene, start, &Known::Unknown, &mut Attenuate)
+}
+
+/// Follows a ray to the next surface that scatters, `through` whatever media.
+#[inline(always)]
+pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start<'_>, known: &Known, through: &mut T) -> End {
+    let Start { origin, direction, mut interior, leaving, token } = start;
+    let mut along = Along::new(scene, Ray { origin, direction, tmax: f32::INFINITY, token }, leaving);
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
     for crossed in 0..MAX_NULL_CROSSINGS {
         let met = match known {
             Known::Nothing if crossed == 0 => None,
-            Known::Hit(hit) if crossed == 0 => Some(*hit),
-            _ => scene.tracer.intersect(&ray),
+            Known::Hit(hit) if crossed == 0 => along.met(scene, hit),
+            _ => along.next(scene),
         };
-        let (origin, before, left) = (ray.origin, distance, transmittance);
+        let (origin, before, left) = (along.ray().origin, distance, transmittance);
         let medium = if T::MEDIA && scene.survey.media() { interior.medium(scene) } else { None };
-        let Some(hit) = met else {
+        let Some((surface, t)) = met else {
             if let Some(medium) = medium {
                 let (distance, beyond) = (f32::INFINITY, None);
                 let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
@@ -235,18 +236,17 @@ pub(super) fn next_vertex<T: Through>(
             }
             return End::Escaped(transmittance);
         };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
-            return End::Lost;
-        };
-        if let Some(medium) = medium {
-            let (distance, beyond) = (hit.t, Some(FirstHit { p: surface.p, instance: surface.instance }));
+        if let Some(medium) = medium
+            && t > 0.0
+        {
+            let (distance, beyond) = (t, Some(FirstHit { p: surface.p, instance: surface.instance }));
             let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
             match pass(through, &span) {
                 Passage::Left(left) => transmittance *= left,
                 Passage::Ended(arrival) => return End::Medium(arrival),
             }
         }
-        distance += hit.t;
+        distance += t;
         match boundary(scene, &surface, &interior, direction) {
             Boundary::Scattering(eta, crossing) => {
                 return End::Surface(Arrival { surface, eta, crossing, interior, transmittance, distance });
@@ -254,7 +254,7 @@ pub(super) fn next_vertex<T: Through>(
             Boundary::None(tint, behind) => {
                 transmittance *= tint;
                 interior = behind;
-                ray.origin = surface.spawn(direction);
+                along.pass(scene, &surface);
             }
         }
     }
@@ -292,50 +292,65 @@ impl Way {
     }
 }
 
-/// What is left of light between `origin` and the point `tmax` away along the unit `direction` (zero if anything scatters there, else absorption and tints), and the
-/// densities of flight; `in_medium`: whether the way starts and ends at a vertex of a medium.
+/// A ray to a point, or to infinity, whose way is asked for.
+#[derive(Clone, Copy)]
+pub struct Between<'a> {
+    /// From where, and how.
+    pub start: Start<'a>,
+    /// Distance to the end; may be infinite.
+    pub tmax: f32,
+    /// The surface at the end, if others lie on that.
+    pub reaching: Option<&'a Surface>,
+    /// Whether the way starts and ends at a vertex of a medium.
+    pub in_medium: [bool; 2],
+}
+
+/// What is left of light between two points (zero if anything scatters there, else absorption and tints), and the densities of flight.
 #[inline]
-pub fn way(
-    scene: &Scene,
-    origin: Vec3,
-    direction: Vec3,
-    tmax: f32,
-    interior: &Interior,
-    token: u32,
-    in_medium: [bool; 2],
-) -> Way {
-    let mut ray = Ray { origin, direction, tmax, token };
-    let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
-    let [mut starts, ends] = in_medium;
-    if !scene.survey.null_boundaries {
-        if scene.tracer.occluded(&ray) {
-            return Way::BLOCKED;
-        }
-        way.pass(scene, interior, tmax, starts, ends);
-        return way;
+pub fn way(scene: &Scene, between: &Between<'_>) -> Way {
+    let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
+    let [starts, ends] = between.in_medium;
+    if scene.survey.null_boundaries || leaving.is_some() || reaching.is_some() {
+        return way_through(scene, between);
     }
-    let mut interior = *interior;
+    if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
+        return Way::BLOCKED;
+    }
+    let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
+    way.pass(scene, interior, tmax, starts, ends);
+    way
+}
+
+/// The same through boundaries that do not scatter.
+fn way_through(scene: &Scene, between: &Between<'_>) -> Way {
+    let Between { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
+    let mut along = Along::new(scene, Ray { origin, direction, tmax, token }, leaving);
+    let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
+    let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
-        let Some(hit) = scene.tracer.intersect(&ray) else {
-            way.pass(scene, &interior, ray.tmax, starts, ends);
+        let Some((surface, t)) = along.next(scene) else {
+            way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
+            let Some(surface) = reaching else { return way };
+            // What lies on the end before it comes after it for light on its way back.
+            let last = contact::after(scene, surface, -direction, token);
+            for surface in last.iter().rev() {
+                match boundary(scene, surface, &interior, direction) {
+                    Boundary::Scattering(..) => return Way::BLOCKED,
+                    Boundary::None(tint, behind) => (way.left, interior) = (way.left * tint, behind),
+                }
+            }
             return way;
         };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else {
-            return Way::BLOCKED;
-        };
-        way.pass(scene, &interior, hit.t, starts, false);
-        starts = false;
+        if t > 0.0 {
+            way.pass(scene, &interior, t, starts, false);
+            starts = false;
+        }
         match boundary(scene, &surface, &interior, direction) {
             Boundary::Scattering(..) => return Way::BLOCKED,
             Boundary::None(tint, behind) => {
                 way.left *= tint;
                 interior = behind;
-                let next = surface.spawn(direction);
-                ray.tmax -= (next - ray.origin).dot(direction);
-                ray.origin = next;
-                if ray.tmax <= 0.0 {
-                    return way;
-                }
+                along.pass(scene, &surface);
             }
         }
     }

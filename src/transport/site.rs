@@ -1,9 +1,10 @@
 //! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
 
 use super::interior::Interior;
-use super::segment::{MediumArrival, Way, way};
+use super::segment::{Between, MediumArrival, Start, Way, way};
 use super::walk::Vertex;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
+use crate::geometry::Surface;
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
@@ -98,9 +99,29 @@ pub trait Site {
         1.0
     }
 
-    /// What is left of light on the way along `wi` to `target` (`None`: out of the scene), a vertex of a medium or not.
+    /// The surface it is on, if others lie on that.
     #[inline]
-    fn way(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32, to_medium: bool) -> Way {
+    fn touching(&self) -> Option<&Surface> {
+        None
+    }
+
+    /// What is left of light on the way along `wi` to `target` (`None`: out of the scene).
+    #[inline]
+    fn way(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> Way {
+        self.way_to(scene, wi, target, token, false, None)
+    }
+
+    /// The same to a vertex of a medium or not, or to one on a surface that others lie on.
+    #[inline]
+    fn way_to(
+        &self,
+        scene: &Scene,
+        wi: Vec3,
+        target: Option<Vec3>,
+        token: u32,
+        to_medium: bool,
+        reaching: Option<&Surface>,
+    ) -> Way {
         let origin = self.spawn(wi);
         let (direction, tmax) = match target {
             None => (wi, f32::INFINITY),
@@ -111,8 +132,9 @@ pub trait Site {
                 (to / distance, distance)
             }
         };
-        let interior = self.interiors()[usize::from(self.crosses(wi))];
-        way(scene, origin, direction, tmax, interior, token, [Self::IN_MEDIUM, to_medium])
+        let interior = *self.interiors()[usize::from(self.crosses(wi))];
+        let start = Start { origin, direction, interior, leaving: self.touching(), token };
+        way(scene, &Between { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
     }
 }
 
@@ -190,6 +212,11 @@ impl Site for Vertex<'_, '_> {
     #[inline]
     fn spawn(&self, w: Vec3) -> Vec3 {
         self.surface.spawn(w)
+    }
+
+    #[inline]
+    fn touching(&self) -> Option<&Surface> {
+        self.surface.touching.then_some(self.surface)
     }
 
     #[inline]

@@ -3,7 +3,7 @@
 
 use super::flight::{Fly, Split};
 use super::interior::Interior;
-use super::segment::{Arrival, Attenuate, Clear, End, Known, next_vertex, token};
+use super::segment::{Arrival, Attenuate, Clear, End, Known, Start, next_vertex, token};
 use super::site::{MediumVertex, Site};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
@@ -215,26 +215,28 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     }
     let mut scattered: Option<Scattered> = None;
     let mut in_medium = false;
+    let mut leaving: Option<Surface> = None;
     let mut wavelength = None;
     for depth in 1..=max_depth {
         let last = stream.vertex(depth - 1);
         let token = token(scene, last, Purpose::Alpha);
         let met = std::mem::replace(&mut known, &Known::Unknown);
         let mut flight = Flight::FREE;
+        let start = Start { origin, direction, interior, leaving: leaving.as_ref(), token };
         let end = if BESIDES < ABSORPTION {
-            next_vertex(scene, origin, direction, interior, token, met, &mut Clear)
+            next_vertex(scene, start, met, &mut Clear)
         } else if BESIDES < SCATTERING {
-            next_vertex(scene, origin, direction, interior, token, met, &mut Attenuate)
+            next_vertex(scene, start, met, &mut Attenuate)
         } else if V::SPLITS {
             let from = origin;
             let draws = last;
             let mut split =
                 Split { scene, visitor, throughput, draws, depth, scattered, from, wavelength, survival_scale };
-            next_vertex(scene, origin, direction, interior, token, met, &mut split)
+            next_vertex(scene, start, met, &mut split)
         } else {
             let (from_medium, from_infinity) = (in_medium, far && depth == 1);
             let mut fly = Fly { scene, throughput, draws: last, from_medium, from_infinity, flight };
-            let end = next_vertex(scene, origin, direction, interior, token, met, &mut fly);
+            let end = next_vertex(scene, start, met, &mut fly);
             flight = fly.flight;
             end
         };
@@ -281,7 +283,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
                 throughput = vertex.throughput * sample.weight / survival;
                 scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
                 (origin, direction) = (vertex.met.p, sample.wi);
-                (interior, in_medium) = (vertex.met.interior, true);
+                (interior, in_medium, leaving) = (vertex.met.interior, true, None);
                 continue;
             }
             End::Escaped(left) => {
@@ -371,6 +373,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         direction = sample.wi;
         origin = surface.spawn(direction);
         in_medium = false;
+        leaving = if surface.touching { Some(*surface) } else { None };
         interior = if sample.transmitted { behind } else { here };
     }
 }

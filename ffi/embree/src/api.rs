@@ -27,6 +27,9 @@ pub const FORMAT_FLOAT3X4_COLUMN_MAJOR: u32 = 0x9234;
 
 pub const BUILD_QUALITY_MEDIUM: u32 = 1;
 pub const SCENE_FLAG_ROBUST: u32 = 1 << 2;
+/// Rays may bring a filter of their own: `RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION` of Embree 3, and
+/// `RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS` of Embree 4.
+pub const SCENE_FLAG_RAY_FILTER: u32 = 1 << 3;
 
 /// `RTCError`, as words.
 pub fn error_name(code: u32) -> &'static str {
@@ -136,6 +139,39 @@ impl IntersectContext3 {
         instance: INVALID_GEOMETRY_ID,
         min_width_distance_factor: 0.0,
     };
+}
+
+/// A context of Embree 3 and what our filter finds behind it.
+#[repr(C)]
+struct Context3 {
+    context: IntersectContext3,
+    beside: *mut c_void,
+}
+
+/// `RTCRayQueryContext` of Embree 4 (the second number is there only where instances come in arrays, and padding otherwise) and
+/// what our filter finds behind it.
+#[repr(C)]
+struct Context4 {
+    instance: [u32; 2],
+    beside: *mut c_void,
+}
+
+const _: () = assert!(std::mem::offset_of!(Context3, beside) == 24);
+const _: () = assert!(std::mem::offset_of!(Context4, beside) == 8);
+
+/// What [`Trace::intersect_filtered`] was given for its filter, by the major version of Embree.
+///
+/// # Safety
+/// `arguments` must be those that Embree has called a filter of that function with.
+pub unsafe fn beside<const MAJOR: u32, T>(arguments: &FilterArguments) -> *mut T {
+    // SAFETY: the caller vouches for the context, which is one of ours.
+    let beside = unsafe {
+        match MAJOR {
+            3 => (*arguments.context.cast::<Context3>()).beside,
+            _ => (*arguments.context.cast::<Context4>()).beside,
+        }
+    };
+    beside.cast()
 }
 
 /// `RTCIntersectArguments` of Embree 4. The last field is there only in builds with `RTC_MIN_WIDTH`, and padding otherwise.
@@ -282,6 +318,41 @@ impl Trace {
             }
             // SAFETY: as above.
             Trace::V4(functions) => unsafe { (functions.occluded)(scene, ray, std::ptr::null_mut()) },
+        }
+    }
+
+    /// Like [`Trace::intersect`], with a filter that is asked about every hit which the geometry's own has let pass: of `filters` the
+    /// one for this version, which finds `with` by [`beside`].
+    ///
+    /// # Safety
+    /// As for [`Trace::intersect`]; the filters must be sound with a pointer to `T` that is `with`.
+    pub unsafe fn intersect_filtered<T>(
+        &self,
+        scene: Handle,
+        ray: *mut RawRayHit,
+        filters: [FilterFunction; 2],
+        with: *mut T,
+    ) {
+        let (of_3, of_4) = (filters[0] as *const c_void, filters[1] as *const c_void);
+        let beside = with.cast();
+        match self {
+            Trace::V3(functions) => {
+                let context = IntersectContext3 { filter: of_3, ..IntersectContext3::INCOHERENT };
+                let mut context = Context3 { context, beside };
+                // SAFETY: the caller vouches for scene and ray; the context lives through the call.
+                unsafe { (functions.intersect)(scene, (&raw mut context).cast(), ray) }
+            }
+            Trace::V4(functions) => {
+                let mut context = Context4 { instance: [INVALID_GEOMETRY_ID; 2], beside };
+                let mut arguments = IntersectArguments4 {
+                    flags: 1 << 1,
+                    context: (&raw mut context).cast(),
+                    filter: of_4,
+                    ..IntersectArguments4::COHERENT
+                };
+                // SAFETY: as above; context and arguments live through the call.
+                unsafe { (functions.intersect)(scene, ray, (&raw mut arguments).cast()) }
+            }
         }
     }
 

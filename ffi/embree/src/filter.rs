@@ -5,7 +5,8 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
-use crate::api::{FilterArguments, INVALID_GEOMETRY_ID};
+use crate::api::{self, FilterArguments, FilterFunction, INVALID_GEOMETRY_ID, RawHit};
+use crate::query::Hit;
 use crate::scene::GeometryId;
 
 /// A hit that Embree proposes to a filter.
@@ -70,6 +71,34 @@ pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
         Ok(false) => *valid = 0,
         // The hit is accepted so that the ray soon ends.
         Err(panic) => PANIC.set(Some(panic)),
+    }
+}
+
+/// Filters of a ray, for Embree 3 and 4, that hand every hit to the closure `&mut dyn FnMut(Hit)` beside them, and let none stop the ray.
+pub const REPORT: [FilterFunction; 2] = [report::<3>, report::<4>];
+
+/// # Safety
+/// To be called by Embree only, for [`Scene::each_hit`](crate::Scene::each_hit).
+unsafe extern "C" fn report<const MAJOR: u32>(arguments: *const FilterArguments) {
+    // SAFETY: as for `call`; beside the context is a pointer to the closure, which lives through the call.
+    let (valid, hit, t, each) = unsafe {
+        let arguments = &*arguments;
+        debug_assert_eq!(arguments.count, 1);
+        let each = &mut *api::beside::<MAJOR, &mut dyn FnMut(Hit)>(arguments);
+        (&mut *arguments.valid, arguments.hit, (*arguments.ray).tfar, each)
+    };
+    if *valid == 0 {
+        return;
+    }
+    *valid = 0;
+    // SAFETY: as for `call`: what is read is there in Embree 3, too, and the rest is never looked at.
+    let hit = unsafe {
+        let (ng, u, v) = ((*hit).ng, (*hit).u, (*hit).v);
+        let (primitive, geometry, instance) = ((*hit).primitive, (*hit).geometry, (*hit).instance);
+        Hit::new(t, &RawHit { ng, u, v, primitive, geometry, instance, instance_primitive: INVALID_GEOMETRY_ID })
+    };
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| each(hit))) {
+        PANIC.set(Some(panic));
     }
 }
 

@@ -55,6 +55,13 @@ pub fn try_out(library: &Library) -> Result<usize, String> {
     if !scene.occluded(&ray) || scene.intersect(&Ray { token: 1, ..ray }).is_some() {
         return Err("it does not test occlusion or call filters as it should: unknown build options".into());
     }
+    let mut reported = Vec::new();
+    scene.each_hit(&ray, &mut |hit| reported.push((hit.geometry.0, hit.instance.map(|id| id.0), hit.primitive, hit.t)));
+    if !matches!(reported[..], [(3, Some(7), 1, t)] if (t - 2.0).abs() < 1e-4) {
+        return Err(format!(
+            "it does not call filters of rays as it should, but reports {reported:?}: unknown build options"
+        ));
+    }
     Ok(extent)
 }
 

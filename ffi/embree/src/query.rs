@@ -53,6 +53,22 @@ pub struct Bounds {
     pub max: [f32; 3],
 }
 
+impl Hit {
+    /// What Embree has written, at `t`.
+    #[inline(always)]
+    pub(crate) fn new(t: f32, hit: &RawHit) -> Hit {
+        Hit {
+            t,
+            u: hit.u,
+            v: hit.v,
+            ng: hit.ng,
+            primitive: hit.primitive,
+            geometry: GeometryId(hit.geometry),
+            instance: (hit.instance != INVALID_GEOMETRY_ID).then_some(GeometryId(hit.instance)),
+        }
+    }
+}
+
 impl RawRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> RawRay {
@@ -96,19 +112,19 @@ impl Scene {
         if self.filtered {
             filter::resume_panic();
         }
-        let RawRayHit { ray, hit } = raw;
-        if hit.geometry == INVALID_GEOMETRY_ID {
-            return None;
+        (raw.hit.geometry != INVALID_GEOMETRY_ID).then(|| Hit::new(raw.ray.tfar, &raw.hit))
+    }
+
+    /// Calls `each` with every hit on the segment, in no order. For few and short rays: each hit is a call back from Embree.
+    pub fn each_hit(&self, ray: &Ray, each: &mut dyn FnMut(Hit)) {
+        let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
+        if !raw.ray.is_valid(self.reach) {
+            return;
         }
-        Some(Hit {
-            t: ray.tfar,
-            u: hit.u,
-            v: hit.v,
-            ng: hit.ng,
-            primitive: hit.primitive,
-            geometry: GeometryId(hit.geometry),
-            instance: (hit.instance != INVALID_GEOMETRY_ID).then_some(GeometryId(hit.instance)),
-        })
+        let mut each = each;
+        // SAFETY: as in `intersect`; the filters take what they are given here.
+        unsafe { self.trace.intersect_filtered(self.raw, &mut raw, filter::REPORT, &raw mut each) };
+        filter::resume_panic();
     }
 
     /// Calls `each` with the nearest hits of up to eight rays that go much the same way, as those of neighbouring pixels do: faster than

@@ -133,7 +133,7 @@ impl SceneBuilder {
         let raw = RawScene { raw, device: device.clone() };
         // SAFETY: the scene was just made.
         unsafe {
-            (common.set_scene_flags)(raw.raw, api::SCENE_FLAG_ROBUST);
+            (common.set_scene_flags)(raw.raw, api::SCENE_FLAG_ROBUST | api::SCENE_FLAG_RAY_FILTER);
             (common.set_scene_quality)(raw.raw, api::BUILD_QUALITY_MEDIUM);
         }
         device.check(during)?;

@@ -4,6 +4,7 @@ use crate::geometry::Surface;
 use crate::math::Vec3;
 use crate::scene::Scene;
 use crate::trace::Ray;
+use crate::transport::Along;
 
 /// A ray through more surfaces than this that let it pass is given up.
 const MOST_SURFACES: usize = 64;
@@ -26,24 +27,14 @@ pub(super) fn first(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, tok
 }
 
 /// The first surface along a ray that lets no light through. What lets light through does not bend the ray.
-pub(super) fn first_opaque(
-    scene: &Scene,
-    mut origin: Vec3,
-    direction: Vec3,
-    mut tmax: f32,
-    token: u32,
-) -> Option<Surface> {
+pub(super) fn first_opaque(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
+    let mut along = Along::new(scene, Ray { origin, direction, tmax, token }, None);
     for _ in 0..MOST_SURFACES {
-        let surface = first(scene, origin, direction, tmax, token)?;
+        let (surface, _) = along.next(scene)?;
         if scene.materials.list[surface.material as usize].transmission == 0.0 {
             return Some(surface);
         }
-        let next = surface.spawn(direction);
-        tmax -= (next - origin).dot(direction);
-        origin = next;
-        if tmax <= 0.0 {
-            break;
-        }
+        along.pass(scene, &surface);
     }
     None
 }
