@@ -6,4 +6,4 @@ mod surface;
 
 pub use mesh::{Instance, Mesh, Placement};
 pub use shapes::Shapes;
-pub use surface::{Surface, spawn};
+pub use surface::{Surface, error, spawn};

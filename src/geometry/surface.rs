@@ -86,12 +86,6 @@ impl Surface {
         })
     }
 
-    /// How far from the surface its position may be (scene units).
-    #[inline]
-    pub fn error(&self) -> f32 {
-        error(self.p)
-    }
-
     /// Where a ray towards `direction` starts: moved off the surface, to the side the direction points to, by the
     /// error bound of the position, so that the ray does not hit the surface it leaves.
     #[inline]
@@ -100,8 +94,9 @@ impl Surface {
     }
 }
 
+/// How far from its surface a computed position may be (scene units).
 #[inline]
-fn error(p: Vec3) -> f32 {
+pub fn error(p: Vec3) -> f32 {
     POSITION_ERROR * p.abs().max_element().max(1e-3)
 }
 

@@ -4,6 +4,7 @@
 //! and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves splats (its vertices connected to the
 //! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
 
+use super::contact::Place;
 use super::eye::Eye;
 use super::interior::Surroundings;
 use super::mis::{Eta, MisState, Ratios};
@@ -188,9 +189,9 @@ impl LightVertex<'_> {
 
     /// The surface it is on, if others lie on that.
     #[inline]
-    pub fn touching(&self) -> Option<&Surface> {
+    pub fn touching(&self) -> Option<Place> {
         match &self.scatterer {
-            Scatterer::Surface(surface, _) => surface.touching.then_some(surface),
+            Scatterer::Surface(surface, _) => Place::touching(surface),
             Scatterer::Medium(..) => None,
         }
     }

@@ -50,12 +50,12 @@ impl Interior {
         }
         // No axis, so that it grazes no wall of a box.
         let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
-        let mut along = Along::new(scene, Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, None);
+        let mut along = Along::new(Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, None);
         let mut entered: Vec<u32> = Vec::new();
         let mut left: Vec<u32> = Vec::new();
         for _ in 0..MAX_SURROUNDING_HITS {
             let Some((surface, _)) = along.next(scene) else { break };
-            along.pass(scene, &surface);
+            along.pass(&surface);
             if !scene.materials.list[surface.material as usize].is_solid_glass() {
                 continue;
             }

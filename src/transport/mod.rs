@@ -27,7 +27,7 @@ pub use bandwidths::{Bandwidths, Counter, Found, LevelRadii, MAX_LEVELS};
 pub use bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Strategies, Technique};
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Left, LightVertices, Splat};
-pub use contact::Along;
+pub use contact::{Along, Place};
 pub use direct::{balance, direct_light};
 pub use eye::{Eye, EyeMeasure, Features, FirstHit, Indirect};
 pub use gather::Scratch;

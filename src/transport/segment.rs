@@ -1,6 +1,6 @@
 //! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
 
-use super::contact::{self, Along};
+use super::contact::{self, Along, Place};
 use super::eye::FirstHit;
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
@@ -191,7 +191,7 @@ pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
 
 /// A ray from inside `interior`, about to be followed.
 #[derive(Clone, Copy)]
-pub struct Start<'a> {
+pub struct Start {
     /// Where it starts.
     pub origin: Vec3,
     /// Unit direction.
@@ -199,22 +199,22 @@ pub struct Start<'a> {
     /// The solids around its start.
     pub interior: Interior,
     /// The surface that it leaves, if others lie on that.
-    pub leaving: Option<&'a Surface>,
+    pub leaving: Option<Place>,
     /// Decides about cut-outs.
     pub token: u32,
 }
 
 /// Follows a ray to the next surface that scatters; media on the way attenuate.
 #[inline(always)]
-pub fn next_surface(scene: &Scene, start: Start<'_>) -> End {
+pub fn next_surface(scene: &Scene, start: Start) -> End {
     next_vertex(scene, start, &Known::Unknown, &mut Attenuate)
 }
 
 /// Follows a ray to the next surface that scatters, `through` whatever media.
 #[inline(always)]
-pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start<'_>, known: &Known, through: &mut T) -> End {
+pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Known, through: &mut T) -> End {
     let Start { origin, direction, mut interior, leaving, token } = start;
-    let mut along = Along::new(scene, Ray { origin, direction, tmax: f32::INFINITY, token }, leaving);
+    let mut along = Along::new(Ray { origin, direction, tmax: f32::INFINITY, token }, leaving);
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
     for crossed in 0..MAX_NULL_CROSSINGS {
@@ -254,7 +254,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start<'_>, known: &K
             Boundary::None(tint, behind) => {
                 transmittance *= tint;
                 interior = behind;
-                along.pass(scene, &surface);
+                along.pass(&surface);
             }
         }
     }
@@ -294,20 +294,20 @@ impl Way {
 
 /// A ray to a point, or to infinity, whose way is asked for.
 #[derive(Clone, Copy)]
-pub struct Between<'a> {
+pub struct Between {
     /// From where, and how.
-    pub start: Start<'a>,
+    pub start: Start,
     /// Distance to the end; may be infinite.
     pub tmax: f32,
     /// The surface at the end, if others lie on that.
-    pub reaching: Option<&'a Surface>,
+    pub reaching: Option<Place>,
     /// Whether the way starts and ends at a vertex of a medium.
     pub in_medium: [bool; 2],
 }
 
 /// What is left of light between two points (zero if anything scatters there, else absorption and tints), and the densities of flight.
 #[inline]
-pub fn way(scene: &Scene, between: &Between<'_>) -> Way {
+pub fn way(scene: &Scene, between: &Between) -> Way {
     let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
     let [starts, ends] = between.in_medium;
     if scene.survey.null_boundaries || leaving.is_some() || reaching.is_some() {
@@ -322,18 +322,16 @@ pub fn way(scene: &Scene, between: &Between<'_>) -> Way {
 }
 
 /// The same through boundaries that do not scatter.
-fn way_through(scene: &Scene, between: &Between<'_>) -> Way {
+fn way_through(scene: &Scene, between: &Between) -> Way {
     let Between { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
-    let mut along = Along::new(scene, Ray { origin, direction, tmax, token }, leaving);
+    let mut along = Along::new(Ray { origin, direction, tmax, token }, leaving);
     let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some((surface, t)) = along.next(scene) else {
             way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
-            let Some(surface) = reaching else { return way };
-            // What lies on the end before it comes after it for light on its way back.
-            let last = contact::after(scene, surface, -direction, token);
-            for surface in last.iter().rev() {
+            let Some(place) = reaching else { return way };
+            for surface in &contact::before(scene, &place, direction, token) {
                 match boundary(scene, surface, &interior, direction) {
                     Boundary::Scattering(..) => return Way::BLOCKED,
                     Boundary::None(tint, behind) => (way.left, interior) = (way.left * tint, behind),
@@ -350,7 +348,7 @@ fn way_through(scene: &Scene, between: &Between<'_>) -> Way {
             Boundary::None(tint, behind) => {
                 way.left *= tint;
                 interior = behind;
-                along.pass(scene, &surface);
+                along.pass(&surface);
             }
         }
     }

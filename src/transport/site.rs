@@ -1,10 +1,10 @@
 //! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
 
+use super::contact::Place;
 use super::interior::Interior;
 use super::segment::{Between, MediumArrival, Start, Way, way};
 use super::walk::Vertex;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
-use crate::geometry::Surface;
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
@@ -101,7 +101,7 @@ pub trait Site {
 
     /// The surface it is on, if others lie on that.
     #[inline]
-    fn touching(&self) -> Option<&Surface> {
+    fn touching(&self) -> Option<Place> {
         None
     }
 
@@ -120,7 +120,7 @@ pub trait Site {
         target: Option<Vec3>,
         token: u32,
         to_medium: bool,
-        reaching: Option<&Surface>,
+        reaching: Option<Place>,
     ) -> Way {
         let origin = self.spawn(wi);
         let (direction, tmax) = match target {
@@ -215,8 +215,8 @@ impl Site for Vertex<'_, '_> {
     }
 
     #[inline]
-    fn touching(&self) -> Option<&Surface> {
-        self.surface.touching.then_some(self.surface)
+    fn touching(&self) -> Option<Place> {
+        Place::touching(self.surface)
     }
 
     #[inline]

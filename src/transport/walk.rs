@@ -1,6 +1,7 @@
 //! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm is a
 //! [`Visitor`].
 
+use super::contact::Place;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::segment::{Arrival, Attenuate, Clear, End, Known, Start, next_vertex, token};
@@ -215,14 +216,14 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     }
     let mut scattered: Option<Scattered> = None;
     let mut in_medium = false;
-    let mut leaving: Option<Surface> = None;
+    let mut leaving: Option<Place> = None;
     let mut wavelength = None;
     for depth in 1..=max_depth {
         let last = stream.vertex(depth - 1);
         let token = token(scene, last, Purpose::Alpha);
         let met = std::mem::replace(&mut known, &Known::Unknown);
         let mut flight = Flight::FREE;
-        let start = Start { origin, direction, interior, leaving: leaving.as_ref(), token };
+        let start = Start { origin, direction, interior, leaving, token };
         let end = if BESIDES < ABSORPTION {
             next_vertex(scene, start, met, &mut Clear)
         } else if BESIDES < SCATTERING {
@@ -373,7 +374,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         direction = sample.wi;
         origin = surface.spawn(direction);
         in_medium = false;
-        leaving = if surface.touching { Some(*surface) } else { None };
+        leaving = Place::touching(surface);
         interior = if sample.transmitted { behind } else { here };
     }
 }

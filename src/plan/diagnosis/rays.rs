@@ -28,13 +28,13 @@ pub(super) fn first(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, tok
 
 /// The first surface along a ray that lets no light through. What lets light through does not bend the ray.
 pub(super) fn first_opaque(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
-    let mut along = Along::new(scene, Ray { origin, direction, tmax, token }, None);
+    let mut along = Along::new(Ray { origin, direction, tmax, token }, None);
     for _ in 0..MOST_SURFACES {
         let (surface, _) = along.next(scene)?;
         if scene.materials.list[surface.material as usize].transmission == 0.0 {
             return Some(surface);
         }
-        along.pass(scene, &surface);
+        along.pass(&surface);
     }
     None
 }
