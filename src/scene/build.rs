@@ -1,7 +1,7 @@
 //! From a description to a scene: places and bakes meshes, makes lights, commits to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
-use super::{Scene, Survey};
+use super::{Contacts, Scene, Survey};
 use crate::error::{Error, Kind, Result};
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
@@ -83,6 +83,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         );
     }
     let scattering = Scattering::new(&materials.list);
+    let contacts = Contacts::new(&shapes, &materials);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     let lenses = description.cameras.iter().any(|camera| camera.aperture_radius > 0.0);
     if let Some(lacking) = survey.lacking(&materials, lenses) {
@@ -106,6 +107,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         medium: description.medium,
         scattering,
         survey,
+        contacts,
         warnings,
     })
 }
@@ -144,6 +146,7 @@ pub(super) fn dress(
         medium,
         scattering: scene.scattering.again(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
+        contacts: Contacts::new(&shapes, &materials),
         warnings: Vec::new(),
         shapes,
         materials,

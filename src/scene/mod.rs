@@ -1,12 +1,14 @@
 //! The scene: read from a file into a plain [`Description`], then validated and committed into a [`Scene`].
 
 mod build;
+mod contacts;
 pub mod description;
 pub mod environment_file;
 pub mod gltf;
 mod survey;
 mod view;
 
+pub use contacts::Contacts;
 pub use description::Description;
 pub use survey::Survey;
 pub use view::{MAX_SIZE, View};
@@ -53,6 +55,8 @@ pub struct Scene {
     pub scattering: Scattering,
     /// What is present.
     pub survey: Survey,
+    /// Triangles that others may lie on.
+    pub contacts: Contacts,
     /// Whatever was ignored or approximated, from the reader and from building.
     pub warnings: Vec<String>,
 }

@@ -1,8 +1,9 @@
 //! Surfaces that lie on each other: a glass on a table, a liquid in a glass, sheets in a stack.
 //!
 //! A ray goes on a little past the surface it leaves ([`error`]), for rounding decides about what is nearer; so whatever lies in
-//! that little way has to be met by other means. Where light passes a surface, all others there are looked for, and taken to lie on each
-//! other in this order, whichever Embree finds first:
+//! that little way has to be met by other means. Where light passes a triangle that others may lie on
+//! ([`Contacts`](crate::scene::Contacts)), all others there are looked for, and taken to lie on each other in this order, whichever
+//! Embree finds first:
 //!
 //! - what lets no light pass comes first: glass and the table that it stands on are in contact;
 //! - a solid is entered before another is left, so that solids overlap, and nested dielectrics (`interior.rs`) say what fills the space:
@@ -172,6 +173,9 @@ impl Along {
             }
             if is_first {
                 return Some(Surface { touching: true, ..surface });
+            }
+            if !scene.contacts.may_touch(hit.instance, hit.primitive) {
+                return Some(surface);
             }
             let Some(other) = first(scene, Place::of(&surface), hit, self.ray.direction, self.ray.token) else {
                 return Some(surface);
