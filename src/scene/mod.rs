@@ -4,10 +4,12 @@ mod build;
 pub mod description;
 pub mod environment_file;
 pub mod gltf;
+mod nesting;
 mod survey;
 mod view;
 
 pub use description::Description;
+pub use nesting::{Nestings, OPEN, Stack};
 pub use survey::Survey;
 pub use view::{MAX_SIZE, View};
 
@@ -53,6 +55,8 @@ pub struct Scene {
     pub scattering: Scattering,
     /// What is present.
     pub survey: Survey,
+    /// Deep stacks of solids that paths have been in.
+    pub nestings: Nestings,
     /// Whatever was ignored or approximated, from the reader and from building.
     pub warnings: Vec<String>,
 }

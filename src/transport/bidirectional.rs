@@ -5,9 +5,9 @@
 //! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
 
 use super::eye::Eye;
-use super::interior::Surroundings;
 use super::mis::{Eta, MisState, Ratios};
 use super::shares::leads;
+use super::surroundings::Surroundings;
 use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
