@@ -54,7 +54,7 @@ fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
 fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectSample) -> f64) -> Vec<f64> {
     let one = |i: u64| {
         let draws = Stream::new(11, 0, Domain::Test, i).vertex(1);
-        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let light = scene.lights.sample_direct(&scene.shapes, &scene.materials, receiver, choice, point);
         light.map_or(0.0, |light| {
             let cos = f64::from(light.wi.y.max(0.0));

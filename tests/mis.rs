@@ -513,7 +513,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                 Technique::NextEvent { eye: t } => {
                     let met = &from_eye[t as usize - 1];
                     let draws = stream.vertex(t);
-                    let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+                    let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
                     let sample = {
                         let receiver = met.receiver();
                         scene.lights.sample_direct(&scene.shapes, &scene.materials, &receiver, choice, point)

@@ -104,6 +104,17 @@ impl Camera {
         self.position
     }
 
+    /// Corners of a plane that all rays start in.
+    pub fn origins(&self) -> [Vec3; 4] {
+        let film = match self.projection {
+            Projection::Perspective(_) => Vec2::ZERO,
+            Projection::Orthographic(half) => half,
+        };
+        let half = film + if self.has_lens() { self.lens_radius } else { 0.0 };
+        [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+            .map(|(x, y)| self.position + self.rotation * (half * Vec2::new(x, y)).extend(0.0))
+    }
+
     /// Unit viewing direction.
     pub fn forward(&self) -> Vec3 {
         -self.rotation.z_axis

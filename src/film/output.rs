@@ -66,7 +66,9 @@ impl Column {
     }
 
     fn noise(name: impl Into<String>, get: impl Fn(&Pixel, f64) -> DVec3 + Sync + 'static) -> Column {
-        let get = Box::new(move |p: &Pixel, ratio: f64| three(get(p, ratio).as_vec3()));
+        // Squares of 10^20 and more are no f32: what is known to be large is not to look as if nothing were known.
+        let most = DVec3::splat(f64::from(f32::MAX));
+        let get = Box::new(move |p: &Pixel, ratio: f64| three(get(p, ratio).min(most).as_vec3()));
         Column { name: name.into(), components: "RGB", get }
     }
 
@@ -302,6 +304,21 @@ mod tests {
         let clear = Shape { volume: false, volume_radius_factor: None, ..SHAPE };
         assert_eq!(names(&clear).len() + 6, names(&SHAPE).len());
         assert_eq!(names(&SHAPE), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
+    }
+
+    /// Squares of what f32 can hold are not always f32.
+    #[test]
+    fn the_variance_of_great_radiance_is_finite() {
+        let mut pixel = Pixel::new([1.0; 2]);
+        for pass in 1..=4 {
+            let light = Rgb::splat(if pass % 2 == 0 { 1e20 } else { 3e20 });
+            let measure = EyeMeasure { direct: light, ..EyeMeasure::default() };
+            pixel.add(pass, &measure, Some(&measure), (5, 3));
+        }
+        let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
+        assert_eq!(value(&set, "Variance2", "R"), f32::MAX);
+        // (1e20)^2 four times, over 4 and 3, and the root of it.
+        assert!((value(&set, "Error", "R") / (1e20 / 3f32.sqrt()) - 1.0).abs() < 1e-3);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! hit anything. Paths are drawn from a mixture of the whole disc and of the discs of the targets' bounding spheres; each carries the
 //! flux that its density in the mixture asks for, so the estimate is the same and no path is lost.
 
-use super::{Cdf, EmissionSample, Region, Sky};
+use super::{Cdf, EmissionSample, Entry, Region, Sky};
 use crate::geometry::Shapes;
 use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
@@ -134,20 +134,21 @@ impl Targets {
     /// whether it is aimed, and at which target; `point` where on its disc.
     pub fn aim(&self, sky: &Sky, emission: &mut EmissionSample, u: f32, point: Vec2) {
         let Some(choice) = &self.choice else { return };
-        let d = emission.direction;
         if u < AIMED {
-            let (target, ..) = choice.sample(u / AIMED);
-            emission.origin = Self::point(sky, d, self.spheres[target], point);
+            let (target, ..) = choice.sample(f64::from(u / AIMED));
+            self.through(sky, emission, target, point);
+        } else {
+            self.weigh(sky, emission);
         }
-        self.weigh(sky, emission);
     }
 
     /// The same, and part of the paths through the disc of a region. Flux and density are those without the region: [`Targets::lit`] has the mixture's.
     pub fn aim_or_light(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
         let lit = self.share_lit();
         if u < lit {
-            let disc = (region.center, region.sample(u / lit));
-            emission.origin = Self::point(sky, emission.direction, disc, point);
+            let radius = region.sample(u / lit);
+            emission.entry = Entry::Region(radius);
+            emission.origin = Self::point(sky, emission.direction, (region.center, radius), point);
             self.weigh(sky, emission);
         } else {
             self.aim(sky, emission, (u - lit) / (1.0 - lit), point);
@@ -162,12 +163,14 @@ impl Targets {
     pub fn lit(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
         let lit = self.share_lit();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
-        let through = lit * region.density(from_line(region.center, p, d));
+        let drawn = if let Entry::Region(radius) = emission.entry { radius } else { 0.0 };
+        let through = lit * region.density(from_line(region.center, p, d), drawn);
         ((1.0 - lit) * aimed + through, (1.0 - lit) * aimed * self.unaimed(sky, emission) + through)
     }
 
     /// The same, drawn through the disc of one target.
     pub fn through(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
+        emission.entry = Entry::Target(target);
         emission.origin = Self::point(sky, emission.direction, self.spheres[target], point);
         self.weigh(sky, emission);
     }
@@ -182,7 +185,7 @@ impl Targets {
 
     /// Gives a start the flux and density of the mixture; it has those of the uniform density alone.
     fn weigh(&self, sky: &Sky, emission: &mut EmissionSample) {
-        emission.density.onward = self.density(sky, emission.origin, emission.direction);
+        emission.density.onward = self.density_drawn(sky, emission.origin, emission.direction, Some(emission.entry));
         emission.flux *= 1.0 / (PI * sky.radius * sky.radius * emission.density.onward);
     }
 
@@ -194,19 +197,25 @@ impl Targets {
     /// Density per area, in the mixture, of the line through `p` along the unit `d`.
     #[inline]
     pub fn density(&self, sky: &Sky, p: Vec3, d: Vec3) -> f32 {
-        let whole = PI * sky.radius * sky.radius;
+        self.density_drawn(sky, p, d, None)
+    }
+
+    /// The same of a line that was drawn through a disc, which it is within.
+    fn density_drawn(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<Entry>) -> f32 {
         if self.choice.is_none() {
-            return 1.0 / whole;
+            return 1.0 / (PI * sky.radius * sky.radius);
         }
-        let within = |&&(center, radius): &&(Vec3, f32)| from_line(center, p, d) < radius * radius;
-        let discs = self.spheres.iter().filter(within).count();
-        self.uniform(sky, p, d) + AIMED * discs as f32 / self.area
+        let within = |&(target, &(center, radius)): &(usize, &(Vec3, f32))| {
+            drawn == Some(Entry::Target(target)) || from_line(center, p, d) < radius * radius
+        };
+        let discs = self.spheres.iter().enumerate().filter(within).count();
+        self.uniform(sky, p, d, drawn) + AIMED * discs as f32 / self.area
     }
 
     /// The part of that density that paths of all light have.
-    fn uniform(&self, sky: &Sky, p: Vec3, d: Vec3) -> f32 {
+    fn uniform(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<Entry>) -> f32 {
         // A target's disc may reach over the rim of the scene's.
-        let inside = from_line(sky.center, p, d) <= sky.radius * sky.radius;
+        let inside = drawn == Some(Entry::Whole) || from_line(sky.center, p, d) <= sky.radius * sky.radius;
         if inside { (1.0 - AIMED) / (PI * sky.radius * sky.radius) } else { 0.0 }
     }
 
@@ -214,7 +223,10 @@ impl Targets {
     pub fn unaimed(&self, sky: &Sky, emission: &EmissionSample) -> f32 {
         match self.choice {
             None => 1.0,
-            Some(_) => self.uniform(sky, emission.origin, emission.direction) / emission.density.onward,
+            Some(_) => {
+                let EmissionSample { origin, direction, entry, density, .. } = emission;
+                self.uniform(sky, *origin, *direction, Some(*entry)) / density.onward
+            }
         }
     }
 }
@@ -256,6 +268,7 @@ mod tests {
                     light: 0,
                     delta: true,
                     infinite: true,
+                    entry: Entry::Whole,
                     density: EmissionDensity {
                         direct: 1.0,
                         start: 1.0,
@@ -295,6 +308,54 @@ mod tests {
                 assert!((mean - expected).abs() < 4.0 * error, "{mean} +- {error}, expected {expected}, {region:?}");
                 assert!((mean * 1.5 - expected).abs() > 4.0 * error, "half as much again goes unnoticed");
             }
+        }
+    }
+
+    /// A target is as bright however much smaller than the scene it is: starts drawn through its disc carry twice its area's flux, those at the rim as well.
+    /// As rounding decided it, whether they lie in the disc, the mean was up to a hundred times as much, of a few that carried (R/r)^2 times theirs.
+    #[test]
+    fn the_rim_of_a_small_target_carries_no_more() {
+        for ratio in [10.0f32, 700.0, 7_000.0, 100_000.0] {
+            let area = PI;
+            let spheres = vec![(Vec3::new(0.3, -0.2, 0.5) * ratio, 1.0)];
+            let targets = Targets { spheres, choice: Cdf::new(std::iter::once(f64::from(area))), area };
+            let sky = Sky { center: Vec3::ZERO, radius: ratio, environment: None };
+            let whole = PI * ratio * ratio;
+            let region = Region::new(Vec3::new(-0.4, 0.2, 0.1) * ratio, 1.0, ratio);
+            let (mut mean, mut greatest) = (0.0f64, 0.0f32);
+            let n = 20_000u64;
+            for i in 0..n {
+                let draws = Stream::new(10, 0, Domain::Test, i).vertex(0);
+                let point = draws.two(Purpose::Lens);
+                let mut emission = EmissionSample {
+                    origin: Vec3::ZERO,
+                    direction: warp::sphere_uniform(draws.two(Purpose::Direction)),
+                    flux: Rgb::splat(whole),
+                    light: 0,
+                    delta: true,
+                    infinite: true,
+                    entry: Entry::Whole,
+                    density: EmissionDensity {
+                        direct: 1.0,
+                        start: 1.0,
+                        onward: 1.0 / whole,
+                        cos: 1.0,
+                        infinite: true,
+                        delta: true,
+                    },
+                };
+                let lit = EmissionSample { ..emission };
+                targets.through(&sky, &mut emission, 0, point);
+                mean += f64::from(emission.flux.x) / n as f64;
+                // Through the region's own disc, where the density is a third of a half of one over its area at least.
+                let mut lit = lit;
+                targets.aim_or_light(&sky, &mut lit, region, 0.0, point);
+                greatest = greatest.max(1.0 / targets.lit(&sky, &lit, region).0);
+            }
+            // 1 / (AIMED (1 / area + 1 / whole)).
+            let expected = f64::from(1.0 / (AIMED * (1.0 / area + 1.0 / whole)));
+            assert!((mean / expected - 1.0).abs() < 1e-4, "{ratio}: {mean}, expected {expected}");
+            assert!(greatest < 6.001 * PI, "{ratio}: {greatest}");
         }
     }
 }

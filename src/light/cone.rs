@@ -8,31 +8,41 @@ pub struct Cone {
     apex: Vec3,
     /// Unit vector from the apex.
     axis: Vec3,
-    /// Cosine of the angle between the axis and the side.
-    cos: f32,
+    /// Squared sine and cosine of the angle between the axis and the side.
+    sin2: f32,
+    cos2: f32,
 }
 
 impl Cone {
-    /// `None` for wider ones.
+    /// Of a half angle of which 1 - cos is told; `None` for wider ones.
     #[inline]
-    pub fn new(apex: Vec3, axis: Vec3, cos: f32) -> Option<Cone> {
-        (cos > 0.0).then_some(Cone { apex, axis, cos })
+    pub fn new(apex: Vec3, axis: Vec3, one_minus_cos: f32) -> Option<Cone> {
+        let (sin2, cos2) = (one_minus_cos * (2.0 - one_minus_cos), (1.0 - one_minus_cos) * (1.0 - one_minus_cos));
+        (one_minus_cos < 1.0).then_some(Cone { apex, axis, sin2, cos2 })
+    }
+
+    /// A vector along the axis, and what is left of it.
+    #[inline]
+    fn parts(&self, v: Vec3) -> (f32, Vec3) {
+        let along = v.dot(self.axis);
+        (along, v - self.axis * along)
     }
 
     fn holds(&self, p: Vec3) -> bool {
-        let from = p - self.apex;
-        from.dot(self.axis) >= self.cos * from.length()
+        let (height, off) = self.parts(p - self.apex);
+        height >= 0.0 && self.cos2 * off.length_squared() <= self.sin2 * height * height
     }
 
     /// Between which distances the ray from `origin` along the unit `direction` is within, no further than `distance`, which may be infinite.
     #[inline]
     pub fn within(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<[f32; 2]> {
-        // Where the ray meets the double cone: (f . axis)^2 = cos^2 f . f for f = from + t direction.
+        // Where the ray meets the double cone: sin^2 (f . axis)^2 = cos^2 |off|^2 for f = from + t direction, off what is left of it beside the axis.
+        // With sines, so that narrow cones keep their digits.
         let from = origin - self.apex;
-        let (along, height, cos2) = (direction.dot(self.axis), from.dot(self.axis), self.cos * self.cos);
-        let a = along * along - cos2;
-        let b = along * height - cos2 * direction.dot(from);
-        let c = height * height - cos2 * from.length_squared();
+        let ((along, aside), (height, off)) = (self.parts(direction), self.parts(from));
+        let a = self.sin2 * along * along - self.cos2 * aside.length_squared();
+        let b = self.sin2 * along * height - self.cos2 * aside.dot(off);
+        let c = self.sin2 * height * height - self.cos2 * off.length_squared();
         let root = (b * b - a * c).max(0.0).sqrt();
         // The form that cancels nothing; with a parallel to the side one of them is infinite or no number, and met nowhere.
         let q = -(b + root.copysign(b));
@@ -66,14 +76,15 @@ mod tests {
             let draws = |k| Stream::new(21, 0, Domain::Test, i).vertex(k);
             let direction = |k| warp::sphere_uniform(draws(k).two(Purpose::Direction));
             let u: Vec2 = draws(4).two(Purpose::Pixel);
-            let cone = Cone::new(direction(0) * 2.0, direction(1), u.x.max(0.01)).expect("a cone");
+            let cos = u.x.max(0.01);
+            let cone = Cone::new(direction(0) * 2.0, direction(1), 1.0 - cos).expect("a cone");
             let (origin, along) = (direction(2) * 4.0 * u.y, direction(3));
             let distance = if i % 7 == 0 { f32::INFINITY } else { 6.0 };
             let part = cone.within(origin, along, distance);
             for k in 1..60 {
                 let t = k as f32 * 0.1;
                 let from = origin + along * t - cone.apex;
-                let over = from.normalize().dot(cone.axis) - cone.cos;
+                let over = from.normalize().dot(cone.axis) - cos;
                 if over.abs() > 1e-3 {
                     let held = part.is_some_and(|[start, end]| (start..=end).contains(&t));
                     assert_eq!(held, over > 0.0, "{cone:?} {origin} {along} {t}: {part:?}");
@@ -87,7 +98,7 @@ mod tests {
     /// Along the axis, along the side and from the apex.
     #[test]
     fn parts_of_special_rays() {
-        let cone = Cone::new(Vec3::ZERO, Vec3::Z, 0.5f32.sqrt()).expect("a cone");
+        let cone = Cone::new(Vec3::ZERO, Vec3::Z, 1.0 - 0.5f32.sqrt()).expect("a cone");
         assert_eq!(cone.within(Vec3::Z * -1.0, Vec3::Z, 3.0), Some([1.0, 3.0]));
         assert_eq!(cone.within(Vec3::Z, -Vec3::Z, 3.0), Some([0.0, 1.0]));
         let side = Vec3::new(0.5f32.sqrt(), 0.0, 0.5f32.sqrt());
@@ -95,6 +106,6 @@ mod tests {
         assert!((part[0] - 0.25 * 2f32.sqrt()).abs() < 1e-3 && part[1] == f32::INFINITY, "{part:?}");
         assert_eq!(cone.within(Vec3::ZERO, Vec3::Z, 2.0), Some([0.0, 2.0]));
         assert_eq!(cone.within(Vec3::new(0.0, 0.0, -1.0), Vec3::X, 2.0), None);
-        assert!(Cone::new(Vec3::ZERO, Vec3::Z, -0.1).is_none());
+        assert!(Cone::new(Vec3::ZERO, Vec3::Z, 1.1).is_none());
     }
 }

@@ -43,10 +43,10 @@ pub enum Emitter {
         frame: Frame,
         /// Radiant intensity on the axis (W/sr).
         intensity: Rgb,
-        /// Cosine of the half angle of full intensity.
-        cos_inner: f32,
-        /// Cosine of the half angle of no intensity.
-        cos_outer: f32,
+        /// 1 - cos of the half angle of full intensity: a narrow one's cosine has no digits left.
+        inner: f32,
+        /// 1 - cos of the half angle of no intensity, which is greater.
+        outer: f32,
     },
     /// Light from a small cone of directions at infinity.
     Sun {
@@ -72,16 +72,24 @@ pub struct Sky {
     pub environment: Option<Environment>,
 }
 
-/// glTF's smooth edge of a spot: the square of a linear ramp in the cosine (KHR_lights_punctual's recommendation).
+/// glTF's smooth edge of a spot: the square of a linear ramp in the cosine (KHR_lights_punctual's recommendation), at an angle to the axis; of it and of
+/// the borders 1 - cos is told.
 #[inline]
-pub fn spot_falloff(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
-    if cos >= cos_inner {
+pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32) -> f32 {
+    if one_minus_cos <= inner {
         1.0
-    } else if cos <= cos_outer {
+    } else if one_minus_cos >= outer {
         0.0
     } else {
-        sqr((cos - cos_outer) / (cos_inner - cos_outer))
+        sqr((outer - one_minus_cos) / (outer - inner))
     }
+}
+
+/// Solid angle that a spot fills, what its edge dims counted in part.
+#[inline]
+pub fn spot_solid_angle(inner: f32, outer: f32) -> f32 {
+    // The mean of a ramp's square is a third.
+    TAU * (inner + (outer - inner) / 3.0)
 }
 
 impl Emitter {
@@ -94,9 +102,7 @@ impl Emitter {
                 luminance(*radiance) * area * PI * if *two_sided { 2.0 } else { 1.0 }
             }
             Emitter::Point { intensity, .. } => luminance(*intensity) * 2.0 * TAU,
-            Emitter::Spot { intensity, cos_inner, cos_outer, .. } => {
-                luminance(*intensity) * TAU * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0)
-            }
+            Emitter::Spot { intensity, inner, outer, .. } => luminance(*intensity) * spot_solid_angle(*inner, *outer),
             Emitter::Sun { irradiance, .. } => luminance(*irradiance) * disc,
             Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc,
         })

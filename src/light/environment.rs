@@ -101,10 +101,10 @@ impl ImageEnvironment {
     }
 
     fn sample(&self, u: Vec2) -> (Vec3, f32) {
-        let (y, pdf_y, rest_y) = self.rows.sample(u.x);
+        let (y, pdf_y, rest_y) = self.rows.sample(f64::from(u.x));
         // A row that can be chosen has columns.
         let Some(columns) = &self.columns[y] else { return (Vec3::Y, 0.0) };
-        let (x, pdf_x, rest_x) = columns.sample(u.y);
+        let (x, pdf_x, rest_x) = columns.sample(f64::from(u.y));
         let theta = PI * (y as f32 + rest_y) / self.height as f32;
         let phi = TAU * ((x as f32 + rest_x) / self.width as f32 - 0.5);
         let (sin_theta, cos_theta) = theta.sin_cos();

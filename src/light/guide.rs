@@ -8,11 +8,11 @@
 //!
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
-use super::lights::{EmissionSample, Lights};
+use super::lights::{EmissionSample, Entry, Lights};
 use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, spawn};
 use crate::material::Materials;
-use crate::math::{Frame, Vec2, Vec3, warp};
+use crate::math::{DVec2, Frame, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::PI;
 use std::ops::Range;
 
@@ -33,8 +33,8 @@ pub const UNGUIDED: usize = 0;
 struct Lamp {
     emitters: Range<usize>,
     /// Probability of choosing one of them by power, and where in the choice they begin.
-    probability: f32,
-    below: f32,
+    probability: f64,
+    below: f64,
     /// Probability of the lamp's own cell, of paths to anywhere, over `probability`.
     own: f32,
     /// Targets and the probability of their cells over `probability`.
@@ -100,12 +100,12 @@ impl Guide {
         if cells.len() == 1 {
             return None;
         }
-        let power: f32 = lamps.iter().map(|lamp| lamp.probability).sum();
+        let power: f64 = lamps.iter().map(|lamp| lamp.probability).sum();
         // Half of it for caustics, where there is both.
         let half = if own && targets > 0 { 0.5 } else { 1.0 };
         let each = |&(lamp, target): &(usize, Option<usize>)| {
-            let alike = if target.is_some() { targets as f32 } else { 1.0 };
-            f64::from(half * lamps[lamp].probability / (power * alike))
+            let alike = if target.is_some() { targets as f64 } else { 1.0 };
+            half * lamps[lamp].probability / (power * alike)
         };
         let prior: Vec<f64> = std::iter::once(0.0).chain(cells[1..].iter().map(each)).collect();
         let weights = prior.iter().enumerate().map(|(cell, p)| if cell == UNGUIDED { 0.5 } else { 0.5 * p });
@@ -170,9 +170,10 @@ impl Guide {
             let probability = self.choice.pdf(cell);
             if probability > 0.0 {
                 let lamp = &mut self.lamps[lamp];
+                let weight = (f64::from(probability) / lamp.probability) as f32;
                 match target {
-                    Some(target) => lamp.targets.push((target, probability / lamp.probability)),
-                    None => lamp.own = probability / lamp.probability,
+                    Some(target) => lamp.targets.push((target, weight)),
+                    None => lamp.own = weight,
                 }
             }
         }
@@ -186,7 +187,7 @@ impl Guide {
         shapes: &Shapes,
         materials: &Materials,
         region: Option<Region>,
-        (choice, point, direction): (Vec2, Vec2, Vec2),
+        (choice, point, direction): (DVec2, Vec2, Vec2),
     ) -> Option<Guided> {
         let (cell, _, rest) = self.choice.sample(choice.y);
         let (lamp, target) = self.cells[cell];
@@ -206,7 +207,13 @@ impl Guide {
         let untargeted = self.unguided() + lamp.map_or(0.0, |lamp| lamp.own);
         let mut mixed = untargeted * anywhere;
         for &(other, weight) in lamp.iter().flat_map(|lamp| &lamp.targets) {
-            mixed += weight * Self::density(lights, &emission, other, target == Some(other));
+            mixed += weight
+                * Self::density(
+                    lights,
+                    &emission,
+                    other,
+                    target == Some(other) || emission.entry == Entry::Target(other),
+                );
         }
         let plain = lights.plain(&emission);
         let (emission, ratio) = emission.drawn_with(mixed)?;
@@ -251,10 +258,9 @@ impl Guide {
         match cone(emission.origin, center, radius) {
             // From within a target nothing is turned.
             None => emission.density.onward,
-            Some((axis, one_minus_cos)) => {
-                // 1 - cos from the chord: exact for narrow cones.
-                let within = 0.5 * (d - axis).length_squared() < one_minus_cos;
-                if inside || within { warp::cone_uniform_pdf_w(one_minus_cos) } else { 0.0 }
+            Some((axis, size)) => {
+                let within = one_minus_cos(d, axis) < size;
+                if inside || within { warp::cone_uniform_pdf_w(size) } else { 0.0 }
             }
         }
     }

@@ -4,11 +4,11 @@ use super::Region;
 use super::aim::Targets;
 use super::cdf::Cdf;
 use super::cone::Cone;
-use super::emitter::{Emitter, Sky, spot_falloff};
+use super::emitter::{Emitter, Sky, spot_falloff, spot_solid_angle};
 use super::receiver::{Choice, Receiver};
 use crate::geometry::{Shapes, Surface, spawn};
 use crate::material::{Alpha, Materials};
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::ops::Range;
 
@@ -63,6 +63,18 @@ impl EmissionDensity {
     }
 }
 
+/// The disc that a light path from infinity was drawn through. Its density counts that disc, whatever rounding says of the start: on a scene's scale
+/// the rim of a small disc is not sharp, and a start that were taken for one from outside would carry as much more as the scene's disc is larger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry {
+    /// The scene's.
+    Whole,
+    /// A target's.
+    Target(usize),
+    /// One around a region, of this radius.
+    Region(f32),
+}
+
 /// The start of a light path.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {
@@ -78,6 +90,8 @@ pub struct EmissionSample {
     pub delta: bool,
     /// The light is at infinity.
     pub infinite: bool,
+    /// Where it enters the scene, if it is at infinity.
+    pub entry: Entry,
     /// Densities of the start.
     pub density: EmissionDensity,
 }
@@ -221,7 +235,7 @@ impl Lights {
     }
 
     /// The emitters of every lamp, the triangles of an instance or a light alone, and the probability of choosing one of them.
-    pub(super) fn lamps(&self) -> impl Iterator<Item = (Range<usize>, f32)> {
+    pub(super) fn lamps(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
         let same = |a: &Emitter, b: &Emitter| match (a, b) {
             (Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }) => a == b,
             _ => false,
@@ -248,9 +262,9 @@ impl Lights {
                 (cos >= LEAST_COSINE).then(|| (Self::lambertian(cos, *two_sided), cos))
             }
             Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
-            Emitter::Spot { frame, cos_inner, cos_outer, .. } => {
-                let falloff = spot_falloff(frame.n.dot(d), *cos_inner, *cos_outer);
-                (falloff > 0.0).then(|| (falloff * Self::spot_pdf_w(*cos_inner, *cos_outer), 1.0))
+            Emitter::Spot { frame, inner, outer, .. } => {
+                let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer);
+                (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer), 1.0))
             }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
@@ -263,7 +277,7 @@ impl Lights {
         shapes: &Shapes,
         materials: &Materials,
         receiver: &Receiver,
-        choice: f32,
+        choice: f64,
         u: Vec2,
     ) -> Option<DirectSample> {
         let (index, probability) = self.choice.as_ref()?.sample(receiver, choice)?;
@@ -312,15 +326,15 @@ impl Lights {
                 let arrival_pdf_a = 0.5 / TAU / to.length_squared();
                 Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
-            Emitter::Spot { p: at, frame, intensity, cos_inner, cos_outer } => {
+            Emitter::Spot { p: at, frame, intensity, inner, outer } => {
                 let to = *at - p;
                 let wi = to.try_normalize()?;
-                let falloff = spot_falloff(-frame.n.dot(wi), *cos_inner, *cos_outer);
+                let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer);
                 if falloff == 0.0 {
                     return None;
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
-                let arrival_pdf_a = falloff * Self::spot_pdf_w(*cos_inner, *cos_outer) / to.length_squared();
+                let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer) * to.length_squared());
                 Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
             Emitter::Sun { frame, irradiance, one_minus_cos } => {
@@ -354,7 +368,7 @@ impl Lights {
     /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers, and the cone that the light stays in. `None` for
     /// light from infinity.
     #[inline]
-    pub fn point(&self, choice: f32, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
+    pub fn point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
         match &self.emitters[index] {
             Emitter::Triangle { corners, .. } => {
@@ -362,7 +376,7 @@ impl Lights {
                 Some((corners[0] + corners[1] * b.x + corners[2] * b.y, None))
             }
             Emitter::Point { p, .. } => Some((*p, None)),
-            Emitter::Spot { p, frame, cos_outer, .. } => Some((*p, Cone::new(*p, frame.n, *cos_outer))),
+            Emitter::Spot { p, frame, outer, .. } => Some((*p, Cone::new(*p, frame.n, *outer))),
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -381,12 +395,6 @@ impl Lights {
     #[inline]
     fn lambertian(cos: f32, two_sided: bool) -> f32 {
         cos * FRAC_1_PI * if two_sided { 0.5 } else { 1.0 }
-    }
-
-    /// Density per solid angle of emission from a spot along its axis.
-    #[inline]
-    fn spot_pdf_w(cos_inner: f32, cos_outer: f32) -> f32 {
-        1.0 / (TAU * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0))
     }
 
     /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p` towards the light, `wi`.
@@ -439,11 +447,11 @@ impl Lights {
             met(environment.radiance(d), index, environment.pdf_w(d));
         }
         for &index in &self.suns {
-            if let Emitter::Sun { frame, irradiance, one_minus_cos } = &self.emitters[index as usize] {
-                // 1 - cos from the chord: exact for narrow cones, where the cosine itself has no digits left.
-                if 0.5 * (d - frame.n).length_squared() < *one_minus_cos {
-                    let pdf = warp::cone_uniform_pdf_w(*one_minus_cos);
-                    met(Emitter::sun_radiance(*irradiance, *one_minus_cos), index, pdf);
+            if let Emitter::Sun { frame, irradiance, one_minus_cos: size } = &self.emitters[index as usize] {
+                let size = *size;
+                if one_minus_cos(d, frame.n) < size {
+                    let pdf = warp::cone_uniform_pdf_w(size);
+                    met(Emitter::sun_radiance(*irradiance, size), index, pdf);
                 }
             }
         }
@@ -455,7 +463,7 @@ impl Lights {
         &self,
         shapes: &Shapes,
         materials: &Materials,
-        choice: f32,
+        choice: f64,
         point: Vec2,
         direction: Vec2,
     ) -> Option<EmissionSample> {
@@ -481,20 +489,18 @@ impl Lights {
             Emitter::Point { p, intensity } => {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])
             }
-            Emitter::Spot { p, frame, intensity, cos_inner, cos_outer } => {
+            Emitter::Spot { p, frame, intensity, inner, outer } => {
                 // Full cone and penumbra are chosen by their flux; inside the penumbra the ramp's square is inverted, so every
                 // path carries the same flux.
-                let inner = 1.0 - cos_inner;
-                let edge = (cos_inner - cos_outer) / 3.0;
+                let edge = (outer - inner) / 3.0;
                 let x = direction.x * (inner + edge);
-                let cos =
-                    if x < inner { 1.0 - x } else { cos_outer + (cos_inner - cos_outer) * ((x - inner) / edge).cbrt() };
-                let sin = (1.0 - cos * cos).max(0.0).sqrt();
+                let h = if x < *inner { x } else { outer - (outer - inner) * ((x - inner) / edge).cbrt() };
+                let sin = (h * (2.0 - h)).max(0.0).sqrt();
                 let (s, c) = (TAU * direction.y).sin_cos();
-                let pdf_w = Self::spot_pdf_w(*cos_inner, *cos_outer);
-                let falloff = spot_falloff(cos, *cos_inner, *cos_outer);
-                let d = frame.to_world(Vec3::new(sin * c, sin * s, cos));
-                (*p, d, *intensity / pdf_w, [1.0, falloff * pdf_w, 1.0])
+                let filled = spot_solid_angle(*inner, *outer);
+                let falloff = spot_falloff(h, *inner, *outer);
+                let d = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
+                (*p, d, *intensity * filled, [1.0, falloff / filled, 1.0])
             }
             Emitter::Sun { frame, irradiance, one_minus_cos } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
@@ -527,6 +533,7 @@ impl Lights {
             light: index as u32,
             delta,
             infinite,
+            entry: Entry::Whole,
             density,
         })
     }

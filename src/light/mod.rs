@@ -17,6 +17,6 @@ pub use cone::Cone;
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;
-pub use lights::{DirectSample, EmissionDensity, EmissionSample, Lights};
+pub use lights::{DirectSample, EmissionDensity, EmissionSample, Entry, Lights};
 pub use receiver::Receiver;
 pub use region::Region;

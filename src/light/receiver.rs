@@ -7,7 +7,7 @@ use crate::math::{Vec3, luminance};
 use std::f32::consts::PI;
 
 /// Share of the choices that go by power wherever the light is received: what a near lamp behind a wall takes from the others has this bound.
-const BY_POWER: f32 = 0.1;
+const BY_POWER: f64 = 0.1;
 /// Least share of the other choices for lights at infinity, and for all others, where there are both.
 const LEAST_SHARE: f32 = 0.0625;
 
@@ -29,6 +29,12 @@ impl Receiver {
     pub fn anywhere(p: Vec3) -> Receiver {
         Receiver { p, n: Vec3::ZERO, in_medium: false }
     }
+}
+
+/// Probability of a choice that goes by power or by what arrives.
+#[inline]
+fn mixed(by_power: f32, near: f32) -> f32 {
+    BY_POWER as f32 * by_power + (1.0 - BY_POWER as f32) * near
 }
 
 /// Which light is asked for light.
@@ -68,18 +74,18 @@ impl Choice {
 
     /// A light and its probability.
     #[inline]
-    pub fn sample(&self, at: &Receiver, u: f32) -> Option<(usize, f32)> {
+    pub fn sample(&self, at: &Receiver, u: f64) -> Option<(usize, f32)> {
         let Some(near) = self.near.as_ref().filter(|_| !at.in_medium) else {
             let (index, pdf, _) = self.power.sample(u);
             return Some((index, pdf));
         };
         if u < BY_POWER {
             let (index, pdf, _) = self.power.sample(u / BY_POWER);
-            return Some((index, BY_POWER * pdf + (1.0 - BY_POWER) * near.pdf(at, index)));
+            return Some((index, mixed(pdf, near.pdf(at, index))));
         }
-        let u = ((u - BY_POWER) / (1.0 - BY_POWER)).min(1.0f32.next_down());
+        let u = ((u - BY_POWER) / (1.0 - BY_POWER)).min(1.0f64.next_down());
         let (index, pdf) = near.sample(at, u)?;
-        Some((index, BY_POWER * self.power.pdf(index) + (1.0 - BY_POWER) * pdf))
+        Some((index, mixed(self.power.pdf(index), pdf)))
     }
 
     /// Probability of choosing a light.
@@ -87,7 +93,7 @@ impl Choice {
     pub fn pdf(&self, at: &Receiver, index: usize) -> f32 {
         let power = self.power.pdf(index);
         match &self.near {
-            Some(near) if !at.in_medium => BY_POWER * power + (1.0 - BY_POWER) * near.pdf(at, index),
+            Some(near) if !at.in_medium => mixed(power, near.pdf(at, index)),
             _ => power,
         }
     }
@@ -111,15 +117,16 @@ impl Near {
     }
 
     #[inline]
-    fn sample(&self, at: &Receiver, u: f32) -> Option<(usize, f32)> {
+    fn sample(&self, at: &Receiver, u: f64) -> Option<(usize, f32)> {
         let share = self.share(at);
+        let split = f64::from(share);
         match &self.infinite {
-            Some(infinite) if u < share => {
-                let (index, pdf, _) = infinite.sample(u / share);
+            Some(infinite) if u < split => {
+                let (index, pdf, _) = infinite.sample(u / split);
                 Some((index, share * pdf))
             }
             _ => {
-                let rest = ((u - share) / (1.0 - share)).min(1.0f32.next_down());
+                let rest = ((u - split) / (1.0 - split)).min(1.0f64.next_down());
                 let (index, pdf) = self.tree.sample(at, rest)?;
                 Some((index, (1.0 - share) * pdf))
             }

@@ -47,14 +47,16 @@ impl Region {
         self.radius * (disc + 1.0).exp2()
     }
 
-    /// Density per area, in the mixture of discs, at a squared distance from the centre.
+    /// Density per area, in the mixture of discs, at a squared distance from the centre, of a line that was `drawn` through the disc of that radius: it is
+    /// within, whatever rounding says. 0 where it was drawn otherwise.
     #[inline]
-    pub(super) fn density(&self, distance2: f32) -> f32 {
+    pub(super) fn density(&self, distance2: f32, drawn: f32) -> f32 {
+        let drawn2 = drawn * drawn;
         let mut radius2 = self.radius * self.radius;
         let mut share = self.inner();
         let mut density = 0.0;
         for _ in 0..=self.wider {
-            if distance2 < radius2 {
+            if distance2 < radius2 || (drawn2 > 0.0 && drawn2 <= radius2) {
                 density += share / (PI * radius2);
             }
             share = (1.0 - INNER) / self.wider as f32;

@@ -170,9 +170,9 @@ impl LightTree {
 
     /// One of the lights of a node by power, and its probability.
     #[inline]
-    fn by_power(&self, node: &Node, u: f32) -> (u32, f32) {
+    fn by_power(&self, node: &Node, u: f64) -> (u32, f32) {
         let (start, end) = (node.first as usize, (node.first + node.count) as usize);
-        let target = self.below[start] + f64::from(u) * (self.below[end] - self.below[start]);
+        let target = self.below[start] + u * (self.below[end] - self.below[start]);
         let k = start + self.below[start + 1..end].partition_point(|&below| below <= target);
         (self.order[k], self.share(k, node))
     }
@@ -185,7 +185,7 @@ impl LightTree {
 
     /// An emitter and its probability; `None` where none shines.
     #[inline]
-    pub fn sample(&self, at: &Receiver, mut u: f32) -> Option<(usize, f32)> {
+    pub fn sample(&self, at: &Receiver, mut u: f64) -> Option<(usize, f32)> {
         let (mut node, mut pdf) = (&self.nodes[0], 1.0);
         while node.children != 0 && !node.is_compact(at) {
             let [a, b] = self.children(node.children);
@@ -195,16 +195,17 @@ impl LightTree {
                 return None;
             }
             let share = first / sum;
-            if u < share {
-                u /= share;
+            let split = f64::from(share);
+            if u < split {
+                u /= split;
                 pdf *= share;
                 node = a;
             } else {
-                u = (u - share) / (1.0 - share);
+                u = (u - split) / (1.0 - split);
                 pdf *= second / sum;
                 node = b;
             }
-            u = u.min(1.0f32.next_down());
+            u = u.min(1.0f64.next_down());
         }
         let (emitter, share) =
             if node.children == 0 { (self.order[node.first as usize], 1.0) } else { self.by_power(node, u) };
@@ -266,8 +267,8 @@ mod tests {
                     p,
                     frame: crate::math::Frame::from_normal(axis),
                     intensity: radiance,
-                    cos_inner: 0.9,
-                    cos_outer: 0.7 - draws(3).one(Purpose::Lobe),
+                    inner: 0.1,
+                    outer: 0.3 + draws(3).one(Purpose::Lobe),
                 },
                 _ => {
                     let corners = [p, vector(4) - 0.5, vector(5) - 0.5];
@@ -293,7 +294,7 @@ mod tests {
     fn shines(emitter: &Emitter, p: Vec3) -> bool {
         match emitter {
             Emitter::Triangle { two_sided, plane, .. } => *two_sided || plane.truncate().dot(p) - plane.w > 1e-4,
-            Emitter::Spot { p: at, frame, cos_outer, .. } => frame.n.dot((p - at).normalize()) > cos_outer + 1e-4,
+            Emitter::Spot { p: at, frame, outer, .. } => frame.n.dot((p - at).normalize()) > 1.0 - outer + 1e-4,
             _ => true,
         }
     }
@@ -312,7 +313,7 @@ mod tests {
             let (mut count, mut none) = (vec![0u32; emitters.len()], 0);
             for k in 0..n {
                 // A cluster may promise light that neither half has.
-                let Some((index, pdf)) = tree.sample(&at, (k as f32 + 0.5) / n as f32) else {
+                let Some((index, pdf)) = tree.sample(&at, (f64::from(k) + 0.5) / f64::from(n)) else {
                     none += 1;
                     continue;
                 };

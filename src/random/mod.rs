@@ -108,6 +108,12 @@ fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// The same of 32 bits.
+#[inline]
+fn fine(bits: u32) -> f64 {
+    f64::from(bits) * (1.0 / 4_294_967_296.0)
+}
+
 /// Number of groups into which the passes of a render fall. Every group has sequences of its own, so means over
 /// groups are independent, though the passes of a group are not. As few as still tell a variance: the fewer, the
 /// longer the sequences.
@@ -228,6 +234,13 @@ impl Draws {
         } else {
             unit((self.bits(purpose) >> 32) as u32)
         }
+    }
+
+    /// The number of [`Draws::one`] with all of its 32 bits: to choose among more than 2^24.
+    #[inline]
+    pub fn one_fine(self, purpose: Purpose) -> f64 {
+        let hash = || (self.bits(purpose) >> 32) as u32;
+        fine(if self.in_sequence { self.pair(purpose).first_bits(self.reversed) } else { hash() })
     }
 
     /// Uniform on `[0, 1)^2`.

@@ -9,7 +9,7 @@
 //! them cancel.
 
 use super::mix;
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 
 /// Laine-Karras style hash: a random binary-tree permutation when applied to bit-reversed integers
 /// (constants by Vegdahl 2021, which pass more tests than the original ones).
@@ -72,13 +72,27 @@ impl SobolPair {
     pub(super) fn point_reversed(&self, reversed: u32) -> Vec2 {
         let index = self.shuffled(reversed);
         let y = tree_hash(sobol_second(index), self.scramble[1]).reverse_bits();
-        Vec2::new(self.first_of(index), super::unit(y))
+        Vec2::new(super::unit(self.bits_of(index)), super::unit(y))
     }
 
     /// Its first coordinate.
     #[inline]
     pub(super) fn first_reversed(&self, reversed: u32) -> f32 {
-        self.first_of(self.shuffled(reversed))
+        super::unit(self.first_bits(reversed))
+    }
+
+    /// The same with all of its 32 bits.
+    #[inline]
+    pub(super) fn first_bits(&self, reversed: u32) -> u32 {
+        self.bits_of(self.shuffled(reversed))
+    }
+
+    /// Point `index` as [`SobolPair::point`] gives it, with all of the 32 bits of either coordinate.
+    #[inline]
+    pub fn fine(&self, index: u32) -> DVec2 {
+        let index = self.shuffled(index.reverse_bits());
+        let y = tree_hash(sobol_second(index), self.scramble[1]).reverse_bits();
+        DVec2::new(super::fine(self.bits_of(index)), super::fine(y))
     }
 
     #[inline]
@@ -88,8 +102,8 @@ impl SobolPair {
 
     /// The first dimension is the radical inverse: bits least significant first, it is the index itself.
     #[inline]
-    fn first_of(&self, index: u32) -> f32 {
-        super::unit(tree_hash(index, self.scramble[0]).reverse_bits())
+    fn bits_of(&self, index: u32) -> u32 {
+        tree_hash(index, self.scramble[0]).reverse_bits()
     }
 }
 

@@ -75,7 +75,7 @@ pub(super) struct Cost {
 impl Cost {
     /// Counts what paths of a view meet; light paths are guided if there is a guide.
     pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
-        let surroundings = Surroundings::new(scene, camera.position());
+        let surroundings = Surroundings::of(scene, camera);
         let Settings { max_depth, seed, classes, .. } = *settings;
         let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons, classes };
         let reach = |length: f32| match settings.initial {

@@ -31,7 +31,7 @@ impl<'a> Stage<'a> {
         if !settings.method.has_levels() {
             settings.levels = Levels::new(1);
         }
-        Stage { scene, camera, settings, surroundings: Surroundings::new(scene, camera.position()) }
+        Stage { scene, camera, settings, surroundings: Surroundings::of(scene, camera) }
     }
 
     /// The settings of the render.

@@ -1,7 +1,7 @@
 //! From a description to a scene: places and bakes meshes, makes lights, commits to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
-use super::{Contacts, Scene, Survey};
+use super::{Contacts, Nestings, Scene, Survey};
 use crate::error::{Error, Kind, Result};
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
@@ -108,6 +108,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         scattering,
         survey,
         contacts,
+        nestings: Nestings::default(),
         warnings,
     })
 }
@@ -147,6 +148,7 @@ pub(super) fn dress(
         scattering: scene.scattering.again(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
         contacts: Contacts::new(&shapes, &materials),
+        nestings: Nestings::default(),
         warnings: Vec::new(),
         shapes,
         materials,
@@ -263,14 +265,17 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
     let p = (light.to_world.translation - origin).as_vec3();
     match light.kind {
         PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
-        PunctualKind::Spot { inner, outer } => Emitter::Spot {
-            p,
-            frame: Frame::from_normal(axis(light)),
-            intensity: light.intensity,
-            cos_inner: inner.cos(),
-            // Strictly below the inner cosine, so that the ramp has a width.
-            cos_outer: outer.cos().min(inner.cos() - 1e-6),
-        },
+        PunctualKind::Spot { inner, outer } => {
+            let [inner, outer] = [inner, outer].map(|angle| 2.0 * (0.5 * f64::from(angle)).sin().powi(2));
+            Emitter::Spot {
+                p,
+                frame: Frame::from_normal(axis(light)),
+                intensity: light.intensity,
+                inner: inner as f32,
+                // Greater than the inner one, so that the ramp has a width.
+                outer: outer.max(inner * (1.0 + 1e-6)) as f32,
+            }
+        }
         PunctualKind::Sun { angle } => {
             let half = 0.5 * f64::from(angle);
             Emitter::Sun {

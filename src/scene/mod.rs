@@ -5,11 +5,13 @@ mod contacts;
 pub mod description;
 pub mod environment_file;
 pub mod gltf;
+mod nesting;
 mod survey;
 mod view;
 
 pub use contacts::Contacts;
 pub use description::Description;
+pub use nesting::{Nestings, OPEN, Stack};
 pub use survey::Survey;
 pub use view::{MAX_SIZE, View};
 
@@ -57,6 +59,8 @@ pub struct Scene {
     pub survey: Survey,
     /// Triangles that others may lie on.
     pub contacts: Contacts,
+    /// Deep stacks of solids that paths have been in.
+    pub nestings: Nestings,
     /// Whatever was ignored or approximated, from the reader and from building.
     pub warnings: Vec<String>,
 }

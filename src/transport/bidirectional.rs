@@ -6,9 +6,9 @@
 
 use super::contact::Place;
 use super::eye::Eye;
-use super::interior::Surroundings;
 use super::mis::{Eta, MisState, Ratios};
 use super::shares::leads;
+use super::surroundings::Surroundings;
 use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};

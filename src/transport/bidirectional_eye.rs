@@ -112,7 +112,7 @@ impl<R: Record> EyeWalk<'_, R> {
         if !wanted(vertex, seen.0, seen.1, classes) {
             return;
         }
-        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) =
             scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
         else {

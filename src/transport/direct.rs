@@ -47,7 +47,7 @@ pub fn direct_light(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: 
 #[inline]
 pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) -> Rgb {
     let draws = vertex.draws();
-    let choice = draws.one(Purpose::LightChoice);
+    let choice = draws.one_fine(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
     let Some(sample) = scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
     else {

@@ -18,11 +18,11 @@ use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
-use super::interior::Interior;
 use super::segment::{Known, token};
 use super::shares::leads;
 use super::site::MediumVertex;
 use super::site::Site;
+use super::surroundings::Around;
 use super::volume::Volume;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
@@ -468,7 +468,7 @@ pub struct Eye<'a> {
     /// The camera.
     pub camera: &'a Camera,
     /// The solids around the camera.
-    pub interior: Interior,
+    pub interior: Around,
     /// Longest path in segments.
     pub max_depth: u32,
     /// Who brings indirect light where photons are gathered.
@@ -488,7 +488,7 @@ impl Eye<'_> {
             origin: ray.origin,
             direction: ray.direction,
             throughput: Rgb::ONE,
-            interior: self.interior,
+            interior: self.interior.at(self.scene, ray.origin),
             first: Known::Unknown,
             far: false,
             channel: None,

@@ -86,7 +86,7 @@ impl<V> Split<'_, V> {
     /// The way as seen from the point of a light to which next-event estimation goes, if that is near or shines on little of it.
     #[inline]
     fn lamp(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
-        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let (lamp, cone) = self.scene.lights.point(choice, point)?;
         let lit = match cone {
             Some(cone) => cone.within(span.origin, span.direction, span.distance)?,

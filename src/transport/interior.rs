@@ -9,21 +9,36 @@
 use super::contact::Along;
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
-use crate::scene::Scene;
+use crate::scene::{OPEN, Scene, Stack};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 
-/// Most solids a path can be inside of at once; further ones are entered as if they replaced the innermost.
-const MAX_NESTED: usize = 6;
+/// Solids that a path keeps with it, the last ones entered; of those before them it keeps one number.
+const INNERMOST: usize = 5;
 
 /// Surfaces looked at to find where a path starts; a scene with more along one ray has walls enough around the point.
-const MAX_SURROUNDING_HITS: u32 = 1000;
+const MAX_SURROUNDING_HITS: u32 = 1 << 16;
 
 /// The solids a path is inside of, in order of entry: each by the instance through whose surface it was entered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Interior {
-    inside: [u32; MAX_NESTED],
+    inside: [u32; INNERMOST],
     len: u8,
+    /// Those entered before: a stack of the scene's [`crate::scene::Nestings`], or [`OPEN`]; where there are some, `inside` is full.
+    outer: u32,
+}
+
+impl PartialEq for Interior {
+    fn eq(&self, other: &Interior) -> bool {
+        self.entries() == other.entries() && self.outer == other.outer
+    }
+}
+
+impl Default for Interior {
+    /// The open space.
+    fn default() -> Interior {
+        Interior { inside: [0; INNERMOST], len: 0, outer: OPEN }
+    }
 }
 
 /// What is on the two sides of a solid's surface.
@@ -42,6 +57,65 @@ impl Interior {
         &self.inside[..usize::from(self.len)]
     }
 
+    /// Enters a solid.
+    #[inline]
+    fn push(&mut self, scene: &Scene, instance: u32) {
+        if usize::from(self.len) == INNERMOST && !self.make_room(scene) {
+            // As if it replaced the last.
+            self.len -= 1;
+        }
+        self.inside[usize::from(self.len)] = instance;
+        self.len += 1;
+    }
+
+    /// Moves the first of those it has with it to the others.
+    #[cold]
+    #[inline(never)]
+    fn make_room(&mut self, scene: &Scene) -> bool {
+        let Some(outer) = pushed(scene, self.outer, self.inside[0]) else { return false };
+        self.outer = outer;
+        self.inside.copy_within(1.., 0);
+        self.len -= 1;
+        true
+    }
+
+    /// Leaves the solid of the same object that was entered last; whether there is one.
+    #[inline]
+    fn remove(&mut self, scene: &Scene, instance: u32) -> bool {
+        let object_of = |instance: u32| scene.shapes.instances[instance as usize].object;
+        if let Some(at) = self.entries().iter().rposition(|&entry| object_of(entry) == object_of(instance)) {
+            self.inside.copy_within(at + 1.., at);
+            self.len -= 1;
+            self.fill(scene);
+            return true;
+        }
+        if self.outer == OPEN {
+            return false;
+        }
+        let left = without(scene, self.outer, object_of(instance));
+        self.outer = left.unwrap_or(self.outer);
+        left.is_some()
+    }
+
+    /// Takes one of the others back where there is room.
+    #[inline]
+    fn fill(&mut self, scene: &Scene) {
+        if self.outer != OPEN {
+            let Stack { outer, last, .. } = scene.nestings.get(self.outer);
+            self.inside.copy_within(..INNERMOST - 1, 1);
+            (self.inside[0], self.outer) = (last, outer);
+            self.len += 1;
+        }
+    }
+
+    /// Takes away the last.
+    fn pop(&mut self, scene: &Scene) -> Option<u32> {
+        let last = self.entries().last().copied()?;
+        self.len -= 1;
+        self.fill(scene);
+        Some(last)
+    }
+
     /// The solids around `p`: those that a ray from it leaves without having entered. Where paths start.
     pub fn at(scene: &Scene, p: Vec3) -> Interior {
         let mut interior = Interior::default();
@@ -51,27 +125,22 @@ impl Interior {
         // No axis, so that it grazes no wall of a box.
         let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
         let mut along = Along::new(Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, None);
-        let mut entered: Vec<u32> = Vec::new();
-        let mut left: Vec<u32> = Vec::new();
+        let (mut entered, mut left) = (Interior::default(), Interior::default());
         for _ in 0..MAX_SURROUNDING_HITS {
             let Some((surface, _)) = along.next(scene) else { break };
             along.pass(&surface);
             if !scene.materials.list[surface.material as usize].is_solid_glass() {
                 continue;
             }
-            let object = scene.shapes.instances[surface.instance as usize].object;
             if direction.dot(surface.ng) < 0.0 {
-                entered.push(object);
-            } else if let Some(at) = entered.iter().position(|&o| o == object) {
-                entered.swap_remove(at);
-            } else {
-                left.push(surface.instance);
+                entered.push(scene, surface.instance);
+            } else if !entered.remove(scene, surface.instance) {
+                left.push(scene, surface.instance);
             }
         }
         // What is left last was entered first.
-        for &entry in left.iter().rev().take(MAX_NESTED) {
-            interior.inside[usize::from(interior.len)] = entry;
-            interior.len += 1;
+        while let Some(instance) = left.pop(scene) {
+            interior.push(scene, instance);
         }
         interior
     }
@@ -79,18 +148,15 @@ impl Interior {
     /// Material that fills the space here; `None` is the open space.
     #[inline]
     pub fn material(&self, scene: &Scene) -> Option<u32> {
-        let material = |instance: &u32| scene.shapes.instances[*instance as usize].material;
-        // `max_by_key` keeps the last of equals: the one entered last.
-        self.entries().iter().map(material).max_by_key(|&m| scene.materials.list[m as usize].priority)
+        self.host(scene).map(|instance| scene.shapes.instances[instance as usize].material)
     }
 
     /// The instance whose material fills the space here; `None` is the open space.
     #[inline]
     pub fn host(&self, scene: &Scene) -> Option<u32> {
-        let priority = |&&instance: &&u32| {
-            scene.materials.list[scene.shapes.instances[instance as usize].material as usize].priority
-        };
-        self.entries().iter().max_by_key(priority).copied()
+        // `max_by_key` keeps the last of equals: the one entered last.
+        let inner = self.entries().iter().copied().max_by_key(|&instance| priority(scene, instance));
+        if self.outer == OPEN { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
     }
 
     /// Absorption and scattering here.
@@ -111,21 +177,46 @@ impl Interior {
     /// What crossing the surface of `instance` means; `entering`: from its front to its back.
     #[inline]
     pub fn crossing(&self, scene: &Scene, instance: u32, entering: bool) -> Crossing {
-        let object_of = |instance: u32| scene.shapes.instances[instance as usize].object;
         let mut interior = *self;
         let mut before = self.material(scene);
         if entering {
-            let at = usize::from(interior.len).min(MAX_NESTED - 1);
-            interior.inside[at] = instance;
-            interior.len = at as u8 + 1;
-        } else if let Some(at) = self.entries().iter().rposition(|&e| object_of(e) == object_of(instance)) {
-            interior.inside.copy_within(at + 1.., at);
-            interior.len -= 1;
-        } else {
+            interior.push(scene, instance);
+        } else if !interior.remove(scene, instance) {
             before = Some(scene.shapes.instances[instance as usize].material);
         }
         Crossing { before, after: interior.material(scene), interior }
     }
+}
+
+#[inline]
+fn priority(scene: &Scene, instance: u32) -> i32 {
+    scene.materials.list[scene.shapes.instances[instance as usize].material as usize].priority
+}
+
+/// Which fills the space: the host of a stack or `inner`, which was entered later.
+fn stronger(scene: &Scene, stack: u32, inner: u32) -> u32 {
+    if stack == OPEN {
+        return inner;
+    }
+    let outer = scene.nestings.get(stack).host;
+    if priority(scene, outer) > priority(scene, inner) { outer } else { inner }
+}
+
+/// A stack with one more solid.
+fn pushed(scene: &Scene, outer: u32, last: u32) -> Option<u32> {
+    scene.nestings.push(Stack { outer, last, host: stronger(scene, outer, last) })
+}
+
+/// A stack without the last solid of an object; `None` where it has none.
+fn without(scene: &Scene, stack: u32, object: u32) -> Option<u32> {
+    if stack == OPEN {
+        return None;
+    }
+    let Stack { outer, last, .. } = scene.nestings.get(stack);
+    if scene.shapes.instances[last as usize].object == object {
+        return Some(outer);
+    }
+    pushed(scene, without(scene, outer, object)?, last)
 }
 
 /// Index of refraction of a material that fills space; 1 in the open.
@@ -160,34 +251,5 @@ impl Crossing {
         };
         let (before, after) = (ior(self.before), ior(self.after));
         if entering { after / before } else { before / after }
-    }
-}
-
-/// Where the paths of a render start: the solids around the camera and around each light.
-pub struct Surroundings {
-    /// Around the camera.
-    pub eye: Interior,
-    /// Around the lights, by index; empty when the scene has no solids.
-    lights: Vec<Interior>,
-}
-
-impl Surroundings {
-    /// Looks around the camera and one point of every light.
-    pub fn new(scene: &Scene, eye: Vec3) -> Surroundings {
-        let lights = if scene.survey.solids {
-            let emitters = scene.lights.emitters().iter();
-            emitters
-                .map(|e| e.anywhere(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
-                .collect()
-        } else {
-            Vec::new()
-        };
-        Surroundings { eye: Interior::at(scene, eye), lights }
-    }
-
-    /// Around light `index`.
-    #[inline]
-    pub fn light(&self, index: u32) -> Interior {
-        self.lights.get(index as usize).copied().unwrap_or_default()
     }
 }

@@ -1,9 +1,9 @@
 //! How long paths are: what the cost of a method is estimated from, without a clock.
 
 use super::eye::Eye;
-use super::interior::Surroundings;
 use super::light::LightPass;
 use super::site::MediumVertex;
+use super::surroundings::Surroundings;
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Guide;

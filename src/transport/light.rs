@@ -1,9 +1,9 @@
 //! Light paths that leave photons.
 
 use super::eye::Indirect;
-use super::interior::Surroundings;
 use super::segment::Known;
 use super::site::MediumVertex;
+use super::surroundings::Surroundings;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
@@ -127,7 +127,7 @@ impl<'a> LightPass<'a> {
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
     pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
-        let choice = self.choice.point(index);
+        let choice = self.choice.fine(index);
         let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
         let (emission, cell, ratio, weight, unaimed) = match self.guide {
@@ -137,7 +137,7 @@ impl<'a> LightPass<'a> {
             }
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
-                lights.aim_or_light(&mut emission, self.region, choice.y, point);
+                lights.aim_or_light(&mut emission, self.region, choice.y as f32, point);
                 let (mixed, unaimed) = lights.lit(&emission, self.region);
                 let (emission, _) = emission.drawn_with(mixed)?;
                 (emission, guide::UNGUIDED, 1.0, 1.0, unaimed / mixed)
@@ -156,7 +156,7 @@ impl<'a> LightPass<'a> {
                 origin: emission.origin,
                 direction: emission.direction,
                 throughput: flux,
-                interior: surroundings.light(emission.light),
+                interior: surroundings.light(scene, emission.light, emission.origin),
                 first: Known::Unknown,
                 far: emission.infinite,
                 channel: None,

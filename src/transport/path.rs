@@ -46,7 +46,7 @@ impl<R: Record> PathTracer<'_, R> {
         if vertex.depth() >= self.max_depth || !wanted(vertex, self.trail.sight, beam, self.classes) {
             return;
         }
-        let (choice, point) = (draws.one(Purpose::LightChoice), draws.two(Purpose::LightPoint));
+        let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
         let Some(light) =
             scene.lights.sample_direct(&scene.shapes, &scene.materials, &vertex.receiver(), choice, point)
         else {

@@ -15,10 +15,10 @@ use crate::scene::Scene;
 use crate::spectrum::{Hue, Wavelength};
 use bumpalo::Bump;
 
-/// After this many bounces even a path that loses nothing may end: it goes on with probability [`LATE_SURVIVAL`] at most, so that light
-/// trapped between perfect mirrors ends without a limit on depth.
+/// After this many bounces even a path that loses nothing may end, so that light trapped between perfect mirrors ends without a limit on depth.
 const LATE: u32 = 64;
-const LATE_SURVIVAL: f32 = 0.95;
+/// After this many all but such light is gone.
+const TRAPPED: u32 = 1 << 16;
 
 /// Least probability of going on: keeps the weight of what survives bounded.
 const LEAST_SURVIVAL: f32 = 0.02;
@@ -150,7 +150,22 @@ impl Vertex<'_, '_> {
 pub(super) fn survival(expected: f32, depth: u32) -> f32 {
     // Written so that NaN ends the path.
     let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
-    if depth > LATE { survival.min(LATE_SURVIVAL) } else { survival }
+    survival.min(late_survival(depth))
+}
+
+/// Probability of going on at most.
+///
+/// With `1 - c / n` at the `n`-th bounce a path gets there with `P(n) ~ n^-c`, and an estimate that finds `f(n)` on its way has the second moment
+/// `sum_mn f(m) f(n) / P(min(m, n))`. It is finite for whatever loses a share of itself at every bounce, whatever that share, unlike with a constant
+/// survival `s`, which must be above the albedo squared; and for c = 1/2 it grows as a logarithm only for what comes back out of a half space
+/// that absorbs nothing, `f(n) ~ n^-3/2`. A trapped path then has 16 sqrt(n) bounces among the first n on average: with c = 2 from some n on, an end.
+#[inline]
+fn late_survival(depth: u32) -> f32 {
+    match depth {
+        ..=LATE => 1.0,
+        ..=TRAPPED => 1.0 - 0.5 / depth as f32,
+        _ => 1.0 - 2.0 / depth as f32,
+    }
 }
 
 /// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond the scene is
@@ -348,13 +363,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         let survival = match channel {
             None => vertex.survival_chosen(set, chance),
             // It has its roulette on arrival; this one ends what is trapped without loss.
-            Some(_) => {
-                if depth > LATE {
-                    LATE_SURVIVAL
-                } else {
-                    1.0
-                }
-            }
+            Some(_) => late_survival(depth),
         };
         if draws.one(Purpose::Roulette) >= survival {
             return;

@@ -135,7 +135,7 @@ fn shade(scene: &Scene, instances: &[u32]) -> Shade {
 fn towards_light(scene: &Scene, p: Vec3, k: u32) -> Option<(Vec3, f32)> {
     /// Steps of the additive sequence that fills the square evenly \[Roberts 2018\].
     const STEPS: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
-    let choice = (k as f32 + 0.5) / SAMPLES as f32;
+    let choice = (f64::from(k) + 0.5) / f64::from(SAMPLES);
     let u = (STEPS * k as f32).fract();
     let light = scene.lights.sample_direct(&scene.shapes, &scene.materials, &Receiver::anywhere(p), choice, u)?;
     // The end of the way is off the light's own surface.

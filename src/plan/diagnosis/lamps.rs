@@ -4,7 +4,7 @@ use super::super::names::cut;
 use super::super::{Asked, Effect};
 use super::rays;
 use crate::light::Emitter;
-use crate::math::{Vec3, luminance};
+use crate::math::{Vec3, luminance, one_minus_cos};
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::PI;
@@ -85,7 +85,9 @@ fn sources(scene: &Scene) -> Vec<Source> {
         };
         match emitter {
             Emitter::Point { p, .. } => sources.push(from(*p, &|_| true)),
-            Emitter::Spot { p, frame, cos_outer, .. } => sources.push(from(*p, &|d| frame.n.dot(*d) > *cos_outer)),
+            Emitter::Spot { p, frame, outer, .. } => {
+                sources.push(from(*p, &|d| one_minus_cos(*d, frame.n) < *outer));
+            }
             Emitter::Triangle { instance, .. } => glowing.entry(*instance).or_default().push(index),
             Emitter::Sun { .. } | Emitter::Environment => {}
         }

@@ -1,0 +1,128 @@
+//! Where the paths of a render start: the solids around the camera and around each light.
+
+use super::interior::Interior;
+use crate::camera::Camera;
+use crate::light::Emitter;
+use crate::math::Vec3;
+use crate::scene::Scene;
+use std::collections::HashMap;
+
+/// The solids around the points where paths of one kind start.
+#[derive(Clone, Copy, Debug)]
+pub enum Around {
+    /// The same around all of them.
+    Same(Interior),
+    /// The surface of a solid lies between them: each is looked at.
+    Differs,
+}
+
+impl Around {
+    /// Around one of the points.
+    #[inline]
+    pub fn at(&self, scene: &Scene, p: Vec3) -> Interior {
+        match self {
+            Around::Same(interior) => *interior,
+            Around::Differs => Interior::at(scene, p),
+        }
+    }
+}
+
+/// The solids around the camera and around each light.
+pub struct Surroundings {
+    /// Around the camera.
+    pub eye: Around,
+    /// Around the lights, by index; empty when the scene has no solids.
+    lights: Vec<Around>,
+}
+
+impl Surroundings {
+    /// Looks around the points where a camera's rays start, and those of every light.
+    pub fn of(scene: &Scene, camera: &Camera) -> Surroundings {
+        let mut surroundings = Surroundings::new(scene, camera.position());
+        let starts = Extent::of(camera.origins());
+        if scene.survey.solids && Solid::all(scene).iter().any(|solid| solid.meets(scene, &starts)) {
+            surroundings.eye = Around::Differs;
+        }
+        surroundings
+    }
+
+    /// The same of a camera whose rays start in one point.
+    pub fn new(scene: &Scene, eye: Vec3) -> Surroundings {
+        let lights = if scene.survey.solids { around_lights(scene) } else { Vec::new() };
+        Surroundings { eye: Around::Same(Interior::at(scene, eye)), lights }
+    }
+
+    /// Around a point just off light `index`.
+    #[inline]
+    pub fn light(&self, scene: &Scene, index: u32, p: Vec3) -> Interior {
+        self.lights.get(index as usize).map_or(Interior::default(), |around| around.at(scene, p))
+    }
+}
+
+/// A box along the axes.
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Extent {
+    fn of(points: impl IntoIterator<Item = Vec3>) -> Extent {
+        let nothing = Extent { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+        points.into_iter().fold(nothing, |extent, p| Extent { low: extent.low.min(p), high: extent.high.max(p) })
+    }
+
+    fn meets(&self, other: &Extent) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+}
+
+/// An instance whose surface bounds a solid.
+struct Solid {
+    instance: u32,
+    extent: Extent,
+}
+
+impl Solid {
+    /// Those of a scene.
+    fn all(scene: &Scene) -> Vec<Solid> {
+        let instances = (0..).zip(&scene.shapes.instances);
+        let solid = instances.filter(|(_, i)| scene.materials.list[i.material as usize].is_solid_glass());
+        solid.map(|(instance, _)| Solid { instance, extent: extent(scene, instance) }).collect()
+    }
+
+    /// Whether its surface may pass a box: the box around one of its triangles meets it.
+    fn meets(&self, scene: &Scene, other: &Extent) -> bool {
+        let instance = &scene.shapes.instances[self.instance as usize];
+        let mesh = &scene.shapes.meshes[instance.mesh as usize];
+        let passes = |primitive| Extent::of(instance.corners(mesh, primitive)).meets(other);
+        self.extent.meets(other) && (0..mesh.triangles.len() as u32).any(passes)
+    }
+}
+
+fn extent(scene: &Scene, instance: u32) -> Extent {
+    let instance = &scene.shapes.instances[instance as usize];
+    Extent::of(scene.shapes.meshes[instance.mesh as usize].positions.iter().map(|&p| instance.point(p)))
+}
+
+/// By emitter. A lamp's triangle is looked at as a whole where the lamp is clear of the surfaces of all solids, or the triangle of the solids that they bound.
+fn around_lights(scene: &Scene) -> Vec<Around> {
+    let solids = Solid::all(scene);
+    let mut crossed: HashMap<u32, Vec<&Solid>> = HashMap::new();
+    let mut around = |emitter: &Emitter| {
+        if let Emitter::Triangle { instance, two_sided, corners: [a, b, c], .. } = emitter {
+            let crossed = crossed.entry(*instance).or_insert_with(|| {
+                let lamp = extent(scene, *instance);
+                // A lamp that gives light from its front alone is before its own surface everywhere.
+                let others = solids.iter().filter(|solid| *two_sided || solid.instance != *instance);
+                others.filter(|solid| solid.meets(scene, &lamp)).collect()
+            });
+            let own = Extent::of([*a, *a + *b, *a + *c]);
+            if crossed.iter().any(|solid| solid.extent.meets(&own)) {
+                return Around::Differs;
+            }
+        }
+        Around::Same(emitter.anywhere(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
+    };
+    scene.lights.emitters().iter().map(&mut around).collect()
+}
