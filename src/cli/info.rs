@@ -21,6 +21,9 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 pub struct InfoArgs {
     /// Scene (.glb, .gltf) or EXR
     file: PathBuf,
+    /// Let a scene name files (buffers, textures, its environment) outside its own folder
+    #[arg(long)]
+    allow_outside: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -34,7 +37,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         let object = image_object(&set, attributes.object());
         return if args.json { print_json(&Value::Object(object)) } else { print(&image_text(path, &set, &object)) };
     }
-    let asked = SceneArgs::of(path);
+    let asked = SceneArgs::of(path, args.allow_outside);
     let scene = super::pool(0)?.install(|| scene::read(&asked, rayon::current_num_threads()))?.scene;
     let object = scene_object(path, &scene);
     if args.json { print_json(&object) } else { print(&scene_text(path, &object)) }

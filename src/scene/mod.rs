@@ -3,6 +3,7 @@
 mod build;
 pub mod description;
 pub mod environment_file;
+mod folder;
 pub mod gltf;
 mod survey;
 mod view;

@@ -138,3 +138,27 @@ fn warnings_and_strict() {
     let alpha = &set.get("").and_then(|beauty| beauty.plane("A")).expect("alpha").values;
     assert!(alpha.iter().all(|a| *a == 1.0));
 }
+
+/// What the scene names outside its folder is refused by every command that reads scenes, unless it is allowed; what the
+/// command line names may be anywhere.
+#[test]
+fn files_outside_the_scenes_folder() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("scenes")).expect("it can be made");
+    image::Rgb32FImage::from_pixel(2, 1, image::Rgb([1.0; 3])).save(folder.path("sky.hdr")).expect("it can be written");
+    support::glb::write_under(&folder.path("scenes/out.glb"), "../sky.hdr");
+    support::glb::write(&folder.path("scenes/in.glb"), true);
+    let error = "scenes/out.glb: scene 0: environment: the file ../sky.hdr is outside the scene's folder\n\
+                 hint: put it beside the scene file and name it so, or allow such files with --allow-outside\n";
+    let render = "-o out.exr --width 16 --iterations 1 --photons 100 --no-combine --progress none";
+    let converge = "-o out --methods path --time 0.1 --width 16";
+    for (command, options) in [("info", ""), ("plan", ""), ("render", render), ("converge", converge)] {
+        let outcome = folder.run(&format!("{command} scenes/out.glb {options}"));
+        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), error), "{command}");
+        if command != "converge" {
+            let outcome = folder.run(&format!("{command} scenes/out.glb {options} --allow-outside"));
+            assert_eq!(outcome.code, Some(0), "{command}: {}", outcome.stderr);
+        }
+    }
+    assert_eq!(folder.run(&format!("render scenes/in.glb --env sky.hdr {render}")).code, Some(0));
+}

@@ -15,6 +15,11 @@ pub fn write_foggy(path: &Path) {
     std::fs::write(path, bytes(true, &extras)).expect("the scene can be written");
 }
 
+/// The same without the lamp, under a sky from a file.
+pub fn write_under(path: &Path, sky: &str) {
+    std::fs::write(path, bytes(false, &json!({"environment": {"file": sky}}))).expect("the scene can be written");
+}
+
 /// Quads as positions and indices: the floor looks up, the mirror along +Z.
 fn bytes(lamp: bool, extras: &Value) -> Vec<u8> {
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];

@@ -11,6 +11,7 @@ use crate::math::{DAffine3, DMat3, DVec3, Rgb};
 use crate::scene::Description;
 use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Placed};
 use crate::scene::environment_file;
+use crate::scene::folder::Folder;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
@@ -22,7 +23,7 @@ const MOST_COPIES: usize = 1 << 24;
 /// Turns the bytes of a file into a description.
 pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
     let mut warnings = Vec::new();
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = Folder::of(path, options.allow_outside);
     let document = Document::parse(bytes, folder, &mut warnings)?;
     let mut reader = Reader {
         document: &document,
@@ -156,7 +157,10 @@ impl Reader<'_> {
                 }
                 EnvironmentSource::Color(color)
             }
-            (None, Some(file)) => environment_file::read(&self.document.folder.join(file), &mut self.out.warnings)?,
+            (None, Some(file)) => {
+                let file = self.document.folder.file(file.as_ref()).map_err(|e| e.within("environment"))?;
+                environment_file::read(&file, &mut self.out.warnings)?
+            }
             _ => {
                 self.out
                     .warnings
