@@ -7,6 +7,7 @@ mod control;
 mod cost;
 mod counting;
 mod drive;
+mod forecast;
 mod guiding;
 mod method;
 pub mod output;
@@ -22,6 +23,7 @@ mod volume;
 
 pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
 pub use drive::render;
+pub use forecast::photons_per_path;
 pub use method::Method;
 pub use pm::PHOTON_BYTES;
 pub use result::{ErrorEstimate, Phases, Rendered};

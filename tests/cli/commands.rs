@@ -1,6 +1,6 @@
 //! Finishing, comparing, and what files hold.
 
-use crate::{Folder, support, values};
+use crate::{Folder, Outcome, support, values};
 use caustique::film::{Layer, LayerSet, Naming};
 use caustique::image::exr::{self, Attributes};
 
@@ -161,4 +161,24 @@ fn files_outside_the_scenes_folder() {
         }
     }
     assert_eq!(folder.run(&format!("render scenes/in.glb --env sky.hdr {render}")).code, Some(0));
+}
+
+/// Four million copies, each a kilobyte of our lists and Embree's, do not fit under a limit of two gigabytes: told before they are made.
+#[test]
+fn scenes_larger_than_memory() {
+    let folder = Folder::new();
+    support::glb::write_copies(&folder.path("copies.glb"), 64);
+    let mut command = std::process::Command::new("sh");
+    let line = format!("ulimit -v 2097152; exec {} info copies.glb", env!("CARGO_BIN_EXE_caustique"));
+    // Many threads would fill the limit with their stacks.
+    command.current_dir(folder.path("")).args(["-c", &line]).env("RAYON_NUM_THREADS", "2").env("MALLOC_ARENA_MAX", "2");
+    let outcome = Outcome::of(command);
+    let (start, end) = (
+        "copies.glb: node ",
+        " GiB are left by 'ulimit -v'\n\
+         hint: place fewer copies, join them into one mesh, or render with more memory\n",
+    );
+    assert!(outcome.stderr.starts_with(start) && outcome.stderr.ends_with(end), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains(" placed meshes need about "), "{}", outcome.stderr);
+    assert_eq!(outcome.code, Some(1));
 }

@@ -55,12 +55,12 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     let present = Present::of(&scene);
     self::selection(args, settings, present)?;
     // Before anything is tried, which takes time.
-    memory::check(settings, camera.size(), channels(settings, present))?;
+    memory::check((&scene, &camera), settings, channels(settings, present))?;
     let interrupt = Interrupt::listen()?;
     let choice = auto(args, (&scene, &camera), present, &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
-    memory::check(settings, camera.size(), channels(settings, present))?;
+    memory::check((&scene, &camera), settings, channels(settings, present))?;
     let mut plan = plan::plan(&plan::Wishes::of(&args.job, choice.as_ref()), &scene, &camera, &removed);
     let mut ready = ready(&args.job, settings.levels.count)?;
     let mut settings = settings.clone();

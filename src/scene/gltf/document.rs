@@ -8,6 +8,7 @@ use gltf::json;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::fmt::Display;
 
 /// A parsed document. Indices in it are not checked yet: `get` does that.
@@ -23,6 +24,10 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
+    /// Elements made out of nothing so far.
+    pub(super) zeros: Cell<u64>,
+    /// Bytes of elements that were taken since memory was last asked for.
+    pub(super) unasked: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
 }
 
@@ -56,6 +61,8 @@ impl<'a> Document<'a> {
             samplers: parts(&raw, "samplers")?,
             raw,
             folder,
+            zeros: Cell::new(0),
+            unasked: Cell::new(0),
             buffers,
         })
     }
