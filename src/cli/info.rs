@@ -86,7 +86,12 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
         text += &format!("rendered by caustique {version}: {iterations} iterations");
         text += &number("light_paths").map(|n| format!(", {n} light paths")).unwrap_or_default();
         text += &number("seconds").map(|s| format!(", {}", duration(s))).unwrap_or_default();
-        text += &number("error").map(|e| format!(", estimated relative error {}", percent(e))).unwrap_or_default();
+        let note = match object.get("error_of").and_then(Value::as_str) {
+            Some(of) if !of.ends_with("bias") => format!(" ({of} only)"),
+            _ => String::new(),
+        };
+        let error = number("error").map(|e| format!(", estimated relative error {}{note}", percent(e)));
+        text += &error.unwrap_or_default();
         text.push('\n');
     }
     for warning in object.get("warnings").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {

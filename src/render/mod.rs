@@ -19,6 +19,7 @@ mod settings;
 mod sppm;
 mod techniques;
 mod tiles;
+mod told;
 mod volume;
 
 pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
@@ -32,4 +33,5 @@ pub use settings::{
     DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS,
     KernelChoice, Levels, RadiusRule, Settings, Shard,
 };
+pub use told::Told;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
