@@ -139,8 +139,8 @@ fn warnings_and_strict() {
     assert!(alpha.iter().all(|a| *a == 1.0));
 }
 
-/// What the scene names outside its folder is refused by every command that reads scenes, unless it is allowed; what the
-/// command line names may be anywhere.
+/// What the scene names outside its folder is refused by every command that reads scenes, unless it is allowed; what
+/// the command line names may be anywhere.
 #[test]
 fn files_outside_the_scenes_folder() {
     let folder = Folder::new();
@@ -163,7 +163,8 @@ fn files_outside_the_scenes_folder() {
     assert_eq!(folder.run(&format!("render scenes/in.glb --env sky.hdr {render}")).code, Some(0));
 }
 
-/// Four million copies, each a kilobyte of our lists and Embree's, do not fit under a limit of two gigabytes: told before they are made.
+/// Four million copies, each a kilobyte of our lists and Embree's, do not fit under a limit of two gigabytes: told
+/// before they are made.
 #[test]
 fn scenes_larger_than_memory() {
     let folder = Folder::new();
@@ -181,4 +182,23 @@ fn scenes_larger_than_memory() {
     assert!(outcome.stderr.starts_with(start) && outcome.stderr.ends_with(end), "{}", outcome.stderr);
     assert!(outcome.stderr.contains(" placed meshes need about "), "{}", outcome.stderr);
     assert_eq!(outcome.code, Some(1));
+}
+
+/// Equation (6) subtracts levels from each other, so that the network's picture has negative pixels, and nothing comes
+/// after it here: the file has none, and says how many were clamped.
+#[test]
+fn no_finished_pixel_is_negative() {
+    let folder = Folder::new();
+    for denoise in ["none", "own"] {
+        let outcome = folder.run(&format!(
+            "render scene.glb -o out.exr --width 64 --height 48 --photons 500 --method sppm --iterations 2 \
+             --model compact --denoise {denoise}"
+        ));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        let (set, header) = folder.read("out.exr");
+        assert!(values(&set, "").iter().flatten().all(|value| *value >= 0.0), "{denoise}");
+        let clamped = &header["combined"]["clamped"];
+        assert!(clamped["below_zero"].is_u64() && clamped["too_bright"].is_u64(), "{clamped}");
+        println!("{denoise}: {clamped}");
+    }
 }
