@@ -53,7 +53,8 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
     for run in &runs {
-        plan::check_media(&run.args, &scene).map_err(|mut error| {
+        let checked = plan::check_media(&run.args, &scene).and_then(|()| plan::check_bandwidth(&run.args, &scene));
+        checked.map_err(|mut error| {
             error.place = format!("--run \"{}\"", run.entry.name);
             error
         })?;
