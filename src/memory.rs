@@ -1,8 +1,9 @@
 //! Memory that the process may still take, asked before much of it is taken.
 //!
-//! What a few numbers of a scene or of the command line ask for (copies, vertices, pixels, light paths) is multiplied out first and refused with that
-//! number: Rust ends the process where an allocation fails, Embree does, and Linux ends it where one is given but not there. The least of three counts: what
-//! the machine has left, `ulimit -v`, and the `memory.max` of the control groups (containers, batch systems, systemd).
+//! What a few numbers of a scene or of the command line ask for (copies, vertices, pixels, light paths) is multiplied
+//! out first and refused with that number: Rust ends the process where an allocation fails, Embree does, and Linux ends
+//! it where one is given but not there. The least of three counts: what the machine has left, `ulimit -v`, and the
+//! `memory.max` of the control groups (containers, batch systems, systemd).
 
 use crate::error::{Error, Kind, Result};
 use rustix::process::{Resource, getrlimit};
@@ -74,8 +75,9 @@ fn kib(text: &str, key: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What the control groups leave that `/proc/self/cgroup` names (version 2: `0::/path`; version 1: `9:memory:/path`), below the mount at `root`. A group's own
-/// limit binds, and so do those around it; a container may see its own group as the root.
+/// What the control groups leave that `/proc/self/cgroup` names (version 2: `0::/path`; version 1: `9:memory:/path`),
+/// below the mount at `root`. A group's own limit binds, and so do those around it; a container may see its own group
+/// as the root.
 fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
     let groups = text.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':').skip(1);
@@ -96,7 +98,8 @@ fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
     left.min()
 }
 
-/// The limit of a group, less what it uses and could not give back: its files' pages count as used until they are wanted elsewhere.
+/// The limit of a group, less what it uses and could not give back: its files' pages count as used until they are
+/// wanted elsewhere.
 fn left_by_group(group: &Path, [limit, usage, files]: [&str; 3]) -> Option<u64> {
     let number = |name: &str| std::fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
     let (limit, usage) = (number(limit)?, number(usage)?);

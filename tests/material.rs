@@ -7,8 +7,8 @@ use caustique::geometry::Surface;
 use caustique::material::Material;
 use caustique::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use caustique::random::mix;
-use rayon::prelude::*;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
+use rayon::prelude::*;
 use support::stats::{mean_and_error, t_critical};
 
 const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -128,8 +128,8 @@ fn normal_maps_turn_the_frame_and_stay_on_the_side() {
     assert_eq!(with(0).shading_frame(&bare, &textures).n, Vec3::Z);
 }
 
-/// Of thirty glasses each is tabulated against the open space. A pair of them is when it meets, once, and then it is what it would have been had
-/// it been there from the start; whoever asks first.
+/// Of thirty glasses each is tabulated against the open space. A pair of them is when it meets, once, and then it is
+/// what it would have been had it been there from the start; whoever asks first.
 #[test]
 fn pairs_of_glasses_are_tabulated_when_they_meet() {
     let glass = |i: usize| {

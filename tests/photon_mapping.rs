@@ -70,8 +70,9 @@ fn furnace_box() {
     check("furnace", &values, 1.0, 5e-3, 0.025);
 }
 
-/// In a closed box that reflects nine tenths a light path ends at one surface in ten: it leaves nine photons, the first surface none. A sample of light paths
-/// tells so (four standard errors of 2048 geometric numbers, 6e-5), and a render has as many.
+/// In a closed box that reflects nine tenths a light path ends at one surface in ten: it leaves nine photons, the first
+/// surface none. A sample of light paths tells so (four standard errors of 2048 geometric numbers, 6e-5), and a render
+/// has as many.
 #[test]
 fn photons_are_forecast() {
     let mut description = Description::default();

@@ -29,7 +29,8 @@ fn lit(scale: f32) -> Scene {
     build(description)
 }
 
-/// Lamps a thousandth or a thousand times as bright: the same error after the same number of iterations, by every method and with a guide.
+/// Lamps a thousandth or a thousand times as bright: the same error after the same number of iterations, by every
+/// method and with a guide.
 #[test]
 fn errors_do_not_depend_on_the_unit_of_radiance() {
     let scenes = [1.0, 1.0 / 1024.0, 1024.0].map(lit);
@@ -54,14 +55,19 @@ fn errors_do_not_depend_on_the_unit_of_radiance() {
         let own = error(&all[0]);
         assert_eq!(all[0].stop, StopReason::Error, "{method:?} {guided}: {own}");
         for (other, of) in all[1..].iter().zip(["dark", "bright"]) {
-            assert_eq!((other.stop, other.iterations), (StopReason::Error, all[0].iterations), "{method:?} {guided} {of}");
+            assert_eq!(
+                (other.stop, other.iterations),
+                (StopReason::Error, all[0].iterations),
+                "{method:?} {guided} {of}"
+            );
             assert!((error(other) / own - 1.0).abs() < 1e-6, "{method:?} {guided} {of}: {} {own}", error(other));
         }
         println!("{method:?} {guided}: {} iterations, {own}", all[0].iterations);
     }
 }
 
-/// A point lamp in a glass ball is found by no path that starts at the eye: the picture stays black, and nothing is known of its error.
+/// A point lamp in a glass ball is found by no path that starts at the eye: the picture stays black, and nothing is
+/// known of its error.
 #[test]
 fn a_black_picture_is_not_finished() {
     let mut description = Description::default();
@@ -81,7 +87,8 @@ fn a_black_picture_is_not_finished() {
     assert_eq!(seen.stop, StopReason::Error);
 }
 
-/// What is certain from the start ends after two iterations in every quarter, and so does the black picture of a scene without lights.
+/// What is certain from the start ends after two iterations in every quarter, and so does the black picture of a scene
+/// without lights.
 #[test]
 fn a_least_number_of_iterations() {
     for emission in [1.0, 0.0] {
@@ -100,8 +107,8 @@ fn a_least_number_of_iterations() {
     }
 }
 
-/// A picture that is off by a tenth everywhere: 0.01 / 1.01 above the floor that its reference's mean sets, whatever the unit; the papers' relMSE
-/// depends on it.
+/// A picture that is off by a tenth everywhere: 0.01 / 1.01 above the floor that its reference's mean sets, whatever
+/// the unit; the papers' relMSE depends on it.
 #[test]
 fn comparisons_above_a_relative_floor() {
     let layers = |value: f32| {

@@ -30,7 +30,8 @@ pub(super) struct SideTables {
     pub average_grazing: f32,
 }
 
-/// Tables of one pair of media, seen from the thinner and from the denser one: made once, when they are first asked for.
+/// Tables of one pair of media, seen from the thinner and from the denser one: made once, when they are first asked
+/// for.
 #[derive(Clone, Debug)]
 struct InterfaceTables {
     /// Index of the denser medium over the thinner one.
@@ -54,8 +55,9 @@ pub(super) enum Covering {
     Sheen,
 }
 
-/// Everything tabulated for a scene. What pairs of media there can be is known from the start, and which of them the nearest to an index is;
-/// so it makes no difference to what is looked up when, or by which thread, a pair is tabulated.
+/// Everything tabulated for a scene. What pairs of media there can be is known from the start, and which of them the
+/// nearest to an index is; so it makes no difference to what is looked up when, or by which thread, a pair is
+/// tabulated.
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
@@ -78,8 +80,8 @@ pub struct Coverings {
 enum By {
     /// All threads, before there are paths.
     All,
-    /// The thread that follows a path and is the first to need it. It must not share the work: while it waited for the others, it could be handed
-    /// another path that needs the same table, and wait for itself.
+    /// The thread that follows a path and is the first to need it. It must not share the work: while it waited for the
+    /// others, it could be handed another path that needs the same table, and wait for itself.
     One,
 }
 
@@ -245,21 +247,16 @@ impl EnergyTables {
         EnergyTables::on_demand(etas, [], coverings)
     }
 
-    /// The same for the indices `rare` too, of pairs of media that may never meet: they are as many as pairs of materials, and are tabulated
-    /// when a path comes to where they do.
+    /// The same for the indices `rare` too, of pairs of media that may never meet: they are as many as pairs of
+    /// materials, and are tabulated when a path comes to where they do.
     pub fn on_demand(
         etas: impl IntoIterator<Item = f32>,
         rare: impl IntoIterator<Item = f32>,
         coverings: Coverings,
     ) -> EnergyTables {
         let now: Vec<f32> = etas.into_iter().chain([COAT_ETA]).collect();
-        let mut etas: Vec<f32> = now
-            .iter()
-            .copied()
-            .chain(rare)
-            .filter(|e| *e > 0.0)
-            .map(|e| if e < 1.0 { 1.0 / e } else { e })
-            .collect();
+        let mut etas: Vec<f32> =
+            now.iter().copied().chain(rare).filter(|e| *e > 0.0).map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
         etas.sort_by(f32::total_cmp);
         // Nearer ones than this differ by less than the tables' own error.
         etas.dedup_by(|a, b| *a - *b < 1e-3 * *b || (a.is_infinite() && b.is_infinite()));
@@ -310,7 +307,8 @@ impl EnergyTables {
         Some(if eta < 1.0 { [dense, thin] } else { [thin, dense] })
     }
 
-    /// Share of what arrives that facets lose even if they reflect perfectly: seen from the thinner medium it is the same for every pair.
+    /// Share of what arrives that facets lose even if they reflect perfectly: seen from the thinner medium it is the
+    /// same for every pair.
     #[inline]
     pub(super) fn white_loss(&self, alpha: Position) -> Profile {
         self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.white_loss(alpha))

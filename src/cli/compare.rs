@@ -23,7 +23,8 @@ pub struct CompareArgs {
     /// Layer to take from both, such as Noisy or Level1 [default: the picture itself]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
-    /// In relMSE and grain add 0.01 times the squared mean radiance of the reference instead of 0.01, so that they do not depend on how bright the lamps are
+    /// In relMSE and grain add 0.01 times the squared mean radiance of the reference instead of 0.01, so that they do
+    /// not depend on how bright the lamps are
     #[arg(long)]
     relative: bool,
     /// Also write a heat map of FLIP: black is no difference, pale yellow a large one

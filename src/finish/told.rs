@@ -11,9 +11,10 @@ use rayon::prelude::*;
 /// does not depend on `F`.
 pub const WORST: f64 = 0.005;
 
-/// Squared relative errors of the pixels of `picture`, as two `judges` tell them that share no noise with it or each other: means over RGB of
-/// `(F - J1)(F - J2) / (mean_RGB(V)^2 + floor)`, where the picture `values` says what pixels are worth, and what the [`floor`] is. Without the worst pixels, those where judges differ most; in
-/// the same order for all pictures that are judged alike. Noise around a small error may make them and their mean negative.
+/// Squared relative errors of the pixels of `picture`, as two `judges` tell them that share no noise with it or each
+/// other: means over RGB of `(F - J1)(F - J2) / (mean_RGB(V)^2 + floor)`, where the picture `values` says what pixels
+/// are worth, and what the [`floor`] is. Without the worst pixels, those where judges differ most; in the same order
+/// for all pictures that are judged alike. Noise around a small error may make them and their mean negative.
 ///
 /// Judged alike, pictures differ by their own errors alone: the judges' noise is the same in all.
 pub fn squared_errors(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> Vec<f64> {

@@ -25,7 +25,8 @@ pub struct Comparison {
     pub flip: f64,
     /// What of the error changes from pixel to pixel, see [`grain`].
     pub grain: f64,
-    /// What is added to the squared reference that errors are relative to: 0.01 of the papers' relMSE, or that of [`Floor::Relative`].
+    /// What is added to the squared reference that errors are relative to: 0.01 of the papers' relMSE, or that of
+    /// [`Floor::Relative`].
     pub floor: f64,
     /// Pixels with a channel that is not finite, in either picture.
     pub pixels_not_finite: u64,
@@ -40,7 +41,8 @@ pub enum Floor {
     /// 0.01, as the papers define relMSE.
     #[default]
     Papers,
-    /// 0.01 times the squared mean radiance of the reference ([`floor::relative`]), so that errors do not depend on the unit of radiance.
+    /// 0.01 times the squared mean radiance of the reference ([`floor::relative`]), so that errors do not depend on the
+    /// unit of radiance.
     Relative,
 }
 
@@ -172,12 +174,7 @@ pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usiz
     compare_values(a, b, (width, height), Floor::Papers)
 }
 
-fn compare_values(
-    a: &[[f32; 3]],
-    b: &[[f32; 3]],
-    (width, height): (usize, usize),
-    floor: Floor,
-) -> Result<Comparison> {
+fn compare_values(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: Floor) -> Result<Comparison> {
     if a.len() != width * height || b.len() != width * height {
         let cause = format!("{} and {} values for {width} x {height} pixels", a.len(), b.len());
         return Err(Error::new(Kind::Image, "", cause));

@@ -23,12 +23,14 @@ struct Ready {
     shares: Option<(Vec4, f32, f32)>,
     /// The interface with the open space and its relative index of refraction; none where textures change it.
     open: Option<(f32, Interface)>,
-    /// The same with the solids around, by falling index: made when a path first meets it, for few pairs of materials ever do.
+    /// The same with the solids around, by falling index: made when a path first meets it, for few pairs of materials
+    /// ever do.
     nested: Vec<(f32, OnceLock<Box<Interface>>)>,
 }
 
 impl Ready {
-    /// The interface of relative index `eta`, made by `make` where it is asked for the first time; none where it is not to be kept.
+    /// The interface of relative index `eta`, made by `make` where it is asked for the first time; none where it is not
+    /// to be kept.
     #[inline(always)]
     fn interface(&self, eta: f32, make: impl FnOnce() -> Interface) -> Option<&Interface> {
         match &self.open {
@@ -70,7 +72,8 @@ fn solids(materials: &[Material]) -> Vec<f32> {
 }
 
 impl EnergyTables {
-    /// Tables for all interfaces that surfaces of these materials make with the open space, and, when they are asked for, with each other's solids.
+    /// Tables for all interfaces that surfaces of these materials make with the open space, and, when they are asked
+    /// for, with each other's solids.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));

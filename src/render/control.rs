@@ -43,7 +43,8 @@ pub struct Progress {
     pub light_paths: u64,
     /// Photons of the last map.
     pub photons: usize,
-    /// Estimated relative error of the method's own image (root of relMSE), when two iterations are done and light is seen.
+    /// Estimated relative error of the method's own image (root of relMSE), when two iterations are done and light is
+    /// seen.
     pub error: Option<f64>,
     /// What that knows of.
     pub told: Told,

@@ -12,7 +12,8 @@ use crate::light::Guide;
 use crate::photon::ByKind;
 use crate::scene::Scene;
 
-/// Iterations before which the estimated error ends no render: two in every quarter, by whose scatter the variance is told.
+/// Iterations before which the estimated error ends no render: two in every quarter, by whose scatter the variance is
+/// told.
 pub const LEAST: u64 = 2 * QUARTERS as u64;
 
 /// What an iteration has done.

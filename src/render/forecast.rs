@@ -13,8 +13,8 @@ use crate::transport::{LightPass, Surroundings};
 /// Light paths looked at.
 const SAMPLES: u32 = 2048;
 
-/// Photons that a light path leaves on average, on surfaces and in media: a fraction of one where most of the light misses the scene, many in a closed white
-/// room. Where light paths are merged every vertex is one.
+/// Photons that a light path leaves on average, on surfaces and in media: a fraction of one where most of the light
+/// misses the scene, many in a closed white room. Where light paths are merged every vertex is one.
 pub fn photons_per_path(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
     let surroundings = Surroundings::new(scene, camera.position());
     let pass = LightPass::new(settings.seed, 0, Domain::PilotLight, SAMPLES, settings.max_depth)

@@ -33,5 +33,5 @@ pub use settings::{
     DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS,
     KernelChoice, Levels, RadiusRule, Settings, Shard,
 };
-pub use told::Told;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
+pub use told::Told;

@@ -59,13 +59,13 @@ impl Rendered {
         self.settings.method == Method::Pm && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)
     }
 
-    /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over RGB of
-    /// the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + floor), the papers' relMSE with the estimate in place of the
-    /// squared difference, and with a [`floor`] that does not depend on the unit of radiance. `None` before two iterations, and while all is black.
-    /// What it lacks [`Settings::told`] says.
+    /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over
+    /// RGB of the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + floor), the papers' relMSE with the
+    /// estimate in place of the squared difference, and with a [`floor`] that does not depend on the unit of radiance.
+    /// `None` before two iterations, and while all is black. What it lacks [`Settings::told`] says.
     ///
-    /// A surface that could show light and has shown none is not known to be dark: by Laplace's rule of succession the next of n iterations
-    /// brings it light with probability 1 / (n + 2), and then its zero was wholly wrong (1).
+    /// A surface that could show light and has shown none is not known to be dark: by Laplace's rule of succession the
+    /// next of n iterations brings it light with probability 1 / (n + 2), and then its zero was wholly wrong (1).
     ///
     /// A pixel with fewer than two finite samples where others have them is taken for wholly wrong (1), for nothing is known of it; `None` if
     /// this holds for all.
@@ -163,8 +163,8 @@ mod tests {
         assert_eq!(relative_error(&[rejected, once], &levels), None);
     }
 
-    /// Of four pixels two are lit. A black one counts once in so many iterations and two if it shows a surface, and not if it shows none; a picture that
-    /// is black tells nothing.
+    /// Of four pixels two are lit. A black one counts once in so many iterations and two if it shows a surface, and not
+    /// if it shows none; a picture that is black tells nothing.
     #[test]
     fn light_that_is_not_seen_is_not_known_to_be_none() {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };

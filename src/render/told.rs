@@ -1,7 +1,8 @@
 //! What an estimated error knows of.
 //!
-//! Variance is told by independent iterations, bias by the next larger of several bandwidth levels ([`crate::estimator::SquaredError`]). Where there is no such
-//! level, or the points that gather photons stay where they are, the number lacks a part of the error, and whoever reads it is told so beside it.
+//! Variance is told by independent iterations, bias by the next larger of several bandwidth levels
+//! ([`crate::estimator::SquaredError`]). Where there is no such level, or the points that gather photons stay where
+//! they are, the number lacks a part of the error, and whoever reads it is told so beside it.
 
 use super::method::Method;
 use super::settings::Settings;
@@ -16,8 +17,8 @@ pub enum Told {
     /// Noise alone: the bias of the bandwidth is not known.
     #[serde(rename = "noise")]
     Noise,
-    /// The noise of photons alone: eye paths are the same in every iteration \[Hachisuka et al. 2008\], and what another set of them would show differs by more
-    /// than iterations do.
+    /// The noise of photons alone: eye paths are the same in every iteration \[Hachisuka et al. 2008\], and what
+    /// another set of them would show differs by more than iterations do.
     #[serde(rename = "noise of photons")]
     PhotonNoise,
 }

@@ -34,8 +34,8 @@ impl<'a> Folder<'a> {
     }
 }
 
-/// Where a path leads, links followed. Of one that leads nowhere, what its letters say: whether a file outside exists is
-/// not told.
+/// Where a path leads, links followed. Of one that leads nowhere, what its letters say: whether a file outside exists
+/// is not told.
 fn resolved(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     path.canonicalize().unwrap_or_else(|_| {

@@ -1,8 +1,9 @@
 //! What is added to squared values that errors are relative to, so that darkness does not count for ever.
 //!
-//! The papers' relMSE adds 0.01: a radiance of a tenth, squared, which is little in their pictures, whose mean is about one. In one whose lamps are a hundredth
-//! as bright it is everything, and no error counts. An estimate of the error must not depend on the unit of radiance: it adds 0.01 times the squared mean
-//! radiance, which is the same in pictures like theirs.
+//! The papers' relMSE adds 0.01: a radiance of a tenth, squared, which is little in their pictures, whose mean is about
+//! one. In one whose lamps are a hundredth as bright it is everything, and no error counts. An estimate of the error
+//! must not depend on the unit of radiance: it adds 0.01 times the squared mean radiance, which is the same in pictures
+//! like theirs.
 
 /// The papers' own constant.
 pub const PAPERS: f64 = 0.01;
@@ -10,8 +11,8 @@ pub const PAPERS: f64 = 0.01;
 /// Share of the pixels that the mean leaves out, the brightest: lamps that are seen, and fireflies.
 const BRIGHTEST: f64 = 0.01;
 
-/// 0.01 times the squared mean of the values of a picture's pixels without the brightest; with them where the others are black; the papers' constant where all
-/// are. Scaling the values by a power of two scales it exactly.
+/// 0.01 times the squared mean of the values of a picture's pixels without the brightest; with them where the others
+/// are black; the papers' constant where all are. Scaling the values by a power of two scales it exactly.
 pub fn relative(values: impl IntoIterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
     let kept = values.len() - (values.len() as f64 * BRIGHTEST) as usize;

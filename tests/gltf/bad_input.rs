@@ -322,14 +322,16 @@ fn absurd_counts_in_parts() {
     let mut file = pool();
     for i in 0..3 {
         let zeros = file.push("accessors", json!({"componentType": 5126, "type": "VEC3", "count": 400_000}));
-        let mesh = file.push("meshes", json!({"name": i.to_string(), "primitives": [{"attributes": {"POSITION": zeros}}]}));
+        let mesh =
+            file.push("meshes", json!({"name": i.to_string(), "primitives": [{"attributes": {"POSITION": zeros}}]}));
         file.node(json!({"mesh": mesh}));
     }
     let last = file.json["accessors"].as_array().unwrap().len() - 1;
     assert_eq!(
         message(&try_read(&file).unwrap_err()),
         format!(
-            "pool.glb: mesh \"2\", primitive 0, POSITION: accessor {last}: 400000 elements are promised without any data\n{EXPORT}"
+            "pool.glb: mesh \"2\", primitive 0, POSITION: accessor {last}: 400000 elements are promised \
+             without any data\n{EXPORT}"
         )
     );
 }

@@ -26,7 +26,8 @@ fn reading(folder: &Path, part: &str, name: &str, allow_outside: bool) -> Result
     read.map(drop).map_err(|error| message(&error).replace(&folder.display().to_string(), "DIR"))
 }
 
-/// By a path upwards, a path from the root, a URI, and a link: refused, alike whether the file exists, unless it is allowed.
+/// By a path upwards, a path from the root, a URI, and a link: refused, alike whether the file exists, unless it is
+/// allowed.
 #[test]
 fn files_outside_the_folder_are_not_opened() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -27,7 +27,8 @@ pub fn write_copies(path: &Path, nodes: usize) {
         [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
     binary.extend((0..3 * COPIES).flat_map(|i| (i as f32).to_le_bytes()));
     let extension = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 1}}});
-    let accessor = |view: u32, count: usize| json!({"bufferView": view, "componentType": 5126, "count": count, "type": "VEC3"});
+    let accessor =
+        |view: u32, count: usize| json!({"bufferView": view, "componentType": 5126, "count": count, "type": "VEC3"});
     let document = json!({
         "asset": {"version": "2.0"},
         "extensionsUsed": ["EXT_mesh_gpu_instancing"],

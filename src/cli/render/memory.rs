@@ -1,9 +1,9 @@
 //! Whether a render fits into memory, asked before it begins.
 
+use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
 use caustique::estimator::rule::{adaptive, chi_squared, local};
-use caustique::camera::Camera;
 use caustique::memory;
 use caustique::photon;
 use caustique::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, photons_per_path};
@@ -12,7 +12,8 @@ use caustique::transport::{EyeMeasure, MergePhoton};
 use std::fmt::Display;
 use std::mem::size_of;
 
-/// Bytes per photon that carries what its weights are made of: those of an iteration as traced, joined, and sorted beside the map of the last one.
+/// Bytes per photon that carries what its weights are made of: those of an iteration as traced, joined, and sorted
+/// beside the map of the last one.
 const MERGED_BYTES: u64 = 5 * size_of::<MergePhoton>() as u64 + 32;
 
 /// Bytes per pixel of a technique's weighted and unweighted picture.
@@ -76,7 +77,8 @@ const COMBINED_CHANNELS: usize = 37;
 pub fn check_all<'a>(stage: (&Scene, &Camera), all: impl Iterator<Item = &'a Settings>) -> Result<()> {
     let (scene, camera) = stage;
     let (width, height) = camera.size();
-    let each = |settings| needed((width, height), COMBINED_CHANNELS, settings, photons_per_path(scene, camera, settings));
+    let each =
+        |settings| needed((width, height), COMBINED_CHANNELS, settings, photons_per_path(scene, camera, settings));
     refuse(all.map(each).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
 }
 

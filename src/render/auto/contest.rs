@@ -7,12 +7,12 @@
 
 use super::Way;
 use super::trial::WORST;
-use crate::stat::floor;
 use crate::finish::{Estimate, Finish, quarters, reads_for_error, told};
 use crate::light::Guide;
 use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
+use crate::stat::floor;
 use rayon::prelude::*;
 
 /// Iterations of a candidate: one for each quarter, and as many as its share of the pilot allows.

@@ -6,7 +6,6 @@
 
 use super::Way;
 use super::trial::{self, WORST, mean, scale, values};
-use crate::stat::floor;
 use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
@@ -15,6 +14,7 @@ use crate::render::cost::Cost;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
+use crate::stat::floor;
 
 /// Effects that have a part of the picture, in the order of [`parts()`].
 const WHOLE: [Effect; 5] = [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];

@@ -7,7 +7,8 @@ use crate::memory;
 use gltf::json::accessor::ComponentType;
 use gltf::json::validation::Checked;
 
-/// More elements than this a file does not get out of nothing, as accessors without a buffer view ask for, whose purpose is that a few of them are replaced.
+/// More elements than this a file does not get out of nothing, as accessors without a buffer view ask for, whose
+/// purpose is that a few of them are replaced.
 const MOST_ZEROS: u64 = 1 << 20;
 
 const DAMAGED: &str = "the file is damaged: export it again";
@@ -98,8 +99,8 @@ impl Document<'_> {
         self.elements(index, 1, 0, &unsigned, true)
     }
 
-    /// Counts bytes that elements are about to take, and asks whether there are so many once they are many: a file of many parts can name the same data in
-    /// all of them.
+    /// Counts bytes that elements are about to take, and asks whether there are so many once they are many: a file of
+    /// many parts can name the same data in all of them.
     fn decoding(&self, bytes: u64) -> Result<()> {
         let unasked = self.unasked.get().saturating_add(bytes);
         self.unasked.set(unasked);
@@ -107,7 +108,8 @@ impl Document<'_> {
             return Ok(());
         }
         self.unasked.set(0);
-        memory::check(unasked, "its elements").map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
+        memory::check(unasked, "its elements")
+            .map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
     }
 
     fn elements<T: Copy>(

@@ -18,7 +18,8 @@ use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Bytes that a mesh takes each time it is placed, in our lists and in Embree's: 957 MiB were taken by 2^20 copies of a triangle.
+/// Bytes that a mesh takes each time it is placed, in our lists and in Embree's: 957 MiB were taken by 2^20 copies of a
+/// triangle.
 const PLACED_BYTES: u64 = 1000;
 
 /// Turns the bytes of a file into a description.
