@@ -31,6 +31,8 @@ pub mod camera;
 
 pub mod scene;
 
+pub mod memory;
+
 pub mod plan;
 
 pub mod photon;

@@ -13,6 +13,8 @@ mod geometry;
 mod lights;
 #[path = "gltf/materials.rs"]
 mod materials;
+#[path = "gltf/outside.rs"]
+mod outside;
 #[path = "gltf/scenes.rs"]
 mod scenes;
 

@@ -180,7 +180,7 @@ fn the_json_has_the_promised_keys() {
     let b = picture(2, 2, |_| [0.0; 3]);
     let json = serde_json::to_value(compare(&b, &b).unwrap()).unwrap();
     let keys: Vec<&str> = json.as_object().unwrap().keys().map(String::as_str).collect();
-    let mut expected = ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "grain", "pixels_not_finite"];
+    let mut expected = ["relmse", "relmse_trimmed", "mse", "mean_ratio", "flip", "grain", "floor", "pixels_not_finite"];
     expected.sort_unstable();
     let mut found = keys.clone();
     found.sort_unstable();

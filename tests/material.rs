@@ -2,12 +2,13 @@
 
 mod support;
 
-use caustique::bsdf::{Coverings, EnergyTables, LobeSet, Parameters, Shading, Transport};
+use caustique::bsdf::{Coverings, EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;
 use caustique::material::Material;
 use caustique::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use caustique::random::mix;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
+use rayon::prelude::*;
 use support::stats::{mean_and_error, t_critical};
 
 const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -126,6 +127,28 @@ fn normal_maps_turn_the_frame_and_stay_on_the_side() {
     // Without tangents there is no frame to read it in.
     let bare = Surface { tangent: Vec4::ZERO, ..surface() };
     assert_eq!(with(0).shading_frame(&bare, &textures).n, Vec3::Z);
+}
+
+/// Of thirty glasses each is tabulated against the open space. A pair of them is when it meets, once, and then it is
+/// what it would have been had it been there from the start; whoever asks first.
+#[test]
+fn pairs_of_glasses_are_tabulated_when_they_meet() {
+    let glass = |i: usize| {
+        let ior = 1.3 + 0.037 * i as f32;
+        Material { ior, roughness: 0.5, transmission: 1.0, thin: false, ..Material::default() }
+    };
+    let materials: Vec<Material> = (0..30).map(glass).collect();
+    assert!(materials.iter().all(Material::is_solid_glass));
+    let tables = EnergyTables::for_materials(&materials);
+    // And 1.5, which clear coats have.
+    assert_eq!(tables.tabulated(), 31);
+    let eta = materials[3].ior / materials[21].ior;
+    let p = materials[3].parameters(&surface(), &[], eta);
+    let early = format!("{:?}", Interface::new(&p, &EnergyTables::new([eta], Coverings::default())));
+    let made = |_| format!("{:?}", Interface::new(&p, &tables));
+    let all: Vec<String> = (0..16).into_par_iter().map(made).collect();
+    assert!(all.iter().all(|late| *late == early));
+    assert_eq!(tables.tabulated(), 32);
 }
 
 /// Calls `check` with the normal and what makes the shading of a direction.

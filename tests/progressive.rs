@@ -9,11 +9,13 @@ use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{DVec3, Vec3};
 use caustique::photon::Kind;
-use caustique::random::{QUARTERS, quarter};
+use caustique::random::{Domain, QUARTERS, quarter};
 use caustique::render::{Control, KernelChoice, Levels, Method, RadiusRule, Rendered, Settings, render};
+use caustique::scene::description::PunctualLight;
 use caustique::scene::{Description, Scene};
+use caustique::transport::{EqualFlux, LightPass, Photons, Surroundings};
 use support::field::{self, Field, PixelField};
-use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 use support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 
@@ -42,6 +44,33 @@ fn picture(scene: &Scene, size: u32, settings: &Settings) -> Rendered {
     let rendered = render(scene, &camera, settings, |_, _| Control::Continue);
     assert_eq!(rendered.rejected(), 0);
     rendered
+}
+
+/// A blue lamp beside a red one that is a hundred thousand times as strong starts one light path in so many: the sample
+/// that sets the flux of blue photons sees none of them, and blue light is there all the same. Walls that reflect half
+/// of it hold as much again after the first bounce as the lamp gives: 4 pi I, by some forty starts of equal flux (four
+/// standard errors of their number, 6e-5).
+#[test]
+fn lights_too_rare_for_the_sample_keep_their_channel() {
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.0));
+    let lamp = |x: f64, intensity: Vec3| PunctualLight { intensity, ..point_light(DVec3::new(x, 0.0, 0.0), 1.0) };
+    description.lights.push(lamp(-0.5, Vec3::new(1e5, 0.0, 0.0)));
+    description.lights.push(lamp(0.5, Vec3::new(0.0, 0.0, 1.0)));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    let scene = build(description);
+    let surroundings = Surroundings::new(&scene, Vec3::ZERO);
+    let blue = EqualFlux::new(&scene, &surroundings, 2).expect("there is a blue lamp");
+    let starts = 1 << 22;
+    let pass = LightPass::new(3, 1, Domain::Light, starts, u32::MAX);
+    let (mut photons, mut arena) = (Photons::default(), bumpalo::Bump::new());
+    for index in 0..starts {
+        blue.light_path(&scene, &mut arena, &surroundings, &pass, index, &mut photons);
+    }
+    let flux = photons.surface.iter().flatten().map(|photon| f64::from(photon.flux.z)).sum::<f64>();
+    let expected = 4.0 * std::f64::consts::PI;
+    assert!((flux / expected - 1.0).abs() < 4.0 / 40f64.sqrt(), "{flux}, not {expected}");
+    assert!(photons.surface.iter().flatten().all(|photon| photon.flux.x == 0.0));
 }
 
 /// In a closed box whose walls give radiance e and reflect rho there is e / (1 - rho) everywhere: a uniform field of photons, whatever the bandwidth.

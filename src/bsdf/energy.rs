@@ -7,6 +7,7 @@ use super::profile::{Grid, NODES, Position, Profile, node};
 use super::sheen;
 use crate::math::{Vec2, Vec3, Vec4, sqr};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands have
 /// kinks along curves, at the horizon and the critical angle, where product rules converge slowly).
@@ -29,13 +30,13 @@ pub(super) struct SideTables {
     pub average_grazing: f32,
 }
 
-/// Tables of one pair of media.
+/// Tables of one pair of media, seen from the thinner and from the denser one: made once, when they are first asked
+/// for.
 #[derive(Clone, Debug)]
 struct InterfaceTables {
     /// Index of the denser medium over the thinner one.
     eta: f32,
-    thin: SideTables,
-    dense: SideTables,
+    sides: OnceLock<Box<[SideTables; 2]>>,
 }
 
 /// What facets lose below a coat or a sheen, beyond its transmittance at `wo`: see [`EnergyTables::covered_loss`].
@@ -54,7 +55,9 @@ pub(super) enum Covering {
     Sheen,
 }
 
-/// Everything tabulated for a scene; immutable, looked up without locks.
+/// Everything tabulated for a scene. What pairs of media there can be is known from the start, and which of them the
+/// nearest to an index is; so it makes no difference to what is looked up when, or by which thread, a pair is
+/// tabulated.
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
@@ -72,35 +75,47 @@ pub struct Coverings {
     pub sheen: bool,
 }
 
+/// Who makes a table.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum By {
+    /// All threads, before there are paths.
+    All,
+    /// The thread that follows a path and is the first to need it. It must not share the work: while it waited for the
+    /// others, it could be handed another path that needs the same table, and wait for itself.
+    One,
+}
+
 /// Tabulates functions of alpha and cosine: `f` is given a lobe, the direction towards the viewer, Lambda of it, a visible normal and
 /// its weight in the quadrature.
 fn tabulate<T: Send>(
+    by: By,
     zero: impl Fn() -> T + Sync,
     f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3, f32) + Sync,
 ) -> Vec<Vec<T>> {
-    (0..NODES)
-        .into_par_iter()
-        .map(|i| {
-            let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
-            let cosines = (0..NODES).map(|j| {
-                let mu = node(j);
-                let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-                let lambda_o = ggx.lambda(wo);
-                let mut sum = zero();
-                for k in 0..LATTICE.0 {
-                    // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
-                    // reflections are the ones that are lost.
-                    let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
-                    let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
-                    let weight = 2.0 * rest / LATTICE.0 as f32;
-                    let h = ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest));
-                    f(&mut sum, &ggx, wo, lambda_o, h, weight);
-                }
-                sum
-            });
-            cosines.collect()
-        })
-        .collect()
+    let row = |i: usize| -> Vec<T> {
+        let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
+        let cosines = (0..NODES).map(|j| {
+            let mu = node(j);
+            let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
+            let lambda_o = ggx.lambda(wo);
+            let mut sum = zero();
+            for k in 0..LATTICE.0 {
+                // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
+                // reflections are the ones that are lost.
+                let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
+                let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
+                let weight = 2.0 * rest / LATTICE.0 as f32;
+                let h = ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest));
+                f(&mut sum, &ggx, wo, lambda_o, h, weight);
+            }
+            sum
+        });
+        cosines.collect()
+    };
+    match by {
+        By::All => (0..NODES).into_par_iter().map(row).collect(),
+        By::One => (0..NODES).map(row).collect(),
+    }
 }
 
 fn grid<T>(table: &[Vec<T>], f: impl Fn(&T) -> Vec4) -> Grid {
@@ -114,10 +129,11 @@ fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
 }
 
 impl SideTables {
-    fn new(eta: f32) -> SideTables {
+    fn new(eta: f32, by: By) -> SideTables {
         let smooth = Smooth::new(eta);
         // Total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and weighted.
         let table = tabulate(
+            by,
             || [0.0f32; 5],
             |sums, ggx, wo, lambda_o, h, weight| {
                 let cos = wo.dot(h).clamp(0.0, 1.0);
@@ -184,11 +200,24 @@ impl SideTables {
     }
 }
 
+impl InterfaceTables {
+    fn new(eta: f32) -> InterfaceTables {
+        InterfaceTables { eta, sides: OnceLock::new() }
+    }
+
+    /// From the thinner medium, from the denser one.
+    #[inline]
+    fn sides(&self, by: By) -> &[SideTables; 2] {
+        self.sides.get_or_init(|| Box::new([self.eta, 1.0 / self.eta].map(|eta| SideTables::new(eta, by))))
+    }
+}
+
 impl CoverTables {
     /// `cover(k)` is the albedo of the covering at node `k` of its roughness.
     fn new(cover: impl Fn(usize) -> Profile) -> CoverTables {
         let profiles: [Profile; COVER_NODES] = std::array::from_fn(&cover);
         let table = tabulate(
+            By::All,
             || [0.0f32; COVER_NODES],
             |sums, ggx, wo, lambda_o, h, weight| {
                 let (wi, share) = reflected_share(ggx, wo, lambda_o, h);
@@ -215,21 +244,28 @@ impl CoverTables {
 impl EnergyTables {
     /// Tables for interfaces of the relative indices `etas` (an index and its inverse share one), and for 1.5; others use the nearest.
     pub fn new(etas: impl IntoIterator<Item = f32>, coverings: Coverings) -> EnergyTables {
-        let mut etas: Vec<f32> = etas
-            .into_iter()
-            .chain([COAT_ETA])
-            .filter(|e| *e > 0.0)
-            .map(|e| if e < 1.0 { 1.0 / e } else { e })
-            .collect();
+        EnergyTables::on_demand(etas, [], coverings)
+    }
+
+    /// The same for the indices `rare` too, of pairs of media that may never meet: they are as many as pairs of
+    /// materials, and are tabulated when a path comes to where they do.
+    pub fn on_demand(
+        etas: impl IntoIterator<Item = f32>,
+        rare: impl IntoIterator<Item = f32>,
+        coverings: Coverings,
+    ) -> EnergyTables {
+        let now: Vec<f32> = etas.into_iter().chain([COAT_ETA]).collect();
+        let mut etas: Vec<f32> =
+            now.iter().copied().chain(rare).filter(|e| *e > 0.0).map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
         etas.sort_by(f32::total_cmp);
         // Nearer ones than this differ by less than the tables' own error.
         etas.dedup_by(|a, b| *a - *b < 1e-3 * *b || (a.is_infinite() && b.is_infinite()));
         etas.retain(|e| !is_matched(*e));
-        let interfaces = etas
-            .into_iter()
-            .map(|eta| InterfaceTables { eta, thin: SideTables::new(eta), dense: SideTables::new(1.0 / eta) })
-            .collect();
+        let interfaces = etas.into_iter().map(InterfaceTables::new).collect();
         let mut tables = EnergyTables { interfaces, sheen: None, below_coat: None, below_sheen: None };
+        for pair in now.into_iter().filter_map(|eta| tables.nearest(eta)) {
+            pair.sides(By::All);
+        }
         let alpha = |k: usize| Position::new(sqr(k as f32 / (COVER_NODES - 1) as f32));
         if coverings.coat {
             tables.below_coat = Some(CoverTables::new(|k| tables.coat_albedo(alpha(k))));
@@ -242,29 +278,40 @@ impl EnergyTables {
         tables
     }
 
-    /// Tables of the sides of an interface of relative index `eta`: the one seen from above, the one seen from below.
-    /// `None` if the interface does nothing.
+    /// How many pairs of media are tabulated by now.
+    pub fn tabulated(&self) -> usize {
+        self.interfaces.iter().filter(|pair| pair.sides.get().is_some()).count()
+    }
+
+    /// The pair of media nearest to an interface of relative index `eta`; `None` if the interface does nothing.
     #[inline]
-    pub(super) fn sides(&self, eta: f32) -> Option<[&SideTables; 2]> {
+    fn nearest(&self, eta: f32) -> Option<&InterfaceTables> {
         if is_matched(eta) {
             return None;
         }
         let wanted = if eta < 1.0 { 1.0 / eta } else { eta };
         let after = self.interfaces.partition_point(|t| t.eta < wanted);
         let before = after.checked_sub(1).and_then(|i| self.interfaces.get(i));
-        let nearest = match (before, self.interfaces.get(after)) {
-            (Some(a), Some(b)) if wanted - a.eta < b.eta - wanted => a,
-            (_, Some(b)) => b,
-            (Some(a), None) => a,
-            (None, None) => return None,
-        };
-        Some(if eta < 1.0 { [&nearest.dense, &nearest.thin] } else { [&nearest.thin, &nearest.dense] })
+        match (before, self.interfaces.get(after)) {
+            (Some(a), Some(b)) if wanted - a.eta < b.eta - wanted => Some(a),
+            (_, Some(b)) => Some(b),
+            (a, None) => a,
+        }
     }
 
-    /// Share of what arrives that facets lose even if they reflect perfectly.
+    /// Tables of the sides of an interface of relative index `eta`: the one seen from above, the one seen from below.
+    /// `None` if the interface does nothing.
+    #[inline]
+    pub(super) fn sides(&self, eta: f32) -> Option<[&SideTables; 2]> {
+        let [thin, dense] = self.nearest(eta)?.sides(By::One);
+        Some(if eta < 1.0 { [dense, thin] } else { [thin, dense] })
+    }
+
+    /// Share of what arrives that facets lose even if they reflect perfectly: seen from the thinner medium it is the
+    /// same for every pair.
     #[inline]
     pub(super) fn white_loss(&self, alpha: Position) -> Profile {
-        self.interfaces.first().map_or(Profile::constant(0.0), |t| t.thin.white_loss(alpha))
+        self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.white_loss(alpha))
     }
 
     /// Albedo of a clear coat.

@@ -3,7 +3,7 @@
 use super::{output, print, print_json};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{Layer, LayerSet};
-use caustique::image::{Comparison, compare, exr, heat, png};
+use caustique::image::{Comparison, Floor, compare_above, exr, heat, png};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,10 @@ pub struct CompareArgs {
     /// Layer to take from both, such as Noisy or Level1 [default: the picture itself]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
+    /// In relMSE and grain add 0.01 times the squared mean radiance of the reference instead of 0.01, so that they do
+    /// not depend on how bright the lamps are
+    #[arg(long)]
+    relative: bool,
     /// Also write a heat map of FLIP: black is no difference, pale yellow a large one
     #[arg(long, value_name = "FILE.png")]
     png: Option<PathBuf>,
@@ -38,7 +42,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
-    let comparison = compare(&image, &reference).map_err(|e| e.within(args.image.display()))?;
+    let floor = if args.relative { Floor::Relative } else { Floor::Papers };
+    let comparison = compare_above(&image, &reference, floor).map_err(|e| e.within(args.image.display()))?;
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
         png::write(path, image.width, image.height, colours)?;

@@ -170,6 +170,7 @@ impl Ready {
             "model": self.model.as_ref().map(|network| &network.name),
             "levels": account.combined,
             "training": self.model.as_ref().map(|network| &network.training),
+            "clamped": {"below_zero": account.clamped.below_zero, "too_bright": account.clamped.too_bright},
             "error_at_half": account.told.map(|told| told.half),
         })
     }

@@ -21,6 +21,9 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 pub struct InfoArgs {
     /// Scene (.glb, .gltf) or EXR
     file: PathBuf,
+    /// Let a scene name files (buffers, textures, its environment) outside its own folder
+    #[arg(long)]
+    allow_outside: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -34,7 +37,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         let object = image_object(&set, attributes.object());
         return if args.json { print_json(&Value::Object(object)) } else { print(&image_text(path, &set, &object)) };
     }
-    let asked = SceneArgs::of(path);
+    let asked = SceneArgs::of(path, args.allow_outside);
     let scene = super::pool(0)?.install(|| scene::read(&asked, rayon::current_num_threads()))?.scene;
     let object = scene_object(path, &scene);
     if args.json { print_json(&object) } else { print(&scene_text(path, &object)) }
@@ -83,7 +86,12 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
         text += &format!("rendered by caustique {version}: {iterations} iterations");
         text += &number("light_paths").map(|n| format!(", {n} light paths")).unwrap_or_default();
         text += &number("seconds").map(|s| format!(", {}", duration(s))).unwrap_or_default();
-        text += &number("error").map(|e| format!(", estimated relative error {}", percent(e))).unwrap_or_default();
+        let note = match object.get("error_of").and_then(Value::as_str) {
+            Some(of) if !of.ends_with("bias") => format!(" ({of} only)"),
+            _ => String::new(),
+        };
+        let error = number("error").map(|e| format!(", estimated relative error {}{note}", percent(e)));
+        text += &error.unwrap_or_default();
         text.push('\n');
     }
     for warning in object.get("warnings").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {

@@ -1,7 +1,7 @@
 //! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
 
 use super::say;
-use caustique::render::{Progress, Settings};
+use caustique::render::{Progress, Settings, Told};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::io::IsTerminal;
@@ -51,6 +51,7 @@ struct Line {
     remaining: Option<f64>,
     light_paths: u64,
     error: Option<f64>,
+    error_of: Told,
 }
 
 impl Reporter {
@@ -86,8 +87,8 @@ impl Reporter {
                 }
             }
             Form::Json => {
-                let Progress { iteration, iterations, seconds, remaining, light_paths, error, .. } = *progress;
-                let line = Line { iteration, iterations, seconds, remaining, light_paths, error };
+                let Progress { iteration, iterations, seconds, remaining, light_paths, error, told, .. } = *progress;
+                let line = Line { iteration, iterations, seconds, remaining, light_paths, error, error_of: told };
                 if let Ok(line) = serde_json::to_string(&line) {
                     say(&line);
                 }
@@ -127,7 +128,7 @@ fn sentence(progress: &Progress) -> String {
         text += &format!(", {} photons/s", count(progress.light_paths as f64 / progress.seconds.max(1e-9)));
     }
     if let Some(error) = progress.error {
-        text += &format!(", error {}", percent(error));
+        text += &format!(", error {}{}", percent(error), progress.told.note());
     }
     text
 }
@@ -178,8 +179,11 @@ mod tests {
             light_paths: 1_200_000,
             photons: 1,
             error: Some(0.031),
+            told: Told::All,
         };
         assert_eq!(sentence(&progress), "iteration 12 of 64, 3.1 s, 4 min 10 s left, 387 k photons/s, error 3.1 %");
+        let noise = Progress { told: Told::Noise, remaining: None, iterations: None, ..progress };
+        assert_eq!(sentence(&noise), "iteration 12, 3.1 s, 387 k photons/s, error 3.1 % (noise only)");
         assert_eq!(duration(7500.0), "2 h 5 min");
         assert_eq!(duration(99.7), "1 min 40 s");
         assert_eq!(count(9_999.0), "9999");

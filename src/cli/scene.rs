@@ -41,6 +41,9 @@ pub struct SceneArgs {
     /// scene calls for [default: all that it calls for]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
     pub effects: Option<Switches>,
+    /// Let the scene name files (buffers, textures, its environment) outside its own folder
+    #[arg(long)]
+    pub allow_outside: bool,
     /// Take anything in the scene that is ignored or approximated as an error
     #[arg(long)]
     pub strict: bool,
@@ -150,8 +153,8 @@ pub fn forbidden(args: &SceneArgs, warnings: usize) -> Error {
 }
 
 impl SceneArgs {
-    /// A file without any options.
-    pub fn of(path: &Path) -> SceneArgs {
+    /// A file without any options but where what it names may lie.
+    pub fn of(path: &Path, allow_outside: bool) -> SceneArgs {
         SceneArgs {
             path: path.into(),
             env: None,
@@ -160,6 +163,7 @@ impl SceneArgs {
             light_units: LightUnits::Auto,
             glass: Glass::Auto,
             effects: None,
+            allow_outside,
             strict: false,
         }
     }
@@ -181,6 +185,7 @@ impl SceneArgs {
                 Glass::Solid => gltf::Glass::Solid,
                 Glass::Thin => gltf::Glass::Thin,
             },
+            allow_outside: self.allow_outside,
         }
     }
 }

@@ -20,6 +20,11 @@ pub const FOOTPRINT_PIXELS: f32 = 3.0;
 /// Smallest bandwidth over the scene's radius: where photons fall on one point (a perfect focus) the distance is zero.
 pub const LEAST: f32 = 1e-7;
 
+/// Smallest bandwidth over the scene's radius that may be asked for: positions are single precision numbers, a hundred
+/// of whose steps (2^-24) it is, and the smallest of five levels a quarter of that. Photons are not found where their
+/// distance is rounding.
+pub const LEAST_ASKED: f32 = 1e-5;
+
 /// Pixels to each side that [`initial_volume_bandwidths`] looks at.
 const NEIGHBOURHOOD: usize = 3;
 

@@ -7,7 +7,7 @@
 //! `M` is the estimate, `D` the denoiser's picture, `s` the larger of the pixel's own standard error and a high percentile of those around
 //! it, which stand in where a pixel has not met the rare bright sample yet. As `s` falls with the iterations, so does the displacement:
 //! whatever `D` is, the picture tends to what `M` tends to (`docs/theory.md`).
-//! The result stays between zero and the brightest estimate around.
+//! The result stays between zero and the brightest estimate around; how often it had to be kept there is counted.
 
 use super::window::{Size, window};
 use rayon::prelude::*;
@@ -35,10 +35,29 @@ pub fn spread(deviation: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
     (0..deviation.len()).into_par_iter().map_init(Vec::new, of_pixel).collect()
 }
 
+/// Pixels with a channel that was kept within the range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clamped {
+    /// That would be negative: equation (6) subtracts levels from each other, and denoisers overshoot.
+    pub below_zero: u64,
+    /// That would be brighter than the brightest estimate around.
+    pub too_bright: u64,
+}
+
 /// `mean` displaced towards `denoised` by at most [`LIMIT`] of `spread`; not below zero, not above the largest estimate within [`REACH`].
 ///
 /// A value of `denoised` that is no number changes nothing; where `mean` is none, `denoised` stands alone.
 pub fn bounded(mean: &[[f32; 3]], denoised: &[[f32; 3]], spread: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
+    bounded_and_counted(mean, denoised, spread, size).0
+}
+
+/// The same, with the pixels that were clamped.
+pub fn bounded_and_counted(
+    mean: &[[f32; 3]],
+    denoised: &[[f32; 3]],
+    spread: &[[f32; 3]],
+    size: Size,
+) -> (Vec<[f32; 3]>, Clamped) {
     let displaced = |index: usize, c: usize| {
         let (m, d) = (mean[index][c], denoised[index][c]);
         match (m.is_finite(), d.is_finite()) {
@@ -58,9 +77,13 @@ pub fn bounded(mean: &[[f32; 3]], denoised: &[[f32; 3]], spread: &[[f32; 3]], si
                 *most = most.max(if value.is_finite() { value } else { 0.0 });
             }
         }
-        std::array::from_fn(|c| displaced(index, c).min(brightest[c]).max(0.0))
+        let free: [f32; 3] = std::array::from_fn(|c| displaced(index, c));
+        let clamped = [(0..3).any(|c| free[c] < 0.0), (0..3).any(|c| free[c] > brightest[c])];
+        (std::array::from_fn(|c| free[c].min(brightest[c]).max(0.0)), clamped)
     };
-    (0..mean.len()).into_par_iter().map(of_pixel).collect()
+    let (picture, clamped): (Vec<[f32; 3]>, Vec<[bool; 2]>) = (0..mean.len()).into_par_iter().map(of_pixel).unzip();
+    let [below_zero, too_bright] = [0, 1].map(|k: usize| clamped.iter().filter(|clamped| clamped[k]).count() as u64);
+    (picture, Clamped { below_zero, too_bright })
 }
 
 #[cfg(test)]
@@ -127,6 +150,21 @@ mod tests {
         assert!(far.iter().all(|out| out[0] <= 100.0) && far[0][0] == 1.0);
         let dark = bounded(&mean, &plane(|_| -1e6), &plane(|_| 1e6), SIZE);
         assert!(dark.iter().flatten().all(|value| *value == 0.0));
+        let count = |value: f32| bounded_and_counted(&mean, &plane(|_| value), &plane(|_| 1e6), SIZE).1;
+        let pixels = SIZE.pixels() as u64;
+        assert_eq!(count(-1e6), Clamped { below_zero: pixels, too_bright: 0 });
+        assert_eq!(count(1e6), Clamped { below_zero: 0, too_bright: pixels });
+        assert_eq!(count(0.9), Clamped::default());
+    }
+
+    /// Equation (6) may make negative estimates, and nothing may be between it and the picture: they are clamped all
+    /// the same.
+    #[test]
+    fn negative_estimates_do_not_get_through() {
+        let mean = plane(|index| if index % 7 == 0 { -0.25 } else { 1.0 });
+        let (out, clamped) = bounded_and_counted(&mean, &mean, &plane(|_| 0.0), SIZE);
+        assert!(out.iter().flatten().all(|value| *value >= 0.0));
+        assert_eq!(clamped.below_zero, (SIZE.pixels() as u64).div_ceil(7));
     }
 
     #[test]

@@ -22,6 +22,7 @@ use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Kind, Result};
 use crate::estimator::QUARTERS;
 use crate::film::{Layer, LayerSet, Role};
+pub use bound::Clamped;
 use parts::Part;
 use rayon::prelude::*;
 
@@ -156,6 +157,8 @@ pub struct Account {
     pub combined: Option<usize>,
     /// The error, where the picture has quarters.
     pub told: Option<Told>,
+    /// Pixels that were kept between zero and the brightest estimate around.
+    pub clamped: Clamped,
 }
 
 impl Finish {
@@ -190,15 +193,15 @@ impl Finish {
     /// # Errors
     /// The denoiser fails.
     pub fn picture(&mut self, estimate: &Estimate) -> Result<Vec<[f32; 3]>> {
-        self.with_spread(estimate).map(|[picture, _]| picture)
+        self.with_spread(estimate).map(|([picture, _], _)| picture)
     }
 
-    /// The finished picture, and the spread that bounds it.
-    fn with_spread(&mut self, estimate: &Estimate) -> Result<[Vec<[f32; 3]>; 2]> {
+    /// The finished picture, and the spread that bounds it; and what was clamped.
+    fn with_spread(&mut self, estimate: &Estimate) -> Result<([Vec<[f32; 3]>; 2], Clamped)> {
         let denoised = self.denoiser.run(estimate, self.quality)?;
         let spread = bound::spread(&estimate.deviation, estimate.size);
-        let picture = bound::bounded(&estimate.mean, &denoised, &spread, estimate.size);
-        Ok([picture, spread])
+        let (picture, clamped) = bound::bounded_and_counted(&estimate.mean, &denoised, &spread, estimate.size);
+        Ok(([picture, spread], clamped))
     }
 
     /// Finishes the picture of `set` and makes the result its beauty; alpha stays. Adds `CombinedDirect` and the other parts where the picture has
@@ -215,7 +218,7 @@ impl Finish {
             }
             None => None,
         };
-        let [picture, spread] = self.with_spread(&estimate)?;
+        let ([picture, spread], clamped) = self.with_spread(&estimate)?;
         let told = self.told(set, &estimate)?;
         let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
         let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
@@ -230,7 +233,7 @@ impl Finish {
         for (name, values) in parts {
             set.push(Layer::interleaved(name, "RGB", values))?;
         }
-        Ok(Account { combined, told })
+        Ok(Account { combined, told, clamped })
     }
 
     /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is missing or empty.

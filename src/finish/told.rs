@@ -4,24 +4,26 @@
 //! unbiased: the noise of `Q3` and that of `Q4` are independent of each other and of `F`, so they drop out. It is the error of half the iterations;
 //! the whole picture's lies between 0.7 of that and all of it. Where photons are gathered all quarters have the kernel's bias in common, which this cannot see.
 
+use crate::stat::floor;
 use rayon::prelude::*;
 
 /// Share of the pixels left out, those where the judging quarters differ most: one bright sample in either would rule the mean. Which pixels these are
 /// does not depend on `F`.
 pub const WORST: f64 = 0.005;
-/// What is added to squared values that errors are relative to, as relMSE has it.
-pub const DARK: f64 = 0.01;
 
-/// Squared relative errors of the pixels of `picture`, as two `judges` tell them that share no noise with it or each other: means over RGB of
-/// `(F - J1)(F - J2) / (mean_RGB(V)^2 + 0.01)`, where the picture `values` says what pixels are worth. Without the worst pixels, those where judges differ most; in
-/// the same order for all pictures that are judged alike. Noise around a small error may make them and their mean negative.
+/// Squared relative errors of the pixels of `picture`, as two `judges` tell them that share no noise with it or each
+/// other: means over RGB of `(F - J1)(F - J2) / (mean_RGB(V)^2 + floor)`, where the picture `values` says what pixels
+/// are worth, and what the [`floor`] is. Without the worst pixels, those where judges differ most; in the same order
+/// for all pictures that are judged alike. Noise around a small error may make them and their mean negative.
 ///
 /// Judged alike, pictures differ by their own errors alone: the judges' noise is the same in all.
 pub fn squared_errors(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> Vec<f64> {
+    let mean = |index: usize| values[index].iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
+    let floor = floor::relative((0..picture.len()).map(mean));
     let of_pixel = |index: usize| {
         let (f, [a, b]) = (picture[index], judges.map(|judge| judge[index]));
-        let mean = values[index].iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
-        let scale = 1.0 / (3.0 * (mean * mean + DARK));
+        let mean = mean(index);
+        let scale = 1.0 / (3.0 * (mean * mean + floor));
         let over = |of: &dyn Fn(usize) -> f64| (0..3).map(of).sum::<f64>() * scale;
         let apart = over(&|c| f64::from(a[c] - b[c]).powi(2));
         let product = over(&|c| f64::from(f[c] - a[c]) * f64::from(f[c] - b[c]));
@@ -65,7 +67,7 @@ mod tests {
         };
         let (a, b) = (noisy(1), noisy(2));
         let picture = vec![[1.1; 3]; pixels as usize];
-        let expected = 0.01 / (1.21 + DARK);
+        let expected = 0.01 / (1.01 * 1.21);
         let told = squared_error(&picture, [&a, &b], &picture);
         // 0.25 / sqrt(12000) / 1.22 is one standard error of the product's mean.
         assert!((told - expected).abs() < 4.0 * 0.25 / 110.0 / 1.22, "{told}, not {expected}");

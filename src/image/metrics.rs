@@ -6,6 +6,7 @@ use super::flip;
 use crate::error::{Error, Kind, Result};
 use crate::film::LayerSet;
 use crate::math::Rgb;
+use crate::stat::floor;
 
 /// The error of a picture A against a reference B of the same size, over all pixels that are finite in both.
 ///
@@ -24,11 +25,38 @@ pub struct Comparison {
     pub flip: f64,
     /// What of the error changes from pixel to pixel, see [`grain`].
     pub grain: f64,
+    /// What is added to the squared reference that errors are relative to: 0.01 of the papers' relMSE, or that of
+    /// [`Floor::Relative`].
+    pub floor: f64,
     /// Pixels with a channel that is not finite, in either picture.
     pub pixels_not_finite: u64,
     /// HDR-FLIP per pixel, rows from the top; 1 where a pixel is not finite.
     #[serde(skip)]
     pub flip_map: Vec<f32>,
+}
+
+/// What is added to the squared reference that errors are relative to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Floor {
+    /// 0.01, as the papers define relMSE.
+    #[default]
+    Papers,
+    /// 0.01 times the squared mean radiance of the reference ([`floor::relative`]), so that errors do not depend on the
+    /// unit of radiance.
+    Relative,
+}
+
+impl Floor {
+    fn of(self, reference: &[[f32; 3]]) -> f64 {
+        match self {
+            Floor::Papers => floor::PAPERS,
+            Floor::Relative => floor::relative(reference.iter().map(|r| mean(*r))),
+        }
+    }
+}
+
+fn mean(r: [f32; 3]) -> f64 {
+    r.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0
 }
 
 /// The figures of a [`Comparison`] that need no look at neighbours.
@@ -46,13 +74,17 @@ pub struct Errors {
 
 /// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is none.
 pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<Errors> {
+    errors_above(a, b, floor::PAPERS)
+}
+
+fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
     let finite = |&i: &usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len().min(b.len())).filter(finite).collect();
     if pixels.is_empty() {
         return None;
     }
     let n = pixels.len() as f64;
-    let mut relative: Vec<f64> = pixels.iter().map(|&i| relative_squared_error(a[i], b[i])).collect();
+    let mut relative: Vec<f64> = pixels.iter().map(|&i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect();
     let relmse = relative.iter().sum::<f64>() / n;
     relative.sort_unstable_by(f64::total_cmp);
     relative.truncate(pixels.len() - pixels.len() / 1000);
@@ -65,13 +97,12 @@ pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<Errors> {
 
 /// Mean over RGB of (x - r)^2, over (mean of r over RGB)^2 + 0.01.
 pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
-    squared_error(x, r) / weight(r)
+    squared_error(x, r) / weight(r, floor::PAPERS)
 }
 
-/// (mean of r over RGB)^2 + 0.01.
-fn weight(r: [f32; 3]) -> f64 {
-    let mean = r.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-    mean * mean + 0.01
+/// (mean of r over RGB)^2 + the floor.
+fn weight(r: [f32; 3], floor: f64) -> f64 {
+    mean(r).powi(2) + floor
 }
 
 /// Mean over RGB of (x - r)^2.
@@ -85,6 +116,10 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 /// mean over pixels and channels counts. White noise keeps 8/9 of its relMSE, an offset nothing. Pixels that are not finite in both
 /// pictures are left out, as neighbours too; `None` if there is no other, or if the sizes are not `width * height`.
 pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Option<f64> {
+    grain_above(a, b, (width, height), floor::PAPERS)
+}
+
+fn grain_above(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: f64) -> Option<f64> {
     if a.len() != width * height || b.len() != width * height {
         return None;
     }
@@ -108,7 +143,7 @@ pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Opt
                 }
             }
             let square = (0..3).map(|c| (own[c] - around[c] / count).powi(2)).sum::<f64>() / 3.0;
-            sum += square / weight(b[i]);
+            sum += square / weight(b[i], floor);
             pixels += 1;
         }
     }
@@ -119,23 +154,36 @@ pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Opt
 ///
 /// Errors: sizes that differ, a file without a picture, no pixel that is finite in both.
 pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
+    compare_above(a, b, Floor::Papers)
+}
+
+/// The same, relative to what is above `floor`.
+///
+/// # Errors
+/// Those of [`compare`].
+pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Comparison> {
     if (a.width, a.height) != (b.width, b.height) {
         let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
         return Err(Error::new(Kind::Image, "", cause).hint("render both with the same --width and --height"));
     }
-    compare_pixels(&a.beauty()?, &b.beauty()?, a.width, a.height)
+    compare_values(&a.beauty()?, &b.beauty()?, (a.width, a.height), floor)
 }
 
 /// Compares `a` with the reference `b`, `width * height` scene-linear pixels each, see [`compare`].
 pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<Comparison> {
+    compare_values(a, b, (width, height), Floor::Papers)
+}
+
+fn compare_values(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: Floor) -> Result<Comparison> {
     if a.len() != width * height || b.len() != width * height {
         let cause = format!("{} and {} values for {width} x {height} pixels", a.len(), b.len());
         return Err(Error::new(Kind::Image, "", cause));
     }
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
+    let floor = floor.of(b);
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
-        (errors(a, b), grain(a, b, width, height))
+        (errors_above(a, b, floor), grain_above(a, b, (width, height), floor))
     else {
         return Err(Error::new(Kind::Image, "", "the pictures have no pixel with finite values in common"));
     };
@@ -154,6 +202,7 @@ pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usiz
         mean_ratio,
         flip,
         grain,
+        floor,
         pixels_not_finite: (a.len() - pixels.len()) as u64,
         flip_map,
     })

@@ -8,4 +8,4 @@ pub mod metrics;
 pub mod png;
 pub mod tonemap;
 
-pub use metrics::{Comparison, Errors, compare, errors, relative_squared_error};
+pub use metrics::{Comparison, Errors, Floor, compare, compare_above, errors, relative_squared_error};

@@ -6,7 +6,7 @@ use crate::bsdf::{Bsdf, Coverings, EnergyTables, Interface, Parameters, Shading}
 use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use bumpalo::Bump;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Energy compensation tables, and what of all materials no texture changes.
 pub struct Scattering {
@@ -21,29 +21,68 @@ struct Ready {
     plain_frame: bool,
     /// Base colour before vertex colours, share of metal, share of the dielectric that transmits; `None` where textures say.
     shares: Option<(Vec4, f32, f32)>,
-    /// Relative indices of refraction, and the interface there; none where textures change it.
-    interfaces: Vec<(f32, Interface)>,
+    /// The interface with the open space and its relative index of refraction; none where textures change it.
+    open: Option<(f32, Interface)>,
+    /// The same with the solids around, by falling index: made when a path first meets it, for few pairs of materials
+    /// ever do.
+    nested: Vec<(f32, OnceLock<Box<Interface>>)>,
 }
 
-/// Indices of refraction that surround surfaces: the open space's and the solids'.
-fn around(materials: &[Material]) -> Vec<f32> {
-    let index = |m: &Material| if m.ior.is_finite() { m.ior } else { 1.0 };
-    let mut around: Vec<f32> = materials.iter().filter(|m| m.is_solid_glass()).map(index).chain([1.0]).collect();
-    around.sort_by(f32::total_cmp);
-    around.dedup();
-    around
+impl Ready {
+    /// The interface of relative index `eta`, made by `make` where it is asked for the first time; none where it is not
+    /// to be kept.
+    #[inline(always)]
+    fn interface(&self, eta: f32, make: impl FnOnce() -> Interface) -> Option<&Interface> {
+        match &self.open {
+            Some((at, interface)) if *at == eta => Some(interface),
+            _ => {
+                let (_, made) = &self.nested[self.nested.binary_search_by(|(at, _)| eta.total_cmp(at)).ok()?];
+                Some(made.get_or_init(|| Box::new(make())))
+            }
+        }
+    }
+}
+
+/// The interface of a material whose textures do not change it: the same wherever it is made.
+fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Interface {
+    const ANYWHERE: Surface = Surface {
+        p: Vec3::ZERO,
+        ng: Vec3::Z,
+        ns: Vec3::Z,
+        tangent: Vec4::ZERO,
+        uv: [Vec2::ZERO; 2],
+        color: Vec4::ONE,
+        instance: 0,
+        primitive: 0,
+        material: 0,
+        touching: false,
+    };
+    Interface::new(&material.parameters(&ANYWHERE, &[], eta), tables)
+}
+
+fn distinct(indices: impl Iterator<Item = f32>) -> Vec<f32> {
+    let mut indices: Vec<f32> = indices.collect();
+    indices.sort_by(f32::total_cmp);
+    indices.dedup();
+    indices
+}
+
+/// Indices of refraction of the solids that may surround surfaces.
+fn solids(materials: &[Material]) -> Vec<f32> {
+    distinct(materials.iter().filter(|m| m.is_solid_glass() && m.ior.is_finite()).map(|m| m.ior))
 }
 
 impl EnergyTables {
-    /// Tables for all interfaces that surfaces of these materials make with the open space and with each other's solids.
+    /// Tables for all interfaces that surfaces of these materials make with the open space, and, when they are asked
+    /// for, with each other's solids.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
-        let around = around(materials);
-        let etas = materials.iter().flat_map(|m| around.iter().map(|n| m.ior / n));
+        let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
+        let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
         let coverings = Coverings {
             coat: materials.iter().any(|m| m.clearcoat > 0.0),
             sheen: materials.iter().any(|m| m.sheen_color.max_element() > 0.0),
         };
-        EnergyTables::new(etas, coverings)
+        EnergyTables::on_demand(open.iter().copied(), nested, coverings)
     }
 }
 
@@ -60,35 +99,18 @@ impl Scattering {
     }
 
     fn with(tables: Arc<EnergyTables>, materials: &[Material]) -> Scattering {
-        let around = around(materials);
-        // Anywhere: no texture is looked at.
-        let surface = Surface {
-            p: Vec3::ZERO,
-            ng: Vec3::Z,
-            ns: Vec3::Z,
-            tangent: Vec4::ZERO,
-            uv: [Vec2::ZERO; 2],
-            color: Vec4::ONE,
-            instance: 0,
-            primitive: 0,
-            material: 0,
-            touching: false,
-        };
-        let interfaces = |material: &Material| {
-            if material.unlit || !material.has_plain_interface() {
-                return Vec::new();
+        let around = solids(materials);
+        let ready = |material: &Material| {
+            let plain = !material.unlit && material.has_plain_interface();
+            let open = || (material.ior, plain_interface(material, material.ior, &tables));
+            let nested = around.iter().filter(|_| plain).map(|n| (material.ior / n, OnceLock::new()));
+            Ready {
+                unlit: material.unlit,
+                plain_frame: material.has_plain_frame(),
+                shares: material.plain_shares(),
+                open: plain.then(open),
+                nested: nested.collect(),
             }
-            let at = |n: &f32| {
-                let eta = material.ior / n;
-                (eta, Interface::new(&material.parameters(&surface, &[], eta), &tables))
-            };
-            around.iter().map(at).collect()
-        };
-        let ready = |material: &Material| Ready {
-            unlit: material.unlit,
-            plain_frame: material.has_plain_frame(),
-            shares: material.plain_shares(),
-            interfaces: interfaces(material),
         };
         let of_materials = materials.iter().map(ready).collect();
         Scattering { tables, of_materials }
@@ -128,9 +150,9 @@ impl Scattering {
             }
             None => materials.base_and_shares(surface),
         };
-        let made = ready.interfaces.iter().find(|(e, _)| *e == eta);
-        let interface = match made {
-            Some((_, interface)) => interface,
+        let plain = || plain_interface(&materials.list[surface.material as usize], eta, &self.tables);
+        let interface = match ready.interface(eta, plain) {
+            Some(interface) => interface,
             None => arena.alloc_with(|| Interface::new(&materials.parameters(surface, eta), &self.tables)),
         };
         Bsdf::of(base, metallic, transmission, interface)

@@ -1,6 +1,7 @@
 //! Progress, stop conditions and history. The only clocks of a render are here and decide nothing but when to stop.
 
 use super::result::ErrorEstimate;
+use super::told::Told;
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
@@ -42,8 +43,11 @@ pub struct Progress {
     pub light_paths: u64,
     /// Photons of the last map.
     pub photons: usize,
-    /// Estimated relative error of the method's own image (root of relMSE, bias included), when two iterations are done.
+    /// Estimated relative error of the method's own image (root of relMSE), when two iterations are done and light is
+    /// seen.
     pub error: Option<f64>,
+    /// What that knows of.
+    pub told: Told,
 }
 
 /// One moment of a render's history.

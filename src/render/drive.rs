@@ -6,10 +6,15 @@ use super::session::{Session, Stage};
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
 use crate::camera::Camera;
-use crate::estimator::Pixel;
+use crate::estimator::{Pixel, QUARTERS};
+
 use crate::light::Guide;
 use crate::photon::ByKind;
 use crate::scene::Scene;
+
+/// Iterations before which the estimated error ends no render: two in every quarter, by whose scatter the variance is
+/// told.
+pub const LEAST: u64 = 2 * QUARTERS as u64;
 
 /// What an iteration has done.
 pub(super) struct Work {
@@ -60,7 +65,9 @@ pub fn render(
         if observe(&progress, session.pixels()) == Control::Stop {
             break StopReason::Interrupted;
         }
-        if let Some(reason) = settings.stops(progress.seconds, progress.error) {
+        // Without a light the black picture is right.
+        let error = progress.error.or(scene.lights.is_empty().then_some(0.0));
+        if let Some(reason) = settings.stops(progress.seconds, error.filter(|_| progress.iteration >= LEAST)) {
             break reason;
         }
     };

@@ -7,6 +7,7 @@ mod control;
 mod cost;
 mod counting;
 mod drive;
+mod forecast;
 mod guiding;
 mod method;
 pub mod output;
@@ -18,10 +19,12 @@ mod settings;
 mod sppm;
 mod techniques;
 mod tiles;
+mod told;
 mod volume;
 
 pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
 pub use drive::render;
+pub use forecast::photons_per_path;
 pub use method::Method;
 pub use pm::PHOTON_BYTES;
 pub use result::{ErrorEstimate, Phases, Rendered};
@@ -31,3 +34,4 @@ pub use settings::{
     KernelChoice, Levels, RadiusRule, Settings, Shard,
 };
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
+pub use told::Told;

@@ -117,6 +117,7 @@ impl Rendered {
         put("levels", self.settings.levels.count.into());
         put("stopped", stop_name(self.stop).into());
         put("error", self.relative_error().into());
+        put("error_of", json!(self.settings.told()));
         put("variance_known", (self.iterations >= 2).into());
         put("rejected", self.rejected().into());
         let history = self.history.iter().map(|moment| {

@@ -5,7 +5,9 @@ use super::method::Method;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
 use crate::estimator::{Pixel, SquaredError};
+use crate::math::DVec3;
 use crate::photon::ByKind;
+use crate::stat::floor;
 use serde::Serialize;
 
 /// Where the time went: core-seconds (processor time of the whole process) per phase.
@@ -57,9 +59,13 @@ impl Rendered {
         self.settings.method == Method::Pm && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)
     }
 
-    /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over RGB of
-    /// the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + 0.01), the papers' relMSE with the estimate in place of the
-    /// squared difference. `None` before two iterations.
+    /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over
+    /// RGB of the estimated squared error ([`SquaredError`]) over (mean_RGB^2 + floor), the papers' relMSE with the
+    /// estimate in place of the squared difference, and with a [`floor`] that does not depend on the unit of radiance.
+    /// `None` before two iterations, and while all is black. What it lacks [`Settings::told`] says.
+    ///
+    /// A surface that could show light and has shown none is not known to be dark: by Laplace's rule of succession the
+    /// next of n iterations brings it light with probability 1 / (n + 2), and then its zero was wholly wrong (1).
     ///
     /// A pixel with fewer than two finite samples where others have them is taken for wholly wrong (1), for nothing is known of it; `None` if
     /// this holds for all.
@@ -98,24 +104,35 @@ impl ErrorEstimate {
 pub(super) fn error_estimate(pixels: &[Pixel], settings: &Settings) -> Option<ErrorEstimate> {
     let (own, compared) = (settings.levels.own(), settings.compared_levels());
     let (mut variance, mut squared_bias) = (0.0, 0.0);
-    let (mut known, mut unknown) = (0u64, 0u64);
+    let (mut lit, mut unknown) = (false, 0.0);
+    let value = |pixel: &Pixel| pixel.levels[own].mean.element_sum() / 3.0;
+    let floor = floor::relative(pixels.iter().map(value));
     for pixel in pixels {
         let Some(error) = SquaredError::of(pixel, own, compared) else {
-            unknown += 1;
+            unknown += 1.0;
             continue;
         };
-        let mean = pixel.levels[own].mean.element_sum() / 3.0;
-        let scale = 1.0 / (3.0 * (mean * mean + 0.01));
+        let mean = value(pixel);
+        if mean == 0.0 && could_show_light(pixel) {
+            unknown += 1.0 / (f64::from(pixel.iterations) + 2.0);
+            continue;
+        }
+        let scale = 1.0 / (3.0 * (mean * mean + floor));
         variance += pixel.variance_by_quarters().unwrap_or(error.variance).element_sum() * scale;
         squared_bias += error.squared_bias.element_sum() * scale;
-        known += 1;
+        lit |= mean != 0.0;
     }
-    let pixels = (known + unknown) as f64;
-    (known > 0).then(|| ErrorEstimate {
-        variance: variance / pixels,
-        squared_bias: squared_bias.max(0.0) / pixels,
-        unknown: unknown as f64 / pixels,
+    let count = pixels.len() as f64;
+    lit.then(|| ErrorEstimate {
+        variance: variance / count,
+        squared_bias: squared_bias.max(0.0) / count,
+        unknown: unknown / count,
     })
+}
+
+/// Whether a surface is seen that is not black.
+fn could_show_light(pixel: &Pixel) -> bool {
+    pixel.depths > 0 && pixel.albedo != DVec3::ZERO
 }
 
 #[cfg(test)]
@@ -144,5 +161,18 @@ mod tests {
         assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], &levels), Some(0.5));
         assert_eq!(relative_error(&[certain(), once, certain(), certain()], &levels), Some(0.5));
         assert_eq!(relative_error(&[rejected, once], &levels), None);
+    }
+
+    /// Of four pixels two are lit. A black one counts once in so many iterations and two if it shows a surface, and not
+    /// if it shows none; a picture that is black tells nothing.
+    #[test]
+    fn light_that_is_not_seen_is_not_known_to_be_none() {
+        let levels = Settings { levels: Levels::new(1), ..Settings::default() };
+        let relative_error = |pixels: &[Pixel]| error_estimate(pixels, &levels).map(|e| e.root());
+        let empty = Pixel { iterations: 14, ..Pixel::new([1.0; 2]) };
+        let dark = Pixel { depths: 14, albedo: DVec3::splat(7.0), ..empty };
+        assert_eq!(relative_error(&[certain(), certain(), empty, empty]), Some(0.0));
+        assert_eq!(relative_error(&[certain(), certain(), empty, dark]), Some(0.125));
+        assert_eq!(relative_error(&[dark, dark, empty]), None);
     }
 }

@@ -140,6 +140,7 @@ impl<'a> Session<'a> {
             light_paths: self.light_paths,
             photons: self.photons,
             error: error.map(|error| error.root()),
+            told: settings.told(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::description::EnvironmentSource;
 use crate::error::{Error, Kind, Result};
+use crate::memory;
 use exr::prelude::{ReadChannels, ReadLayers};
 use image::ImageDecoder;
 use std::fs::File;
@@ -63,7 +64,8 @@ fn clamp(texels: &mut [[f32; 3]]) -> usize {
 
 fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
     match width.checked_mul(height) {
-        Some(1..=MOST_TEXELS) => Ok(()),
+        // As they are decoded and as they are kept.
+        Some(texels @ 1..=MOST_TEXELS) => memory::check(24 * texels, "its texels").map_err(|e| e.cause),
         _ => Err(format!("{width} x {height} texels are none or too many")),
     }
 }

@@ -4,6 +4,7 @@ mod build;
 mod contacts;
 pub mod description;
 pub mod environment_file;
+mod folder;
 pub mod gltf;
 mod nesting;
 mod survey;

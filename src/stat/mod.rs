@@ -1,5 +1,6 @@
 //! Running statistics, and fits.
 
+pub mod floor;
 mod power_law;
 mod welford;
 

@@ -7,7 +7,7 @@ use super::surroundings::Surroundings;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
-use crate::math::{Rgb, Vec2};
+use crate::math::{DVec3, Rgb, Vec2};
 use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
@@ -330,12 +330,15 @@ impl EqualFlux {
     /// Paths drawn to tell the mean flux.
     const SAMPLES: u32 = 4096;
 
-    /// Of a channel (0 to 2): as much flux as a light path carries on average, so that paths are as many. `None` where no light has any of this channel.
+    /// Of a channel (0 to 2): as much flux as a light path carries on average, so that paths are as many. A channel
+    /// that the sample has not seen may be that of a rare light: it gets the mean of all three, for any flux above zero
+    /// leaves every light what it is, in more paths or fewer. `None` where no light shines.
     pub fn new(scene: &Scene, surroundings: &Surroundings, channel: usize) -> Option<EqualFlux> {
         let pass = LightPass::new(0, 0, Domain::PilotLight, Self::SAMPLES, u32::MAX);
         let emitted = (0..Self::SAMPLES).filter_map(|index| pass.emit(scene, surroundings, index));
         // `emit` divides by the number of paths.
-        let flux: f64 = emitted.map(|emitted| f64::from(emitted.start.throughput[channel])).sum();
+        let flux: DVec3 = emitted.map(|emitted| emitted.start.throughput.as_dvec3()).sum();
+        let flux = if flux[channel] > 0.0 { flux[channel] } else { flux.element_sum() / 3.0 };
         (flux > 0.0).then_some(EqualFlux { channel, flux: flux as f32 })
     }
 

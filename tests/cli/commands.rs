@@ -1,6 +1,6 @@
 //! Finishing, comparing, and what files hold.
 
-use crate::{Folder, support, values};
+use crate::{Folder, Outcome, support, values};
 use caustique::film::{Layer, LayerSet, Naming};
 use caustique::image::exr::{self, Attributes};
 
@@ -137,4 +137,68 @@ fn warnings_and_strict() {
     let (set, _) = folder.read("out.exr");
     let alpha = &set.get("").and_then(|beauty| beauty.plane("A")).expect("alpha").values;
     assert!(alpha.iter().all(|a| *a == 1.0));
+}
+
+/// What the scene names outside its folder is refused by every command that reads scenes, unless it is allowed; what
+/// the command line names may be anywhere.
+#[test]
+fn files_outside_the_scenes_folder() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("scenes")).expect("it can be made");
+    image::Rgb32FImage::from_pixel(2, 1, image::Rgb([1.0; 3])).save(folder.path("sky.hdr")).expect("it can be written");
+    support::glb::write_under(&folder.path("scenes/out.glb"), "../sky.hdr");
+    support::glb::write(&folder.path("scenes/in.glb"), true);
+    let error = "scenes/out.glb: scene 0: environment: the file ../sky.hdr is outside the scene's folder\n\
+                 hint: put it beside the scene file and name it so, or allow such files with --allow-outside\n";
+    let render = "-o out.exr --width 16 --iterations 1 --photons 100 --no-combine --progress none";
+    let converge = "-o out --methods path --time 0.1 --width 16";
+    for (command, options) in [("info", ""), ("plan", ""), ("render", render), ("converge", converge)] {
+        let outcome = folder.run(&format!("{command} scenes/out.glb {options}"));
+        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), error), "{command}");
+        if command != "converge" {
+            let outcome = folder.run(&format!("{command} scenes/out.glb {options} --allow-outside"));
+            assert_eq!(outcome.code, Some(0), "{command}: {}", outcome.stderr);
+        }
+    }
+    assert_eq!(folder.run(&format!("render scenes/in.glb --env sky.hdr {render}")).code, Some(0));
+}
+
+/// Four million copies, each a kilobyte of our lists and Embree's, do not fit under a limit of two gigabytes: told
+/// before they are made.
+#[test]
+fn scenes_larger_than_memory() {
+    let folder = Folder::new();
+    support::glb::write_copies(&folder.path("copies.glb"), 64);
+    let mut command = std::process::Command::new("sh");
+    let line = format!("ulimit -v 2097152; exec {} info copies.glb", env!("CARGO_BIN_EXE_caustique"));
+    // Many threads would fill the limit with their stacks.
+    command.current_dir(folder.path("")).args(["-c", &line]).env("RAYON_NUM_THREADS", "2").env("MALLOC_ARENA_MAX", "2");
+    let outcome = Outcome::of(command);
+    let (start, end) = (
+        "copies.glb: node ",
+        " GiB are left by 'ulimit -v'\n\
+         hint: place fewer copies, join them into one mesh, or render with more memory\n",
+    );
+    assert!(outcome.stderr.starts_with(start) && outcome.stderr.ends_with(end), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains(" placed meshes need about "), "{}", outcome.stderr);
+    assert_eq!(outcome.code, Some(1));
+}
+
+/// Equation (6) subtracts levels from each other, so that the network's picture has negative pixels, and nothing comes
+/// after it here: the file has none, and says how many were clamped.
+#[test]
+fn no_finished_pixel_is_negative() {
+    let folder = Folder::new();
+    for denoise in ["none", "own"] {
+        let outcome = folder.run(&format!(
+            "render scene.glb -o out.exr --width 64 --height 48 --photons 500 --method sppm --iterations 2 \
+             --model compact --denoise {denoise}"
+        ));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        let (set, header) = folder.read("out.exr");
+        assert!(values(&set, "").iter().flatten().all(|value| *value >= 0.0), "{denoise}");
+        let clamped = &header["combined"]["clamped"];
+        assert!(clamped["below_zero"].is_u64() && clamped["too_bright"].is_u64(), "{clamped}");
+        println!("{denoise}: {clamped}");
+    }
 }

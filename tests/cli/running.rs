@@ -15,7 +15,7 @@ fn progress_for_programs() {
     assert_eq!(lines.len(), 3);
     for (i, line) in lines.iter().enumerate() {
         let keys: Vec<&String> = line.as_object().expect("an object").keys().collect();
-        assert_eq!(keys, ["error", "iteration", "iterations", "light_paths", "remaining", "seconds"]);
+        assert_eq!(keys, ["error", "error_of", "iteration", "iterations", "light_paths", "remaining", "seconds"]);
         assert_eq!((&line["iteration"], &line["iterations"]), (&(i + 1).into(), &3.into()));
         assert_eq!(line["light_paths"], 2000 * (i + 1));
     }

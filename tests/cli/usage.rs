@@ -347,3 +347,19 @@ fn a_picture_larger_than_memory() {
     assert!(outcome.stderr.ends_with(hint), "{}", outcome.stderr);
     assert_eq!((outcome.code, folder.files()), (Some(2), vec![]));
 }
+
+/// A bandwidth below what positions are told apart by would lose light without a word.
+#[test]
+fn bandwidths_too_small_for_the_scene() {
+    let folder = Folder::new();
+    let render =
+        "render scene.glb -o out.exr --width 32 --iterations 1 --photons 100 --method sppm --initial-bandwidth";
+    let outcome = folder.run(&format!("{render} 1e-9"));
+    let (start, end) = (
+        "scene.glb: --initial-bandwidth 0.000000001: in a scene of radius ",
+        "e-5 at least, or leave --initial-bandwidth out\n",
+    );
+    assert!(outcome.stderr.starts_with(start) && outcome.stderr.ends_with(end), "{}", outcome.stderr);
+    assert_eq!((outcome.code, folder.files()), (Some(2), vec![]));
+    assert_eq!(folder.run(&format!("{render} 0.001")).code, Some(0));
+}

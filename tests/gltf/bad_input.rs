@@ -124,8 +124,11 @@ fn missing_buffers() {
         "pool.glb: buffer 0: its data URI is not valid base64\nhint: export the scene again"
     );
     for device in ["/dev/zero", "/"] {
+        let mut file = pool();
+        file.json["buffers"][0]["uri"] = device.into();
+        let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
         assert_eq!(
-            with("/buffers/0/uri", json!(device)),
+            message(&read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap_err()),
             format!(
                 "pool.glb: buffer 0: the file {device} cannot be read: it is not a regular file\n\
                  hint: put the file there, or export as .glb, which holds buffers and textures itself"
@@ -310,6 +313,26 @@ fn absurd_counts() {
     assert_eq!(
         with("/accessors/0", json!({"componentType": 5126, "type": "VEC3", "count": 1_000_000_000_000u64})),
         format!("{place}: 1000000000000 elements are promised without any data\n{EXPORT}")
+    );
+}
+
+/// Many small promises are as absurd as a large one.
+#[test]
+fn absurd_counts_in_parts() {
+    let mut file = pool();
+    for i in 0..3 {
+        let zeros = file.push("accessors", json!({"componentType": 5126, "type": "VEC3", "count": 400_000}));
+        let mesh =
+            file.push("meshes", json!({"name": i.to_string(), "primitives": [{"attributes": {"POSITION": zeros}}]}));
+        file.node(json!({"mesh": mesh}));
+    }
+    let last = file.json["accessors"].as_array().unwrap().len() - 1;
+    assert_eq!(
+        message(&try_read(&file).unwrap_err()),
+        format!(
+            "pool.glb: mesh \"2\", primitive 0, POSITION: accessor {last}: 400000 elements are promised \
+             without any data\n{EXPORT}"
+        )
     );
 }
 

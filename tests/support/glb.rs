@@ -15,6 +15,34 @@ pub fn write_foggy(path: &Path) {
     std::fs::write(path, bytes(true, &extras)).expect("the scene can be written");
 }
 
+/// The same without the lamp, under a sky from a file.
+pub fn write_under(path: &Path, sky: &str) {
+    std::fs::write(path, bytes(false, &json!({"environment": {"file": sky}}))).expect("the scene can be written");
+}
+
+/// So many nodes, each of which places one triangle 2^16 times (EXT_mesh_gpu_instancing), all by the same numbers.
+pub fn write_copies(path: &Path, nodes: usize) {
+    const COPIES: usize = 1 << 16;
+    let mut binary: Vec<u8> =
+        [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    binary.extend((0..3 * COPIES).flat_map(|i| (i as f32).to_le_bytes()));
+    let extension = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 1}}});
+    let accessor =
+        |view: u32, count: usize| json!({"bufferView": view, "componentType": 5126, "count": count, "type": "VEC3"});
+    let document = json!({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "scene": 0,
+        "scenes": [{"nodes": (0..nodes).collect::<Vec<usize>>()}],
+        "nodes": vec![json!({"mesh": 0, "extensions": extension}); nodes],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "buffers": [{"byteLength": binary.len()}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12 * COPIES}],
+        "accessors": [accessor(0, 3), accessor(1, COPIES)],
+    });
+    std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
+}
+
 /// Quads as positions and indices: the floor looks up, the mirror along +Z.
 fn bytes(lamp: bool, extras: &Value) -> Vec<u8> {
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
@@ -61,6 +89,11 @@ fn bytes(lamp: bool, extras: &Value) -> Vec<u8> {
         ],
         "buffers": [{"byteLength": 108}],
     });
+    chunks(&document, &binary)
+}
+
+/// A document and its binary chunk as a file.
+fn chunks(document: &Value, binary: &[u8]) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut file = Vec::new();

@@ -53,7 +53,8 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
     for run in &runs {
-        plan::check_media(&run.args, &scene).map_err(|mut error| {
+        let checked = plan::check_media(&run.args, &scene).and_then(|()| plan::check_bandwidth(&run.args, &scene));
+        checked.map_err(|mut error| {
             error.place = format!("--run \"{}\"", run.entry.name);
             error
         })?;
@@ -61,7 +62,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let interrupt = Interrupt::listen()?;
     let (runs, choices) = choose_all(args, runs, (&scene, &camera), &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
-    memory::check_all(runs.iter().map(|run| &run.entry.settings), camera.size())?;
+    memory::check_all((&scene, &camera), runs.iter().map(|run| &run.entry.settings))?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;

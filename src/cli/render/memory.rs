@@ -1,30 +1,34 @@
 //! Whether a render fits into memory, asked before it begins.
 
+use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::Pixel;
 use caustique::estimator::rule::{adaptive, chi_squared, local};
+use caustique::memory;
 use caustique::photon;
-use caustique::render::{MAX_TECHNIQUES, Method, Settings};
-use caustique::transport::EyeMeasure;
+use caustique::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, photons_per_path};
+use caustique::scene::Scene;
+use caustique::transport::{EyeMeasure, MergePhoton};
+use std::fmt::Display;
 use std::mem::size_of;
 
-/// Bytes per light path: the photons that a path leaves on average, in the list and in the map.
-const PER_LIGHT_PATH: u64 = 150;
-/// The same where photons carry what their weights are made of, and every bounce leaves one.
-const PER_MERGED_PATH: u64 = 800;
+/// Bytes per photon that carries what its weights are made of: those of an iteration as traced, joined, and sorted
+/// beside the map of the last one.
+const MERGED_BYTES: u64 = 5 * size_of::<MergePhoton>() as u64 + 32;
 
 /// Bytes per pixel of a technique's weighted and unweighted picture.
 const PER_TECHNIQUE: u64 = 24;
 
 /// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
-fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> u64 {
+fn needed((width, height): (u32, u32), channels: usize, settings: &Settings, per_light_path: f64) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
     let eye_paths = 1 + u64::from(settings.levels.two_paths);
     let (method, measure) = (settings.method, size_of::<EyeMeasure>() as u64);
+    let gathered = (f64::from(settings.photons) * per_light_path * PHOTON_BYTES as f64) as u64;
     let (per_path, photons) = match (method.counts_photons(), method.has_bandwidths()) {
-        _ if method == Method::Pm => (0, settings.photon_memory.min(u64::from(settings.photons) * PER_LIGHT_PATH)),
-        (true, _) => (0, u64::from(settings.photons) * PER_LIGHT_PATH),
-        (false, true) => (measure + PER_MERGED_PATH, 0),
+        _ if method == Method::Pm => (0, settings.photon_memory.min(gathered)),
+        (true, _) => (0, gathered),
+        (false, true) => (measure + (per_light_path * MERGED_BYTES as f64) as u64, 0),
         (false, false) => (measure, 0),
     };
     // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
@@ -47,36 +51,20 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings) -> 
     pixels * per_pixel + photons
 }
 
-/// Bytes that the system can give without swapping; `None` where it does not tell.
-fn available() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
-}
-
 /// Checks that the picture and its photons fit.
 ///
 /// # Errors
 /// They need more memory than there is.
-pub fn check(settings: &Settings, size: (u32, u32), channels: usize) -> Result<()> {
-    let needed = needed(size, channels, settings);
-    let Some(available) = available().filter(|available| needed > *available) else { return Ok(()) };
-    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize) -> Result<()> {
+    let size = stage.1.size();
+    let needed = needed(size, channels, settings, photons_per_path(stage.0, stage.1, settings));
     let paths = if settings.method.counts_photons() {
         let each = if settings.method == Method::Pm { "" } else { " an iteration" };
         format!(" and {} light paths{each}", settings.photons)
     } else {
         format!(" with --method {}", settings.method.name())
     };
-    let cause = format!(
-        "{} x {} pixels{paths} need about {:.1} GiB of memory, {:.1} GiB are available",
-        size.0,
-        size.1,
-        gib(needed),
-        gib(available)
-    );
-    let error = Error::new(Kind::Usage, "command line", cause);
-    Err(error.hint("use a smaller --width and --height, or fewer --photons"))
+    refuse(needed, format_args!("{} x {} pixels{paths}", size.0, size.1), "fewer --photons")
 }
 
 /// Channels of the layers that the combiner reads.
@@ -86,19 +74,20 @@ const COMBINED_CHANNELS: usize = 37;
 ///
 /// # Errors
 /// They need more memory than there is.
-pub fn check_all<'a>(all: impl Iterator<Item = &'a Settings>, size: (u32, u32)) -> Result<()> {
-    let needed: u64 = all.map(|settings| needed(size, COMBINED_CHANNELS, settings)).sum();
-    let Some(available) = available().filter(|available| needed > *available) else { return Ok(()) };
-    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
-    let cause = format!(
-        "all runs together need about {:.1} GiB of memory at {} x {} pixels, {:.1} GiB are available",
-        gib(needed),
-        size.0,
-        size.1,
-        gib(available)
-    );
-    let error = Error::new(Kind::Usage, "command line", cause);
-    Err(error.hint("use a smaller --width and --height, or fewer runs"))
+pub fn check_all<'a>(stage: (&Scene, &Camera), all: impl Iterator<Item = &'a Settings>) -> Result<()> {
+    let (scene, camera) = stage;
+    let (width, height) = camera.size();
+    let each =
+        |settings| needed((width, height), COMBINED_CHANNELS, settings, photons_per_path(scene, camera, settings));
+    refuse(all.map(each).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
+}
+
+/// The error where `what` need more memory than there is.
+fn refuse(needed: u64, what: impl Display, fewer: &str) -> Result<()> {
+    memory::check(needed, what).map_err(|error| {
+        Error::new(Kind::Usage, "command line", error.cause)
+            .hint(format!("use a smaller --width and --height, or {fewer}"))
+    })
 }
 
 #[cfg(test)]
@@ -109,10 +98,10 @@ mod tests {
     fn the_largest_picture_does_not_overflow() {
         let none = Settings { photons: 0, ..Settings::default() };
         let some = Settings { photons: 1000, ..Settings::default() };
-        let one = needed((1, 1), 93, &none);
+        let one = needed((1, 1), 93, &none, 2.5);
         assert!(one > 93 * 4);
-        assert_eq!(needed((1 << 16, 1 << 16), 93, &some), (one << 32) + 150_000);
+        assert_eq!(needed((1 << 16, 1 << 16), 93, &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
         let merged = Settings { method: Method::Vcm, ..none };
-        assert!(needed((1, 1), 93, &merged) > one);
+        assert!(needed((1, 1), 93, &merged, 2.5) > one);
     }
 }

@@ -24,7 +24,7 @@ use caustique::finish;
 use caustique::image::exr::{self, Attributes};
 use caustique::render::auto::{Choice, choose};
 use caustique::render::output::{Present, shape};
-use caustique::render::{Clock, Control, Rendered, Settings, cpu_seconds, peak_memory};
+use caustique::render::{Clock, Control, Rendered, Settings, Told, cpu_seconds, peak_memory};
 use caustique::scene::Scene;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -51,16 +51,17 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     scene::tell(&args.job.scene, &scene.warnings)?;
     let camera = scene.camera(&args.job.view())?;
     plan::check_media(&args.job, &scene)?;
+    plan::check_bandwidth(&args.job, &scene)?;
     let settings = &args.job.sized(settings.clone(), camera.size());
     let present = Present::of(&scene);
     self::selection(args, settings, present)?;
     // Before anything is tried, which takes time.
-    memory::check(settings, camera.size(), channels(settings, present))?;
+    memory::check((&scene, &camera), settings, channels(settings, present))?;
     let interrupt = Interrupt::listen()?;
     let choice = auto(args, (&scene, &camera), present, &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
     let settings = choice.as_ref().map_or(settings, |choice| &choice.settings);
-    memory::check(settings, camera.size(), channels(settings, present))?;
+    memory::check((&scene, &camera), settings, channels(settings, present))?;
     let mut plan = plan::plan(&plan::Wishes::of(&args.job, choice.as_ref()), &scene, &camera, &removed);
     let mut ready = ready(&args.job, settings.levels.count)?;
     let mut settings = settings.clone();
@@ -120,7 +121,9 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
         summary.tell();
         if let Some(name) = name {
             let told = finished.as_ref().and_then(|account| account.told).map(|told| told.half);
-            let error = told.map(|error| format!("; its quarters tell an error of {}", percent(error)));
+            // All quarters have the kernel's bias in common, whatever the levels tell of it.
+            let note = if settings.method.has_bandwidths() { Told::Noise } else { settings.told() }.note();
+            let error = told.map(|error| format!("; its quarters tell an error of {}{note}", percent(error)));
             say(&format!("finished with {name} in {}{}", duration(finishing), error.unwrap_or_default()));
         }
     }

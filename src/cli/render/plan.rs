@@ -1,10 +1,11 @@
 //! The plan of a render: from the options to what the library plans, and its warnings told.
 
-use super::job::{Indirect, Job, Method};
+use super::job::{BandwidthChoice, Indirect, Job, Method};
 use crate::cli::progress::percent;
 use crate::cli::say;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
+use caustique::estimator::bandwidth::LEAST_ASKED;
 use caustique::plan::switch::Removed;
 use caustique::plan::{Asked, Plan, Switches};
 use caustique::render;
@@ -90,6 +91,26 @@ pub fn check_media(job: &Job, scene: &Scene) -> Result<()> {
     };
     let cause = format!("{option} does not render media that scatter light");
     Err(Error::new(Kind::Usage, job.scene.path.display(), cause).hint(hint))
+}
+
+/// Whether photons can be found within the bandwidth that was asked for.
+///
+/// # Errors
+/// It is smaller than positions in this scene can be told apart.
+pub fn check_bandwidth(job: &Job, scene: &Scene) -> Result<()> {
+    let least = f64::from(LEAST_ASKED * scene.lights.sky().radius);
+    match job.initial_bandwidth {
+        Some(BandwidthChoice::Length(asked)) if asked < least => {
+            let cause = format!(
+                "--initial-bandwidth {asked}: in a scene of radius {:.3} single precision does not tell such lengths \
+                 apart",
+                scene.lights.sky().radius
+            );
+            let error = Error::new(Kind::Usage, job.scene.path.display(), cause);
+            Err(error.hint(format!("ask for {least:.1e} at least, or leave --initial-bandwidth out")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Prints what the plan warns of.

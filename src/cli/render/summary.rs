@@ -5,7 +5,7 @@ use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
-use caustique::render::{Rendered, StopReason, peak_memory};
+use caustique::render::{Rendered, StopReason, Told, peak_memory};
 
 /// The numbers of a render.
 pub struct Summary {
@@ -14,6 +14,7 @@ pub struct Summary {
     seconds: f64,
     phases: String,
     error: Option<f64>,
+    told: Told,
     rejected: u64,
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
@@ -32,6 +33,7 @@ impl Summary {
                 p.pilot, p.light, p.map, p.eye
             ),
             error: rendered.relative_error(),
+            told: rendered.settings.told(),
             rejected: rendered.rejected(),
             stop: rendered.stop,
             full: rendered.map_is_full().then(|| {
@@ -50,7 +52,7 @@ impl Summary {
         }
         say(&line);
         if let Some(error) = self.error {
-            say(&format!("estimated relative error before the finish {}", percent(error)));
+            say(&format!("estimated relative error before the finish {}{}", percent(error), self.told.note()));
         }
         say(&format!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30)));
     }

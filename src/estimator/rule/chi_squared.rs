@@ -35,6 +35,9 @@ impl Default for ChiSquaredSettings {
 /// Least count for the first test, B_1, however few neighbours set the bandwidth: below it the statistic does not follow its distribution.
 pub const LEAST_BOUND: f32 = 10.0;
 
+/// Photons of a level that are counted at most: see [`ChiSquared::sums`].
+const MOST_COUNTED: f64 = (1u32 << 30) as f64;
+
 /// The rule.
 #[derive(Clone, Debug)]
 pub struct ChiSquared {
@@ -251,6 +254,14 @@ impl ChiSquared {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
     }
 
+    /// Halves counts before they are no longer numbers with a sign: photons that look uniform after a thousand million
+    /// of them do so by half as many. What an iteration adds is far less than what is left.
+    #[cold]
+    #[inline(never)]
+    fn halve(counts: &mut [u32]) {
+        counts.iter_mut().for_each(|count| *count /= 2);
+    }
+
     /// After an iteration: tests if there are photons enough, and shrinks the bandwidth where they do not look uniform. Returns whether it shrank.
     #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
@@ -258,6 +269,8 @@ impl ChiSquared {
         let rejected = all.0 >= f64::from(bandwidth.bound) && !self.looks_uniform(self.annuli, all);
         if rejected {
             self.shrink(bandwidth, counts);
+        } else if all.0 >= MOST_COUNTED {
+            Self::halve(counts);
         }
         rejected
     }
@@ -353,6 +366,26 @@ mod tests {
         let mut tally = Tally::default();
         rule.count(&[bandwidth], counts, &mut tally, &frame, &Found::one(offset, x * x + y * y, 1.0, Mark::default()));
         tally.unpack(0, counts);
+    }
+
+    /// Counts that would lose their sign are halved, together; those that are not uniform are rejected first.
+    #[test]
+    fn counts_stay_numbers() {
+        let rule = rule();
+        let mut bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
+        let each = (1u32 << 30) / 12 + 1;
+        let mut counts = [each; 12];
+        assert!(!rule.test(&mut bandwidth, &mut counts));
+        assert_eq!((counts, bandwidth.radius2), ([each / 2; 12], 1.0));
+        // Many iterations later: never beyond.
+        for _ in 0..10_000 {
+            counts.iter_mut().for_each(|count| *count += 1_000_000);
+            assert!(!rule.test(&mut bandwidth, &mut counts));
+            assert!(counts.iter().all(|count| *count < 1 << 30));
+        }
+        counts[3] += 1_000_000;
+        assert!(rule.test(&mut bandwidth, &mut counts) && bandwidth.radius2 < 1.0);
+        assert_eq!(counts, [0; 12]);
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::light::Guide;
 use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
+use crate::stat::floor;
 use rayon::prelude::*;
 
 /// Iterations of a candidate: one for each quarter, and as many as its share of the pilot allows.
@@ -110,10 +111,11 @@ impl<'a> Candidate<'a> {
 
 /// Relative squared difference of two pictures, without the worst pixels.
 fn variance(a: &[[f32; 3]], b: &[[f32; 3]], values: &[[f32; 3]]) -> f64 {
+    let value = |index: usize| values[index].iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
+    let floor = floor::relative((0..a.len()).map(value));
     let square = |index: usize| -> f64 {
         let apart: f64 = (0..3).map(|c| f64::from(a[index][c] - b[index][c]).powi(2)).sum();
-        let value = values[index].iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
-        apart / 3.0 * super::trial::scale(value)
+        apart / 3.0 * super::trial::scale(value(index), floor)
     };
     without_worst((0..a.len()).into_par_iter().map(square).collect())
 }

@@ -1,7 +1,7 @@
 //! Small renders of the same view: their settings, and what their pixels are worth.
 
 use crate::estimator::{InitialBandwidth, Pixel};
-use crate::finish::{Size, told::DARK, window};
+use crate::finish::{Size, window};
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
 use crate::render::method::Method;
@@ -51,9 +51,9 @@ pub(super) fn mean(v: DVec3) -> f64 {
     v.element_sum() / 3.0
 }
 
-/// What makes squares relative to the value of a pixel.
-pub(super) fn scale(value: f64) -> f64 {
-    1.0 / (value * value + DARK)
+/// What makes squares relative to the value of a pixel, above the [`floor`](crate::stat::floor) of the picture.
+pub(super) fn scale(value: f64, floor: f64) -> f64 {
+    1.0 / (value * value + floor)
 }
 
 /// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of `levels`. A pixel's own mean would not

@@ -14,6 +14,7 @@ use crate::render::cost::Cost;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
+use crate::stat::floor;
 
 /// Effects that have a part of the picture, in the order of [`parts()`].
 const WHOLE: [Effect; 5] = [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];
@@ -111,6 +112,8 @@ pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
 /// What light of so many pixels means to pictures that are worth `values`.
 struct Scale<'a> {
     values: &'a [f64],
+    /// See [`floor`].
+    floor: f64,
     /// All light of the picture.
     total: f64,
 }
@@ -124,7 +127,7 @@ impl Scale<'_> {
     /// relMSE by lack of the light, and its standard error, without the pixels where the halves disagree most.
     fn relmse(&self, [first, second]: &[Vec<DVec3>; 2]) -> (f64, f64) {
         let pixels = first.iter().zip(second).zip(self.values).map(|((first, second), value)| {
-            let (scale, apart) = (scale(*value), *first - *second);
+            let (scale, apart) = (scale(*value, self.floor), *first - *second);
             (mean(apart * apart) * scale, mean(*first * *second) * scale)
         });
         let mut pixels: Vec<(f64, f64)> = pixels.collect();
@@ -150,7 +153,8 @@ pub(super) fn weigh(
     let (pixels, whole) = picture(scene, camera, settings);
     let values = values(&pixels, camera.size(), settings.levels);
     let total = 0.5 * light(&whole, None).iter().flatten().map(|light| mean(*light)).sum::<f64>();
-    let scale = Scale { values: &values, total: total.max(f64::MIN_POSITIVE) };
+    let floor = floor::relative(values.iter().copied());
+    let scale = Scale { values: &values, floor, total: total.max(f64::MIN_POSITIVE) };
     // Light is never negative: noise hides none of it.
     let of_light = |effect: Effect, light: &[Vec<DVec3>; 2]| {
         let error_if_off = Some(scale.relmse(light).0.max(0.0).sqrt());

@@ -3,11 +3,13 @@
 use super::document::{Document, at, get};
 use super::fault;
 use crate::error::Result;
+use crate::memory;
 use gltf::json::accessor::ComponentType;
 use gltf::json::validation::Checked;
 
-/// More elements than this are not made out of nothing, as accessors without a buffer view ask for.
-const MOST_ZEROS: u64 = 1 << 24;
+/// More elements than this a file does not get out of nothing, as accessors without a buffer view ask for, whose
+/// purpose is that a few of them are replaced.
+const MOST_ZEROS: u64 = 1 << 20;
 
 const DAMAGED: &str = "the file is damaged: export it again";
 
@@ -97,6 +99,19 @@ impl Document<'_> {
         self.elements(index, 1, 0, &unsigned, true)
     }
 
+    /// Counts bytes that elements are about to take, and asks whether there are so many once they are many: a file of
+    /// many parts can name the same data in all of them.
+    fn decoding(&self, bytes: u64) -> Result<()> {
+        let unasked = self.unasked.get().saturating_add(bytes);
+        self.unasked.set(unasked);
+        if unasked < memory::SMALL {
+            return Ok(());
+        }
+        self.unasked.set(0);
+        memory::check(unasked, "its elements")
+            .map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
+    }
+
     fn elements<T: Copy>(
         &self,
         index: usize,
@@ -120,18 +135,32 @@ impl Document<'_> {
             return Err(fault(place(), format!("its elements have {have} components instead of {width}")).hint(DAMAGED));
         }
         let (count, size) = (accessor.count.0, width * component.size());
+        // After the count is known to be that of data.
+        let room = |count: usize| {
+            self.decoding(count as u64 * size_of::<T>() as u64)?;
+            memory::room(count, "elements")
+        };
         let mut values = match accessor.buffer_view {
             Some(view) => {
                 let bytes = self.view(view.value()).map_err(|e| e.within(place()))?;
                 let stride = get(&self.views, view.value(), "buffer view")?.byte_stride.map(|s| s.0);
                 let offset = accessor.byte_offset.unwrap_or_default().0;
                 let elements = Elements::new(bytes, offset, count, size, stride).map_err(|e| e.within(place()))?;
-                elements.iter().map(|bytes| decode(component, bytes)).collect()
+                let mut values = room(elements.count).map_err(|e| e.within(place()))?;
+                values.extend(elements.iter().map(|bytes| decode(component, bytes)));
+                values
             }
-            None if count > MOST_ZEROS => {
-                return Err(fault(place(), format!("{count} elements are promised without any data")).hint(DAMAGED));
+            None => {
+                let zeros = self.zeros.get().saturating_add(count);
+                if zeros > MOST_ZEROS {
+                    let cause = format!("{count} elements are promised without any data");
+                    return Err(fault(place(), cause).hint(DAMAGED));
+                }
+                self.zeros.set(zeros);
+                let mut values = room(count as usize).map_err(|e| e.within(place()))?;
+                values.resize(count as usize, zero);
+                values
             }
-            None => vec![zero; count as usize],
         };
         if let Some(sparse) = &accessor.sparse {
             let Checked::Valid(kind) = sparse.indices.component_type else {

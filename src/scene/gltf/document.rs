@@ -3,17 +3,18 @@
 use super::container::{self, malformed};
 use super::{fault, uri};
 use crate::error::Result;
+use crate::scene::folder::Folder;
 use gltf::json;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::fmt::Display;
-use std::path::Path;
 
 /// A parsed document. Indices in it are not checked yet: `get` does that.
 pub(super) struct Document<'a> {
     pub(super) raw: Value,
-    pub(super) folder: &'a Path,
+    pub(super) folder: Folder<'a>,
     pub(super) accessors: Vec<json::Accessor>,
     pub(super) views: Vec<json::buffer::View>,
     pub(super) meshes: Vec<json::Mesh>,
@@ -23,6 +24,10 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
+    /// Elements made out of nothing so far.
+    pub(super) zeros: Cell<u64>,
+    /// Bytes of elements that were taken since memory was last asked for.
+    pub(super) unasked: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
 }
 
@@ -34,7 +39,7 @@ impl<'a> Document<'a> {
     }
 
     /// Parses a file and loads its buffers; other files are looked for in `folder`.
-    pub(super) fn parse(bytes: &'a [u8], folder: &'a Path, warnings: &mut Vec<String>) -> Result<Document<'a>> {
+    pub(super) fn parse(bytes: &'a [u8], folder: Folder<'a>, warnings: &mut Vec<String>) -> Result<Document<'a>> {
         let (mut raw, binary) = container::split(bytes)?;
         container::check(&raw, warnings)?;
         // A scene without nodes is valid glTF; the crate wants the list.
@@ -56,6 +61,8 @@ impl<'a> Document<'a> {
             samplers: parts(&raw, "samplers")?,
             raw,
             folder,
+            zeros: Cell::new(0),
+            unasked: Cell::new(0),
             buffers,
         })
     }
@@ -157,7 +164,7 @@ fn core(value: &Value, place: &str) -> Result<Value> {
     })
 }
 
-fn buffers<'a>(list: &[json::Buffer], binary: &'a [u8], folder: &Path) -> Result<Vec<Cow<'a, [u8]>>> {
+fn buffers<'a>(list: &[json::Buffer], binary: &'a [u8], folder: Folder) -> Result<Vec<Cow<'a, [u8]>>> {
     let load = |(i, buffer): (usize, &json::Buffer)| {
         let place = at("buffer", i);
         let bytes = match &buffer.uri {

@@ -59,9 +59,12 @@ pub struct ReadOptions {
     pub light_units: LightUnits,
     /// Glass without a volume extension.
     pub glass: Glass,
+    /// Files that the scene names may lie outside its own folder.
+    pub allow_outside: bool,
 }
 
-/// Reads the scene file at `path`; buffers, textures and the environment that it names are looked for beside it.
+/// Reads the scene file at `path`; buffers, textures and the environment that it names are looked for beside it, and
+/// nowhere outside its folder unless `options` allow it.
 ///
 /// # Errors
 /// The file or one that it names cannot be read, is damaged, or requires an extension that is not supported. The place in

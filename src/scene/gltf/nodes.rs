@@ -8,21 +8,24 @@ use super::{ReadOptions, counted, fault, lights, mesh, shading_frame, topology};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{DAffine3, DMat3, DVec3, Rgb};
+use crate::memory;
 use crate::scene::Description;
 use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Placed};
 use crate::scene::environment_file;
+use crate::scene::folder::Folder;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// More copies of one node than this are taken for damage.
-const MOST_COPIES: usize = 1 << 24;
+/// Bytes that a mesh takes each time it is placed, in our lists and in Embree's: 957 MiB were taken by 2^20 copies of a
+/// triangle.
+const PLACED_BYTES: u64 = 1000;
 
 /// Turns the bytes of a file into a description.
 pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
     let mut warnings = Vec::new();
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = Folder::of(path, options.allow_outside);
     let document = Document::parse(bytes, folder, &mut warnings)?;
     let mut reader = Reader {
         document: &document,
@@ -156,7 +159,10 @@ impl Reader<'_> {
                 }
                 EnvironmentSource::Color(color)
             }
-            (None, Some(file)) => environment_file::read(&self.document.folder.join(file), &mut self.out.warnings)?,
+            (None, Some(file)) => {
+                let file = self.document.folder.file(file.as_ref()).map_err(|e| e.within("environment"))?;
+                environment_file::read(&file, &mut self.out.warnings)?
+            }
             _ => {
                 self.out
                     .warnings
@@ -246,6 +252,7 @@ impl Reader<'_> {
         if parts.is_empty() {
             return Ok(());
         }
+        self.check_room(copies.len(), parts.len()).map_err(|e| e.within(place))?;
         let object = self.out.objects.len() as u32;
         self.out.objects.push(name.clone());
         let mut flat = 0;
@@ -349,16 +356,32 @@ impl Reader<'_> {
         let turns = index("ROTATION").map(|i| self.document.floats::<4>(i)).transpose().map_err(within)?;
         let counts = [moves.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), turns.as_ref().map(Vec::len)];
         let n = counts.iter().flatten().copied().max().unwrap_or(0);
-        if counts.iter().flatten().any(|c| *c != n) || n > MOST_COPIES {
-            return Err(within(fault("", "its attributes differ in length, or are too long")));
+        if counts.iter().flatten().any(|c| *c != n) {
+            return Err(within(fault("", "its attributes differ in length")));
         }
+        self.check_room(n, 1).map_err(within)?;
         let copy = |i: usize| {
             let three = |v: &Option<Vec<[f32; 3]>>| v.as_ref().map(|v| v[i].map(f64::from));
             let turn = turns.as_ref().map(|v| v[i].map(f64::from));
             let copy = compose(three(&moves), turn, three(&scales)).filter(finite);
             copy.ok_or_else(|| within(fault("", format!("the transform of copy {i} is not finite"))))
         };
-        (0..n).map(copy).collect()
+        let mut copies = memory::room(n, "copies").map_err(within)?;
+        for i in 0..n {
+            copies.push(copy(i)?);
+        }
+        Ok(copies)
+    }
+
+    /// Checks that so many copies of a mesh in so many parts fit beside what is placed already.
+    fn check_room(&self, copies: usize, parts: usize) -> Result<()> {
+        let placed = (copies as u64).saturating_mul(parts as u64).saturating_add(self.out.instances.len() as u64);
+        let bytes = placed.saturating_mul(PLACED_BYTES);
+        if bytes < memory::SMALL {
+            return Ok(());
+        }
+        memory::check(bytes, format_args!("{placed} placed meshes"))
+            .map_err(|e| e.hint("place fewer copies, join them into one mesh, or render with more memory"))
     }
 }
 

@@ -3,10 +3,11 @@
 use super::document::{Document, get, named};
 use super::{fault, uri};
 use crate::error::{Error, Kind, Result};
+use crate::memory;
 use crate::texture::{Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashMap;
@@ -178,6 +179,7 @@ fn decode(bytes: &[u8]) -> Result<DynamicImage> {
     limits.max_alloc = Some(MOST_BYTES);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
+    check_room(bytes, format)?;
     // A decoder's own fault must not end the program.
     let decoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.decode()));
     let decoded = decoded.map_err(|_| broken("it cannot be decoded: the decoder failed".into()))?;
@@ -186,6 +188,22 @@ fn decode(bytes: &[u8]) -> Result<DynamicImage> {
         return Err(broken("it has no texels".into()));
     }
     Ok(image)
+}
+
+/// Checks that the image fits as it is decoded and as it is kept: a few bytes can stand for a gigabyte of one colour.
+fn check_room(bytes: &[u8], format: ImageFormat) -> Result<()> {
+    // What is wrong with it, or larger than any image is taken, the decoder tells.
+    let Ok(decoder) = ImageReader::with_format(Cursor::new(bytes), format).into_decoder() else { return Ok(()) };
+    let (width, height) = decoder.dimensions();
+    let deep = decoder.color_type().bytes_per_pixel() > decoder.color_type().channel_count();
+    // Four bytes, or four floats twice on the way, beside what is decoded.
+    let texels = u64::from(width) * u64::from(height);
+    let needed = decoder.total_bytes().saturating_add(texels * if deep { 32 } else { 4 });
+    if needed < memory::SMALL || width > MOST_TEXELS || height > MOST_TEXELS {
+        return Ok(());
+    }
+    memory::check(needed, format_args!("{width} x {height} texels"))
+        .map_err(|e| e.hint("save the image smaller, or render with more memory"))
 }
 
 /// Texels as the renderer keeps them: 8 bits stay 8 bits, more become floats.

@@ -2,10 +2,11 @@
 
 use super::fault;
 use crate::error::{Error, Kind, Result};
-use std::path::{Path, PathBuf};
+use crate::scene::folder::Folder;
+use std::path::PathBuf;
 
 /// The bytes that `uri` stands for; relative paths start at `folder`.
-pub(super) fn load(uri: &str, folder: &Path) -> Result<Vec<u8>> {
+pub(super) fn load(uri: &str, folder: Folder) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((head, body)) = data.split_once(',') else {
             return Err(fault("", "its data URI has no comma").hint("export the scene again"));
@@ -30,7 +31,7 @@ pub(super) fn load(uri: &str, folder: &Path) -> Result<Vec<u8>> {
 }
 
 /// The file that a relative or absolute path in a URI names.
-pub(super) fn path_of(uri: &str, folder: &Path) -> Result<PathBuf> {
+pub(super) fn path_of(uri: &str, folder: Folder) -> Result<PathBuf> {
     let scheme = uri.split_once(':').map(|(scheme, _)| scheme);
     let path = match scheme {
         // One letter is a drive.
@@ -44,7 +45,7 @@ pub(super) fn path_of(uri: &str, folder: &Path) -> Result<PathBuf> {
         _ => uri,
     };
     let path = String::from_utf8(percent_decode(path)).map_err(|_| fault("", "its URI is not valid UTF-8"))?;
-    Ok(folder.join(path))
+    folder.file(path.as_ref())
 }
 
 /// `%41` is `A`; a percent sign without two digits stands for itself.
@@ -94,6 +95,7 @@ fn base64(text: &str) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
     fn base64_of_the_rfc() {
@@ -107,7 +109,8 @@ mod tests {
 
     #[test]
     fn paths_are_percent_decoded() {
-        let at = |uri: &str| path_of(uri, Path::new("/scenes")).map(|p| p.display().to_string());
+        let folder = Folder::of(Path::new("/scenes/a.gltf"), true);
+        let at = |uri: &str| path_of(uri, folder).map(|p| p.display().to_string());
         assert_eq!(at("a%20b/c.bin").unwrap(), "/scenes/a b/c.bin");
         assert_eq!(at("100%.bin").unwrap(), "/scenes/100%.bin");
         assert_eq!(at("file:///x/y.bin").unwrap(), "/x/y.bin");

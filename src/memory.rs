@@ -1,0 +1,150 @@
+//! Memory that the process may still take, asked before much of it is taken.
+//!
+//! What a few numbers of a scene or of the command line ask for (copies, vertices, pixels, light paths) is multiplied
+//! out first and refused with that number: Rust ends the process where an allocation fails, Embree does, and Linux ends
+//! it where one is given but not there. The least of three counts: what the machine has left, `ulimit -v`, and the
+//! `memory.max` of the control groups (containers, batch systems, systemd).
+
+use crate::error::{Error, Kind, Result};
+use rustix::process::{Resource, getrlimit};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+/// Smaller amounts than this are not asked about.
+pub const SMALL: u64 = 16 << 20;
+
+/// Bytes that may still be taken, and who says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Available {
+    /// How many.
+    pub bytes: u64,
+    /// Whose limit it is: `available`, `left by 'ulimit -v'`.
+    pub by: &'static str,
+}
+
+/// The least of what the machine and the limits of the process leave; `None` where none of them tells.
+pub fn available() -> Option<Available> {
+    let machine = || kib(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
+    let address_space = || {
+        let most = getrlimit(Resource::As).current?;
+        Some(most.saturating_sub(kib(&std::fs::read_to_string("/proc/self/status").ok()?, "VmSize:")?))
+    };
+    let groups = || left_by_groups(&std::fs::read_to_string("/proc/self/cgroup").ok()?, Path::new("/sys/fs/cgroup"));
+    let limits = [
+        (machine(), "available"),
+        (address_space(), "left by 'ulimit -v'"),
+        (groups(), "left by the control group (a container's or a job's limit)"),
+    ];
+    let limits = limits.into_iter().filter_map(|(bytes, by)| Some(Available { bytes: bytes?, by }));
+    limits.min_by_key(|limit| limit.bytes)
+}
+
+/// Checks that `bytes` can be taken, which `what` need.
+///
+/// # Errors
+/// There is less: with both numbers, without a place, to which the caller adds the remedy.
+pub fn check(bytes: u64, what: impl Display) -> Result<()> {
+    match available() {
+        Some(Available { bytes: left, by }) if bytes > left => {
+            let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+            let cause = format!("{what} need about {:.1} GiB of memory, {:.1} GiB are {by}", gib(bytes), gib(left));
+            Err(Error::new(Kind::Scene, "", cause))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// An empty vector with room for `count` items; `what` they are.
+///
+/// # Errors
+/// The allocator has no room for them.
+pub fn room<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
+    let mut items = Vec::new();
+    match items.try_reserve_exact(count) {
+        Ok(()) => Ok(items),
+        Err(_) => {
+            let mib = (count as u128 * size_of::<T>() as u128) >> 20;
+            Err(Error::new(Kind::Scene, "", format!("there is no memory for {count} {what} ({mib} MiB)")))
+        }
+    }
+}
+
+/// The value of a line of `/proc` in bytes: `MemAvailable:  123 kB`.
+fn kib(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
+    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
+/// What the control groups leave that `/proc/self/cgroup` names (version 2: `0::/path`; version 1: `9:memory:/path`),
+/// below the mount at `root`. A group's own limit binds, and so do those around it; a container may see its own group
+/// as the root.
+fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
+    let groups = text.lines().filter_map(|line| {
+        let mut fields = line.splitn(3, ':').skip(1);
+        let (controllers, path) = (fields.next()?, fields.next()?.trim_start_matches('/'));
+        match controllers {
+            "" => Some((root.to_owned(), path, ["memory.max", "memory.current", "inactive_file"])),
+            list if list.split(',').any(|name| name == "memory") => {
+                let names = ["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"];
+                Some((root.join("memory"), path, names))
+            }
+            _ => None,
+        }
+    });
+    let left = groups.flat_map(|(mount, path, names)| {
+        let around: Vec<PathBuf> = Path::new(path).ancestors().map(|group| mount.join(group)).collect();
+        around.into_iter().filter_map(move |group| left_by_group(&group, names))
+    });
+    left.min()
+}
+
+/// The limit of a group, less what it uses and could not give back: its files' pages count as used until they are
+/// wanted elsewhere.
+fn left_by_group(group: &Path, [limit, usage, files]: [&str; 3]) -> Option<u64> {
+    let number = |name: &str| std::fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
+    let (limit, usage) = (number(limit)?, number(usage)?);
+    let stat = std::fs::read_to_string(group.join("memory.stat")).unwrap_or_default();
+    let files = stat.lines().find_map(|line| line.strip_prefix(files)?.trim().parse().ok());
+    Some(limit.saturating_sub(usage.saturating_sub(files.unwrap_or(0))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tightest_group_binds() {
+        let root = tempfile::tempdir().expect("a folder");
+        let write = |path: &str, text: &str| {
+            let path = root.path().join(path);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            std::fs::write(path, text).expect("it can be written");
+        };
+        let left = |text: &str| left_by_groups(text, root.path());
+        assert_eq!(left("0::/jobs/7\n"), None);
+        write("jobs/7/memory.max", "max\n");
+        write("jobs/7/memory.current", "900\n");
+        assert_eq!(left("0::/jobs/7\n"), None);
+        write("jobs/memory.max", "5000\n");
+        write("jobs/memory.current", "1700\n");
+        write("jobs/memory.stat", "anon 900\ninactive_file 300\nactive_file 500\n");
+        assert_eq!(left("0::/jobs/7\n"), Some(3600));
+        write("jobs/7/memory.max", "1000\n");
+        assert_eq!(left("0::/jobs/7\n"), Some(100));
+        // The first version, in a container that sees its group as the root.
+        write("memory/memory.limit_in_bytes", "4096\n");
+        write("memory/memory.usage_in_bytes", "96\n");
+        assert_eq!(left("4:cpu,cpuacct:/x\n3:memory:/docker/abc\n"), Some(4000));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error_with_its_number() {
+        assert!(available().expect("Linux tells").bytes > 0);
+        assert!(check(1 << 20, "few").is_ok());
+        let error = check(1 << 60, "9 copies").expect_err("no machine has that");
+        assert!(error.cause.starts_with("9 copies need about 1073741824.0 GiB of memory, "), "{error}");
+        assert_eq!(room::<u64>(3, "numbers").map(|items| items.capacity() >= 3), Ok(true));
+        let error = room::<u64>(1 << 59, "numbers").expect_err("no machine has that");
+        assert_eq!(error.cause, format!("there is no memory for {} numbers ({} MiB)", 1u64 << 59, 1u64 << 42));
+    }
+}

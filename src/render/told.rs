@@ -1,0 +1,70 @@
+//! What an estimated error knows of.
+//!
+//! Variance is told by independent iterations, bias by the next larger of several bandwidth levels
+//! ([`crate::estimator::SquaredError`]). Where there is no such level, or the points that gather photons stay where
+//! they are, the number lacks a part of the error, and whoever reads it is told so beside it.
+
+use super::method::Method;
+use super::settings::Settings;
+use serde::Serialize;
+
+/// What the estimate of a render's error is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Told {
+    /// All of the error: of noise, and of bias where the method has any.
+    #[serde(rename = "noise and bias")]
+    All,
+    /// Noise alone: the bias of the bandwidth is not known.
+    #[serde(rename = "noise")]
+    Noise,
+    /// The noise of photons alone: eye paths are the same in every iteration \[Hachisuka et al. 2008\], and what
+    /// another set of them would show differs by more than iterations do.
+    #[serde(rename = "noise of photons")]
+    PhotonNoise,
+}
+
+impl Told {
+    /// What is lacking, to be printed behind the number: ` (noise only)`; nothing where nothing is.
+    pub fn note(self) -> &'static str {
+        match self {
+            Told::All => "",
+            Told::Noise => " (noise only)",
+            Told::PhotonNoise => " (noise of photons only)",
+        }
+    }
+}
+
+impl Settings {
+    /// What the estimated error of such a render knows of.
+    pub fn told(&self) -> Told {
+        let compared = self.levels.own() + 1 < self.compared_levels();
+        match self.method {
+            Method::Ppm => Told::PhotonNoise,
+            Method::Pm => Told::Noise,
+            method if method.has_bandwidths() && !compared => Told::Noise,
+            _ => Told::All,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::{Levels, RadiusRule};
+
+    #[test]
+    fn bias_is_told_by_a_larger_level() {
+        let of = |method: Method, levels: usize, radius_rule: RadiusRule| {
+            Settings { method, levels: Levels::new(levels), radius_rule, ..Settings::default() }.told()
+        };
+        let memoryless = RadiusRule::Memoryless;
+        assert_eq!(of(Method::Sppm, 5, memoryless), Told::All);
+        assert_eq!(of(Method::Sppm, 1, memoryless), Told::Noise);
+        assert_eq!(of(Method::Sppm, 5, RadiusRule::Local), Told::Noise);
+        assert_eq!(of(Method::Cppm, 5, memoryless), Told::Noise);
+        assert_eq!(of(Method::Vcm, 1, memoryless), Told::Noise);
+        assert_eq!(of(Method::Path, 1, memoryless), Told::All);
+        assert_eq!(of(Method::Pm, 1, memoryless), Told::Noise);
+        assert_eq!(of(Method::Ppm, 1, RadiusRule::Local), Told::PhotonNoise);
+    }
+}

@@ -1,0 +1,85 @@
+//! Files that a scene names outside its own folder.
+
+use super::glb::Glb;
+use super::message;
+use caustique::scene::gltf::{ReadOptions, read_bytes};
+use serde_json::json;
+use std::path::Path;
+
+/// A scene in `folder/scene` whose mesh, texture or sky is `name`.
+fn reading(folder: &Path, part: &str, name: &str, allow_outside: bool) -> Result<(), String> {
+    let mut file = Glb::new();
+    let mesh = file.mesh("water", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[0, 1, 2], None);
+    file.node(json!({"mesh": mesh}));
+    match part {
+        "buffer" => file.json["buffers"][0]["uri"] = name.into(),
+        "image" => {
+            file.json["images"] = json!([{"uri": name}]);
+            file.json["textures"] = json!([{"source": 0}]);
+            file.json["materials"] = json!([{"emissiveTexture": {"index": 0}}]);
+            file.json["meshes"][0]["primitives"][0]["material"] = 0.into();
+        }
+        _ => file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"file": name}}}),
+    }
+    let options = ReadOptions { allow_outside, ..ReadOptions::default() };
+    let read = read_bytes(&file.bytes(), &folder.join("scene/a.glb"), &options);
+    read.map(drop).map_err(|error| message(&error).replace(&folder.display().to_string(), "DIR"))
+}
+
+/// By a path upwards, a path from the root, a URI, and a link: refused, alike whether the file exists, unless it is
+/// allowed.
+#[test]
+fn files_outside_the_folder_are_not_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let inside = folder.join("scene/parts");
+    std::fs::create_dir_all(&inside).expect("a folder");
+    for (name, bytes) in [("a.bin", vec![0u8; 72]), ("a.png", png()), ("a.hdr", hdr())] {
+        std::fs::write(inside.join(name), &bytes).expect("it can be written");
+        std::fs::write(folder.join(name), &bytes).expect("it can be written");
+    }
+    std::os::unix::fs::symlink(folder, folder.join("scene/up")).expect("a link");
+    // A folder whose name begins with the scene's.
+    std::os::unix::fs::symlink(folder, folder.join("scene-2")).expect("a link");
+    let root = folder.display().to_string();
+    let places = [
+        ("buffer", "a.bin", "buffer 0"),
+        ("image", "a.png", "material 0, emissiveTexture: image 0"),
+        ("environment", "a.hdr", "scene \"Scene\": environment"),
+    ];
+    for (part, file, place) in places {
+        for name in [format!("parts/{file}"), format!("parts/../parts/{file}"), format!("{root}/scene/parts/{file}")] {
+            assert_eq!(reading(folder, part, &name, false), Ok(()), "{part} {name}");
+        }
+        let absent = format!("../no-{file}");
+        let mut names = vec![format!("../{file}"), format!("{root}/{file}"), format!("up/{file}"), absent.clone()];
+        names.extend([format!("up/no-{file}"), format!("../scene-2/{file}"), format!("nowhere/../../{file}")]);
+        if part != "environment" {
+            names.extend([format!("file://{root}/{file}"), format!("%2e%2e/{file}")]);
+        }
+        for name in names {
+            let shown = name.trim_start_matches("file://").replace("%2e", ".").replace(&root, "DIR");
+            let expected = format!(
+                "DIR/scene/a.glb: {place}: the file {shown} is outside the scene's folder\n\
+                 hint: put it beside the scene file and name it so, or allow such files with --allow-outside"
+            );
+            let told = reading(folder, part, &name, false).expect_err(&name);
+            assert_eq!(told, expected, "{part} {name}");
+            if name != absent && !name.contains("no-") && !name.starts_with("nowhere") {
+                assert_eq!(reading(folder, part, &name, true), Ok(()), "{part} {name}");
+            }
+        }
+    }
+}
+
+fn png() -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(1, 1).write_to(&mut bytes, image::ImageFormat::Png).expect("a picture");
+    bytes.into_inner()
+}
+
+fn hdr() -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::Rgb32FImage::new(1, 1).write_to(&mut bytes, image::ImageFormat::Hdr).expect("a picture");
+    bytes.into_inner()
+}

@@ -1,0 +1,127 @@
+//! When renders stop by their estimated error.
+
+mod support;
+
+use caustique::film::{Layer, LayerSet};
+use caustique::image::{Floor, metrics};
+use caustique::math::{DVec3, Vec3};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, StopReason, render};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
+
+const SIZE: u32 = 16;
+
+fn rendered(scene: &Scene, settings: &Settings) -> Rendered {
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    render(scene, &camera, settings, |_, _| Control::Continue)
+}
+
+/// A floor under a point lamp and a lit panel, all `scale` times as bright.
+fn lit(scale: f32) -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z), matte(0.5, 0.0));
+    let wall = quad(Vec3::new(-2.0, 0.0, -2.0), 4.0 * Vec3::X, 3.0 * Vec3::Y);
+    add(&mut description, "wall", wall, matte(0.7, 0.0));
+    let panel = quad(Vec3::new(-0.5, 1.9, -0.5), Vec3::X, Vec3::Z);
+    add(&mut description, "panel", panel, matte(0.0, 2.0 * scale));
+    description.lights.push(point_light(DVec3::new(1.0, 1.5, 0.5), 3.0 * scale));
+    description.cameras.push(look_at(DVec3::new(0.2, 1.4, 4.5), DVec3::new(0.0, 0.6, 0.0), 50.0));
+    build(description)
+}
+
+/// Lamps a thousandth or a thousand times as bright: the same error after the same number of iterations, by every
+/// method and with a guide.
+#[test]
+fn errors_do_not_depend_on_the_unit_of_radiance() {
+    let scenes = [1.0, 1.0 / 1024.0, 1024.0].map(lit);
+    for (method, guided) in [
+        (Method::Path, false),
+        (Method::Bdpt, false),
+        (Method::Vcm, false),
+        (Method::Sppm, false),
+        (Method::Sppm, true),
+        (Method::Cppm, false),
+    ] {
+        let settings = Settings {
+            method,
+            guided,
+            photons: 3000,
+            iterations: Some(400),
+            target_error: Some(0.12),
+            ..Settings::default()
+        };
+        let all = scenes.each_ref().map(|scene| rendered(scene, &settings));
+        let error = |rendered: &Rendered| rendered.relative_error().expect("light is seen");
+        let own = error(&all[0]);
+        assert_eq!(all[0].stop, StopReason::Error, "{method:?} {guided}: {own}");
+        for (other, of) in all[1..].iter().zip(["dark", "bright"]) {
+            assert_eq!(
+                (other.stop, other.iterations),
+                (StopReason::Error, all[0].iterations),
+                "{method:?} {guided} {of}"
+            );
+            assert!((error(other) / own - 1.0).abs() < 1e-6, "{method:?} {guided} {of}: {} {own}", error(other));
+        }
+        println!("{method:?} {guided}: {} iterations, {own}", all[0].iterations);
+    }
+}
+
+/// A point lamp in a glass ball is found by no path that starts at the eye: the picture stays black, and nothing is
+/// known of its error.
+#[test]
+fn a_black_picture_is_not_finished() {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z), matte(0.5, 0.0));
+    add(&mut description, "bulb", sphere(Vec3::Y, 0.2, 16), glass(1.5));
+    description.lights.push(point_light(DVec3::Y, 5.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 3.0), DVec3::ZERO, 50.0));
+    let scene = build(description);
+    let settings =
+        Settings { method: Method::Path, iterations: Some(40), target_error: Some(0.9), ..Settings::default() };
+    let dark = rendered(&scene, &settings);
+    assert!(dark.pixels.iter().all(|pixel| pixel.levels[0].mean == DVec3::ZERO));
+    assert_eq!((dark.stop, dark.iterations, dark.relative_error()), (StopReason::Iterations, 40, None));
+    // Photons find it.
+    let seen = rendered(&scene, &Settings { method: Method::Sppm, photons: 3000, ..settings });
+    assert!(seen.relative_error().is_some());
+    assert_eq!(seen.stop, StopReason::Error);
+}
+
+/// What is certain from the start ends after two iterations in every quarter, and so does the black picture of a scene
+/// without lights.
+#[test]
+fn a_least_number_of_iterations() {
+    for emission in [1.0, 0.0] {
+        let mut description = Description::default();
+        add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.0, emission));
+        description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+        let settings = Settings {
+            method: Method::Path,
+            levels: Levels::new(1),
+            iterations: Some(40),
+            target_error: Some(0.01),
+            ..Settings::default()
+        };
+        let rendered = rendered(&build(description), &settings);
+        assert_eq!((rendered.stop, rendered.iterations), (StopReason::Error, 8), "{emission}");
+    }
+}
+
+/// A picture that is off by a tenth everywhere: 0.01 / 1.01 above the floor that its reference's mean sets, whatever
+/// the unit; the papers' relMSE depends on it.
+#[test]
+fn comparisons_above_a_relative_floor() {
+    let layers = |value: f32| {
+        let mut set = LayerSet::new(20, 10);
+        set.layers.push(Layer::interleaved("", "RGB", vec![[value; 3]; 200]));
+        set
+    };
+    for scale in [1.0f32 / 1024.0, 1.0, 1024.0] {
+        let (a, b) = (layers(1.125 * scale), layers(scale));
+        let relative = metrics::compare_above(&a, &b, Floor::Relative).expect("sizes agree");
+        assert!((relative.relmse - 0.015625 / 1.01).abs() < 1e-12, "{relative:?}");
+        let papers = metrics::compare_above(&a, &b, Floor::Papers).expect("sizes agree");
+        let square = f64::from(scale).powi(2);
+        assert!((papers.relmse - 0.015625 * square / (square + 0.01)).abs() < 1e-9 * papers.relmse, "{papers:?}");
+    }
+}
