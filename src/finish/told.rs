@@ -11,38 +11,49 @@ use rayon::prelude::*;
 /// does not depend on `F`.
 pub const WORST: f64 = 0.005;
 
+/// What two judges tell of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged {
+    /// Its squared relative error; noise around a small one may make it negative.
+    pub error: f64,
+    /// What the judges' noise adds to that, by channel: its derivative by a judge times how far the two are apart.
+    pub pulls: [f64; 3],
+}
+
 /// Squared relative errors of the pixels of `picture`, as two `judges` tell them that share no noise with it or each
 /// other: means over RGB of `(F - J1)(F - J2) / (mean_RGB(V)^2 + floor)`, where the picture `values` says what pixels
 /// are worth, and what the [`floor`] is. Without the worst pixels, those where judges differ most; in the same order
-/// for all pictures that are judged alike. Noise around a small error may make them and their mean negative.
+/// for all pictures that are judged alike.
 ///
-/// Judged alike, pictures differ by their own errors alone: the judges' noise is the same in all.
-pub fn squared_errors(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> Vec<f64> {
+/// Judged alike, pictures differ by their own errors alone: the judges' noise is the same in all, but for what it takes
+/// from each by `pulls`.
+pub fn judge(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> Vec<Judged> {
     let mean = |index: usize| values[index].iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
     let floor = floor::relative((0..picture.len()).map(mean));
     let of_pixel = |index: usize| {
-        let (f, [a, b]) = (picture[index], judges.map(|judge| judge[index]));
-        let mean = mean(index);
+        let (f, [a, b]) = (picture[index], judges.map(|judge| judge[index].map(f64::from)));
+        let (f, mean) = (f.map(f64::from), mean(index));
         let scale = 1.0 / (3.0 * (mean * mean + floor));
         let over = |of: &dyn Fn(usize) -> f64| (0..3).map(of).sum::<f64>() * scale;
-        let apart = over(&|c| f64::from(a[c] - b[c]).powi(2));
-        let product = over(&|c| f64::from(f[c] - a[c]) * f64::from(f[c] - b[c]));
-        (apart, product)
+        let apart = over(&|c| (a[c] - b[c]).powi(2));
+        let error = over(&|c| (f[c] - a[c]) * (f[c] - b[c]));
+        let pulls = std::array::from_fn(|c| scale * (f[c] - 0.5 * (a[c] + b[c])) * (a[c] - b[c]));
+        (apart, Judged { error, pulls })
     };
-    let pixels: Vec<(f64, f64)> = (0..picture.len()).into_par_iter().map(of_pixel).collect();
+    let pixels: Vec<(f64, Judged)> = (0..picture.len()).into_par_iter().map(of_pixel).collect();
     let mut apart: Vec<f64> = pixels.iter().map(|(apart, _)| *apart).collect();
     let kept = apart.len() - (apart.len() as f64 * WORST) as usize;
     if kept == 0 {
         return Vec::new();
     }
     let most = *apart.select_nth_unstable_by(kept - 1, f64::total_cmp).1;
-    pixels.into_iter().filter(|(apart, _)| *apart <= most).map(|(_, product)| product).collect()
+    pixels.into_iter().filter(|(apart, _)| *apart <= most).map(|(_, judged)| judged).collect()
 }
 
-/// The mean of [`squared_errors`].
+/// The mean of the errors that [`judge`] tells.
 pub fn squared_error(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> f64 {
-    let errors = squared_errors(picture, judges, values);
-    errors.iter().sum::<f64>() / errors.len().max(1) as f64
+    let pixels = judge(picture, judges, values);
+    pixels.iter().map(|pixel| pixel.error).sum::<f64>() / pixels.len().max(1) as f64
 }
 
 /// Means of quarters 1 and 2 per pixel, of equal numbers of iterations but for one.

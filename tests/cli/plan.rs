@@ -108,7 +108,7 @@ fn classes_of_light_paths_are_left_out() {
     }
     // Nothing that photons would bring is left.
     let none = folder.run(
-        "render scene.glb --width 64 --height 48 --no-combine --iterations 1 -o none.exr --effects -caustic,-sds,-indirect,-glossy",
+        "render scene.glb --width 64 --height 48 --no-combine --method sppm --iterations 1 -o none.exr --effects -caustic,-sds,-indirect,-glossy",
     );
     assert_eq!(none.code, Some(0), "{}", none.stderr);
     assert_eq!(folder.read("none.exr").1["light_paths"], 0);

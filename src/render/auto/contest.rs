@@ -7,7 +7,8 @@
 
 use super::Way;
 use super::trial::WORST;
-use crate::finish::{Estimate, Finish, quarters, reads_for_error, told};
+use crate::finish::told::{self, Judged};
+use crate::finish::{Estimate, Finish, quarters, reads_for_error};
 use crate::light::Guide;
 use crate::render::cost::Cost;
 use crate::render::method::Method;
@@ -21,11 +22,8 @@ pub(super) const ITERATIONS: (u64, u64) = (4, 256);
 const FIRST: f64 = 0.4;
 /// Those whose picture has so many times the squared error of the best after that are out.
 const UNCLEAR: f64 = 2.0;
-/// Standard errors that a difference has to stand out by before a candidate is out.
+/// Standard errors that a difference has to stand out by: before a candidate is out, and before the usual way is left for a better one.
 const TOLD: f64 = 2.0;
-/// The usual way is taken where it is within so many standard errors of the best: the rule of one standard error (Breiman et al. 1984,
-/// section 3.4.3), by which the choice leaves a default only for what the data show.
-const CLEAR: f64 = 1.0;
 /// A judge has to have seen this share of the caustics that any other has.
 const SEEN: f64 = 0.5;
 
@@ -167,20 +165,21 @@ fn judges(candidates: &[Candidate<'_>], shown: &[Option<Shown>], focuses: bool) 
     Some(([mean(0), mean(1)], least))
 }
 
-/// What a candidate is expected to leave: squared errors by pixel, over which the noise of the pilot shows; `None` where nothing was
-/// seen.
-struct Left(Option<Vec<f64>>);
+/// What a candidate is expected to leave, by pixel; `None` where nothing was seen.
+struct Left(Option<Vec<Judged>>);
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
 }
 
 impl Left {
-    /// Carries the squared errors of a candidate's half, and of either quarter of it, on to `more` times the half's iterations, as the
-    /// power of their number that the means show. What the pixels mean is linear in both errors: the power's own noise, which grows
-    /// with the logarithm of `more`, is in theirs.
-    fn carried(half: &[f64], quarter: &[f64], more: f64) -> Left {
-        let (h, q) = (mean(half), mean(quarter));
+    /// Carries what was told of a candidate's half, and of either quarter of it, on to `more` times the half's iterations, as the power of
+    /// their number that the mean errors show. It is linear in both, so that the power's own noise, which grows with the logarithm of
+    /// `more`, is in what it is told to be worth.
+    fn carried(half: &[Judged], quarters: [&[Judged]; 2], more: f64) -> Left {
+        let of = |pixels: &[Judged]| mean(pixels.iter().map(|pixel| pixel.error));
+        let (h, q) = (of(half), 0.5 * (of(quarters[0]) + of(quarters[1])));
         let more = more.max(1.0);
         // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is missing.
         let (of_half, of_quarter) = match h {
@@ -191,21 +190,30 @@ impl Left {
                 (scale * (1.0 + doublings), -scale * doublings * h / q)
             }
         };
-        Left(Some(half.iter().zip(quarter).map(|(h, q)| of_half * h + of_quarter * q).collect()))
+        let pixel = |((half, a), b): ((&Judged, &Judged), &Judged)| {
+            let carried = |half: f64, a: f64, b: f64| of_half * half + of_quarter * 0.5 * (a + b);
+            Judged {
+                error: carried(half.error, a.error, b.error),
+                pulls: std::array::from_fn(|c| carried(half.pulls[c], a.pulls[c], b.pulls[c])),
+            }
+        };
+        Left(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
     }
 
     fn squared_error(&self) -> f64 {
-        self.0.as_ref().map_or(f64::INFINITY, |errors| mean(errors).max(f64::MIN_POSITIVE))
+        let error = |pixels: &Vec<Judged>| mean(pixels.iter().map(|pixel| pixel.error)).max(f64::MIN_POSITIVE);
+        self.0.as_ref().map_or(f64::INFINITY, error)
     }
 
-    /// How much more it leaves than another, and the standard error of that: pixel by pixel, for both were judged by the same pictures.
+    /// How much more it leaves than another, and the standard error that the judges' noise gives that: both were judged by the same.
     fn more_than(&self, other: &Left) -> (f64, f64) {
-        let (Some(errors), Some(others)) = (&self.0, &other.0) else {
+        let (Some(pixels), Some(others)) = (&self.0, &other.0) else {
             return (if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY }, 0.0);
         };
-        let apart: Vec<f64> = errors.iter().zip(others).map(|(a, b)| a - b).collect();
-        let squares: Vec<f64> = apart.iter().map(|apart| apart * apart).collect();
-        (mean(&apart), (mean(&squares) / apart.len().max(1) as f64).sqrt())
+        let apart = pixels.iter().zip(others).map(|(a, b)| a.error - b.error);
+        let pull = |(a, b): (&Judged, &Judged)| (0..3).map(|c| (a.pulls[c] - b.pulls[c]).powi(2)).sum::<f64>();
+        let count = pixels.len().max(1) as f64;
+        (mean(apart), (mean(pixels.iter().zip(others).map(pull)) / count).sqrt())
     }
 
     /// It may still turn out no worse than the best.
@@ -216,7 +224,7 @@ impl Left {
 
     fn is_clearly_worse(&self, than: &Left) -> bool {
         let (more, noise) = self.more_than(than);
-        more > CLEAR * noise
+        more > TOLD * noise
     }
 }
 
@@ -270,12 +278,11 @@ fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, focuses: bool,
     let values = judged.as_ref().and_then(|(_, worth)| shown[*worth].as_ref()).map(|shown| &shown.finished);
     let left = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Left> {
         let (shown, ([a, b], _), values) = (shown.as_ref()?, judged.as_ref()?, values?);
-        let of = |picture: &[[f32; 3]]| told::squared_errors(picture, [a, b], values);
+        let of = |picture: &[[f32; 3]]| told::judge(picture, [a, b], values);
         let earlier = shown.earlier.each_ref().map(|picture| of(picture));
-        let quarter: Vec<f64> = earlier[0].iter().zip(&earlier[1]).map(|(a, b)| 0.5 * (a + b)).collect();
         // In the render's iterations over those of the half; the least number of iterations may have cost more than the share.
         let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);
-        Some(Left::carried(&of(&shown.finished), &quarter, more))
+        Some(Left::carried(&of(&shown.finished), [&earlier[0], &earlier[1]], more))
     };
     candidates.iter().zip(&shown).map(|(c, shown)| left(c, shown).unwrap_or(Left(None))).collect()
 }
