@@ -76,8 +76,8 @@ fn phase_function_is_sampled_normalised_and_symmetric() {
     assert!(phase.pdf_w(a, -a) > 10.0 * phase.pdf_w(a, a));
 }
 
-/// Relative deviations over an even grid of the numbers that a direction is drawn from: of the mean of 1 - cos from 1 - g, the greatest of 1 - cos from the
-/// inverse of the distribution, and of the density at the angles drawn.
+/// Relative deviations over an even grid of the numbers that a direction is drawn from: of the mean of 1 - cos from 1 -
+/// g, the greatest of 1 - cos from the inverse of the distribution, and of the density at the angles drawn.
 fn forward_errors(g: f32, draw: impl Fn(&HenyeyGreenstein, Vec3, Vec2) -> Vec3) -> [f64; 3] {
     // A power of two, so that all numbers are exact.
     const STEPS: u32 = 1 << 22;
@@ -105,7 +105,8 @@ fn forward_errors(g: f32, draw: impl Fn(&HenyeyGreenstein, Vec3, Vec2) -> Vec3) 
     [mean / (1.0 - g.abs()) - 1.0, worst[0], worst[1]]
 }
 
-/// Up to the sharpest. By cosines, which take steps of 6e-8 where their median is 1 - 1.5 (1 - g)^2, most directions were drawn straight ahead.
+/// Up to the sharpest. By cosines, which take steps of 6e-8 where their median is 1 - 1.5 (1 - g)^2, most directions
+/// were drawn straight ahead.
 #[test]
 fn sharp_phase_functions_keep_their_mean_cosine() {
     let by_cosine = |phase: &HenyeyGreenstein, wo: Vec3, u: Vec2| {
@@ -266,15 +267,15 @@ fn furnace_box_full_of_fog() {
         check.run(&format!("foggy furnace, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(100, seed)));
     }
     for method in [Method::Sppm, Method::Cppm] {
-        // Kernels lose what they would hold behind a wall, where they reach: 3/16 of the light scattered that near.
+        // On walls, kernels lose what they would hold behind an edge.
         let check = Check { expected: [1.0; 3], bias: 0.015, detects: 0.12 };
         let means = means(&scene, method, 24, 8, |seed| photons(20_000, 0.06, 8, seed));
         check.run(&format!("foggy furnace, {method:?}"), &means);
     }
 }
 
-/// What a medium that absorbs nothing scatters to the eye where radiance is 1 everywhere: what it takes on the way, the mean of `1 - exp(-sigma t)` over a
-/// picture from within a box of half width `half`.
+/// What a medium that absorbs nothing scatters to the eye where radiance is 1 everywhere: what it takes on the way, the
+/// mean of `1 - exp(-sigma t)` over a picture from within a box of half width `half`.
 fn taken_on_the_way(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
     let camera = scene.camera(&square(size)).expect("a camera");
     let n = size * 8;
@@ -287,8 +288,9 @@ fn taken_on_the_way(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
     (0..n * n).map(taken).sum::<f64>() / f64::from(n * n)
 }
 
-/// Kernels a third as wide as the box that holds the fog, be it of walls or a mesh of the medium's own: what they would hold behind its border is made up for.
-/// Divided by the volume of the whole ball, the light was too weak by a tenth and more (3 r / 8 d, of half the box's width d).
+/// Kernels a third as wide as the box that holds the fog, be it of walls or a mesh of the medium's own: what they would
+/// hold behind its border is made up for. Divided by the volume of the whole ball, the light was too weak by a tenth
+/// and more (3 r / 8 d, of half the box's width d).
 #[test]
 fn kernels_that_reach_behind_borders_lose_nothing() {
     let sigma = [1.5, 0.5, 1.0];

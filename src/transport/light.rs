@@ -185,10 +185,11 @@ pub struct Photons {
 
 /// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or clear glass.
 ///
-/// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is one among those that light everything: it
-/// goes on with a probability, their share of the density of its start, and then carries as much as they do. Else bandwidths would be set by dense photons of little
-/// flux, and filled by sparse ones of much. But in a solid that scatters light, such as milk in a glass, it is one of the few that get there at all, and that scattering is
-/// what it was sent for: until it comes to an opaque surface it goes on as it is.
+/// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is
+/// one among those that light everything: it goes on with a probability, their share of the density of its start, and
+/// then carries as much as they do. Else bandwidths would be set by dense photons of little flux, and filled by sparse
+/// ones of much. But in a solid that scatters light, such as milk in a glass, it is one of the few that get there at
+/// all, and that scattering is what it was sent for: until it comes to an opaque surface it goes on as it is.
 struct Deposit<'a> {
     scene: &'a Scene,
     photons: &'a mut Photons,

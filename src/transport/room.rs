@@ -1,8 +1,10 @@
 //! The part of a kernel's ball that lies in the medium whose photons it gathers.
 //!
-//! Next to a border the ball reaches into what holds no photons of the medium. Divided by the kernel's mass within it, not by that of all of the ball, the
-//! estimate is right for light that is the same all over the ball \[boundary kernels; Silverman 1986, "Density Estimation", 2.10\]. The mass is measured along rays:
-//! of the kernel `K` with radius r a ray that is in the medium from a to b has `int_a^b 3 t^2 K(t^2 / r^2) dt / r^3`, and the mean over all directions is the mass.
+//! Next to a border the ball reaches into what holds no photons of the medium. Divided by the kernel's mass within it,
+//! not by that of all of the ball, the estimate is right for light that is the same all over the ball \[boundary
+//! kernels; Silverman 1986, "Density Estimation", 2.10\]. The mass is measured along rays: of the kernel `K` with
+//! radius r a ray that is in the medium from a to b has `int_a^b 3 t^2 K(t^2 / r^2) dt / r^3`, and the mean over all
+//! directions is the mass.
 
 use super::bandwidths::MAX_LEVELS;
 use super::interior::Interior;
@@ -17,7 +19,8 @@ use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 use std::f32::consts::TAU;
 
-/// Rays: to the corners of a cube that is turned at random. For every one there is its opposite, which makes planes through the centre exact.
+/// Rays: to the corners of a cube that is turned at random. For every one there is its opposite, which makes planes
+/// through the centre exact.
 const RAYS: usize = 8;
 /// A smaller part is not told from none: photons there would count without a bound.
 const LEAST: f32 = 0.05;
@@ -102,7 +105,8 @@ impl Place {
         self.bodies == 0 && self.interior.material(scene).unwrap_or(u32::MAX) == medium
     }
 
-    /// Whether there may be something behind the surface: out of the body that holds all there is, a room, there is nothing.
+    /// Whether there may be something behind the surface: out of the body that holds all there is, a room, there is
+    /// nothing.
     fn cross(&mut self, scene: &Scene, surface: &Surface, direction: Vec3) -> bool {
         let entering = direction.dot(surface.ng) < 0.0;
         if scene.materials.list[surface.material as usize].is_solid_glass() {
@@ -125,7 +129,8 @@ impl Place {
     }
 }
 
-/// Nodes of Gauss-Legendre quadrature on [0, 1], and their weights: exact for polynomials up to degree 9, such as the box and Epanechnikov's kernel have.
+/// Nodes of Gauss-Legendre quadrature on [0, 1], and their weights: exact for polynomials up to degree 9, such as the
+/// box and Epanechnikov's kernel have.
 const NODES: [(f32, f32); 5] = [
     (0.046_910_08, 0.118_463_44),
     (0.230_765_35, 0.239_314_33),
