@@ -31,8 +31,8 @@ fn shells(count: u32) -> Scene {
     build(description)
 }
 
-/// Clear glass under a uniform sky cannot be seen. With room for six solids, and a seventh in the place of the sixth, seven shells gave 1.21. A t test over
-/// seeds with an error rate of 0.1 % over nine checks.
+/// Clear glass under a uniform sky cannot be seen. With room for six solids, and a seventh in the place of the sixth,
+/// seven shells gave 1.21. A t test over seeds with an error rate of 0.1 % over nine checks.
 #[test]
 fn furnace_of_nested_shells() {
     for count in [7, 12, 40] {
@@ -61,7 +61,8 @@ fn furnace_of_nested_shells() {
     }
 }
 
-/// From within, the solids are found again, and leaving them in any order leaves the others: forty steps out along a ray.
+/// From within, the solids are found again, and leaving them in any order leaves the others: forty steps out along a
+/// ray.
 #[test]
 fn all_solids_around_a_point_are_known() {
     let scene = shells(40);
@@ -96,8 +97,8 @@ fn basin() -> Description {
     description
 }
 
-/// A lamp that crosses the surface of the water starts its light where it is, and so does one of glowing glass that gives light to both sides. Both were
-/// in one place as a whole, what the middle of each triangle was in.
+/// A lamp that crosses the surface of the water starts its light where it is, and so does one of glowing glass that
+/// gives light to both sides. Both were in one place as a whole, what the middle of each triangle was in.
 #[test]
 fn light_starts_where_its_lamp_is() {
     let mut description = basin();

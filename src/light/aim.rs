@@ -311,8 +311,9 @@ mod tests {
         }
     }
 
-    /// A target is as bright however much smaller than the scene it is: starts drawn through its disc carry twice its area's flux, those at the rim as well.
-    /// As rounding decided it, whether they lie in the disc, the mean was up to a hundred times as much, of a few that carried (R/r)^2 times theirs.
+    /// A target is as bright however much smaller than the scene it is: starts drawn through its disc carry twice its
+    /// area's flux, those at the rim as well. As rounding decided it, whether they lie in the disc, the mean was up to
+    /// a hundred times as much, of a few that carried (R/r)^2 times theirs.
     #[test]
     fn the_rim_of_a_small_target_carries_no_more() {
         for ratio in [10.0f32, 700.0, 7_000.0, 100_000.0] {

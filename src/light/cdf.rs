@@ -1,18 +1,19 @@
 //! Choosing an index with given probabilities.
 
-/// Steps that the unit interval is divided into, and probabilities are multiples of: as many as uniform numbers of 32 bits can tell apart. Sums in f32 have
-/// an unequal 2^24, and the weaker of a million lamps none of them.
+/// Steps that the unit interval is divided into, and probabilities are multiples of: as many as uniform numbers of 32
+/// bits can tell apart. Sums in f32 have an unequal 2^24, and the weaker of a million lamps none of them.
 const STEPS: u64 = 1 << 32;
 
 /// A discrete distribution, inverted by a guide table \[Chen and Asau 1974\]: unlike an alias table it keeps the strata of its input.
 #[derive(Clone, Debug)]
 pub struct Cdf {
-    /// The first step after an index, which are as many as go into its weight, and one at least where it has any; from `last` on all of them, which is
-    /// too great a number for this.
+    /// The first step after an index, which are as many as go into its weight, and one at least where it has any; from
+    /// `last` on all of them, which is too great a number for this.
     ends: Vec<u32>,
     /// The last index that has a weight.
     last: usize,
-    /// `guide[b]`: the first index that ends after bucket `b` of as many as there are indices begins, where a search for a step in it starts.
+    /// `guide[b]`: the first index that ends after bucket `b` of as many as there are indices begins, where a search
+    /// for a step in it starts.
     guide: Vec<u32>,
     total: f64,
 }
@@ -108,9 +109,9 @@ mod tests {
         assert!(Cdf::new([0.0, -1.0].into_iter()).is_none());
     }
 
-    /// The weaker of millions have a chance, too: equal ones, and those beside one that has all but a twentieth of it, as lamps have the floor that
-    /// `lights.rs` gives them. Sums in f32 left
-    /// 11 % of such a million without any, and 53 % of four million.
+    /// The weaker of millions have a chance, too: equal ones, and those beside one that has all but a twentieth of it,
+    /// as lamps have the floor that `lights.rs` gives them. Sums in f32 left 11 % of such a million without any, and 53
+    /// % of four million.
     #[test]
     fn none_of_millions_is_impossible() {
         for n in [1_000_000usize, 4_000_000] {

@@ -36,8 +36,8 @@ impl Cone {
     /// Between which distances the ray from `origin` along the unit `direction` is within, no further than `distance`, which may be infinite.
     #[inline]
     pub fn within(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<[f32; 2]> {
-        // Where the ray meets the double cone: sin^2 (f . axis)^2 = cos^2 |off|^2 for f = from + t direction, off what is left of it beside the axis.
-        // With sines, so that narrow cones keep their digits.
+        // Where the ray meets the double cone: sin^2 (f . axis)^2 = cos^2 |off|^2 for f = from + t direction, off what
+        // is left of it beside the axis. With sines, so that narrow cones keep their digits.
         let from = origin - self.apex;
         let ((along, aside), (height, off)) = (self.parts(direction), self.parts(from));
         let a = self.sin2 * along * along - self.cos2 * aside.length_squared();

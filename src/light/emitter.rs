@@ -72,8 +72,8 @@ pub struct Sky {
     pub environment: Option<Environment>,
 }
 
-/// glTF's smooth edge of a spot: the square of a linear ramp in the cosine (KHR_lights_punctual's recommendation), at an angle to the axis; of it and of
-/// the borders 1 - cos is told.
+/// glTF's smooth edge of a spot: the square of a linear ramp in the cosine (KHR_lights_punctual's recommendation), at
+/// an angle to the axis; of it and of the borders 1 - cos is told.
 #[inline]
 pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32) -> f32 {
     if one_minus_cos <= inner {

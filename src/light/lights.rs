@@ -63,8 +63,9 @@ impl EmissionDensity {
     }
 }
 
-/// The disc that a light path from infinity was drawn through. Its density counts that disc, whatever rounding says of the start: on a scene's scale
-/// the rim of a small disc is not sharp, and a start that were taken for one from outside would carry as much more as the scene's disc is larger.
+/// The disc that a light path from infinity was drawn through. Its density counts that disc, whatever rounding says of
+/// the start: on a scene's scale the rim of a small disc is not sharp, and a start that were taken for one from outside
+/// would carry as much more as the scene's disc is larger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
     /// The scene's.

@@ -47,8 +47,8 @@ impl Region {
         self.radius * (disc + 1.0).exp2()
     }
 
-    /// Density per area, in the mixture of discs, at a squared distance from the centre, of a line that was `drawn` through the disc of that radius: it is
-    /// within, whatever rounding says. 0 where it was drawn otherwise.
+    /// Density per area, in the mixture of discs, at a squared distance from the centre, of a line that was `drawn`
+    /// through the disc of that radius: it is within, whatever rounding says. 0 where it was drawn otherwise.
     #[inline]
     pub(super) fn density(&self, distance2: f32, drawn: f32) -> f32 {
         let drawn2 = drawn * drawn;

@@ -14,7 +14,8 @@ pub fn sqr(x: f32) -> f32 {
     x * x
 }
 
-/// 1 - cos of the angle between unit vectors, from the chord: exact for small angles, where the cosine itself has no digits left.
+/// 1 - cos of the angle between unit vectors, from the chord: exact for small angles, where the cosine itself has no
+/// digits left.
 #[inline]
 pub fn one_minus_cos(a: Vec3, b: Vec3) -> f32 {
     0.5 * (a - b).length_squared()

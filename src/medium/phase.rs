@@ -29,8 +29,9 @@ impl HenyeyGreenstein {
     #[inline]
     pub fn sample(&self, wo: Vec3, u: Vec2) -> Vec3 {
         let (g, ahead) = self.forward(wo);
-        // The inverse of the distribution, `cos = (1 + g^2 - s^2) / (2 g)` with `s = (1 - g^2) / (1 + g - 2 g u)`, for 1 - cos: most of it is less than
-        // a cosine can tell from one where g is near 1, and without the division by g it holds for g = 0, too.
+        // The inverse of the distribution, `cos = (1 + g^2 - s^2) / (2 g)` with `s = (1 - g^2) / (1 + g - 2 g u)`, for
+        // 1 - cos: most of it is less than a cosine can tell from one where g is near 1, and without the division by g
+        // it holds for g = 0, too.
         let rest = (1.0 - g) + 2.0 * g * (1.0 - u.x);
         let h = (u.x * (1.0 - g) * (1.0 - g) * (1.0 + (1.0 + g) / rest) / rest).min(2.0);
         let sin = (h * (2.0 - h)).sqrt();

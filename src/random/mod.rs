@@ -89,6 +89,10 @@ pub enum Purpose {
     Equiangular = 22,
     /// Rank of a photon among those of other weights.
     Mark = 23,
+    /// Directions in which the borders of a medium are looked for.
+    Border = 24,
+    /// How they are turned.
+    BorderTurn = 25,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

@@ -1,7 +1,8 @@
 //! Solids inside each other, deeper than a path keeps them with it.
 //!
-//! A stack is its last solid and the stack of those entered before, each kept once \[hash consing, Ershov 1958\]: a path needs one number for any of them. What
-//! number depends on the threads, what it stands for does not. Few scenes have such stacks, so that a lock is no cost.
+//! A stack is its last solid and the stack of those entered before, each kept once \[hash consing, Ershov 1958\]: a
+//! path needs one number for any of them. What number depends on the threads, what it stands for does not. Few scenes
+//! have such stacks, so that a lock is no cost.
 
 use std::collections::HashMap;
 use std::sync::{PoisonError, RwLock};

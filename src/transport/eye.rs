@@ -414,7 +414,14 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             };
             let longest = self.max_depth - vertex.depth;
             let medium = vertex.medium_id(self.scene);
-            let gather = |volume: Volume<'_>| volume.gather(self.kernel, self.near_volume, vertex, medium, longest);
+            let gather = |volume: Volume<'_>| {
+                let mut sums = volume.gather(self.kernel, self.near_volume, vertex, medium, longest);
+                if sums.iter().any(|&sum| sum != Rgb::ZERO) {
+                    let room = volume.room(self.kernel, self.scene, vertex, medium);
+                    sums.iter_mut().zip(room).for_each(|(sum, room)| *sum /= room);
+                }
+                sums
+            };
             let wanted = self.classes.has(sight.then(Event::Medium).receives(Beam::SCATTERED));
             let gathered = self.volume.filter(|_| wanted).map(gather);
             let measure = &mut self.measure;

@@ -24,7 +24,8 @@ const MAX_SURROUNDING_HITS: u32 = 1 << 16;
 pub struct Interior {
     inside: [u32; INNERMOST],
     len: u8,
-    /// Those entered before: a stack of the scene's [`crate::scene::Nestings`], or [`OPEN`]; where there are some, `inside` is full.
+    /// Those entered before: a stack of the scene's [`crate::scene::Nestings`], or [`OPEN`]; where there are some,
+    /// `inside` is full.
     outer: u32,
 }
 

@@ -185,9 +185,11 @@ pub struct Photons {
 
 /// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or clear glass.
 ///
-/// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is one among those that light everything: it
-/// goes on with a probability, their share of the density of its start, and then carries as much as they do. Else bandwidths would be set by dense photons of little
-/// flux, and filled by sparse ones of much.
+/// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is
+/// one among those that light everything: it goes on with a probability, their share of the density of its start, and
+/// then carries as much as they do. Else bandwidths would be set by dense photons of little flux, and filled by sparse
+/// ones of much. But in a solid that scatters light, such as milk in a glass, it is one of the few that get there at
+/// all, and that scattering is what it was sent for: until it comes to an opaque surface it goes on as it is.
 struct Deposit<'a> {
     scene: &'a Scene,
     photons: &'a mut Photons,
@@ -196,7 +198,11 @@ struct Deposit<'a> {
     kinds: ByKind<bool>,
     caustic: bool,
     flags: PhotonFlags,
-    /// The path may go on after a broad bounce, and its flux then is multiplied by this.
+    /// A medium in a solid has scattered it, and it has come to nothing opaque since.
+    within: bool,
+    /// It has been made one among those that light everything.
+    thinned: bool,
+    /// The path may go on then, and its flux is multiplied by this.
     goes_on: bool,
     gain: f32,
     /// What flux is multiplied by here.
@@ -228,6 +234,8 @@ impl<'a> Deposit<'a> {
             } else {
                 PhotonFlags::straight(emitted.density.of_rays())
             },
+            within: false,
+            thinned: false,
             goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
             gain: 1.0 / probability,
             scale: 1.0,
@@ -245,19 +253,19 @@ impl<'a> Deposit<'a> {
             self.flags = PhotonFlags::default();
         }
         // A medium, which focuses nothing, is as broad as can be.
-        if scattered.lobe.has(LobeSet::BROAD) {
-            if self.caustic {
-                (self.caustic, self.scale) = (false, self.gain);
-            }
-            return self.goes_on;
+        self.caustic &= !scattered.lobe.has(LobeSet::BROAD);
+        if self.caustic || self.thinned || self.within {
+            return true;
         }
-        true
+        (self.thinned, self.scale) = (true, self.gain);
+        self.goes_on
     }
 }
 
 impl<'a> Visitor<'a> for Deposit<'_> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
+        self.within &= vertex.shading.bsdf.transmits();
         if !self.arrives(scattered) {
             return Next::Stop;
         }
@@ -282,6 +290,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        self.within = vertex.met.interior.host(self.scene).is_some();
         if !self.arrives(scattered) {
             return Next::Stop;
         }

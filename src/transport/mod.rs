@@ -17,6 +17,7 @@ pub mod mis;
 mod path;
 mod photon_merge;
 mod probe;
+mod room;
 mod segment;
 mod shares;
 mod site;

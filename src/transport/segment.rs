@@ -11,7 +11,8 @@ use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
-/// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a numerical trap and end the path.
+/// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a
+/// numerical trap and end the path.
 const MAX_NULL_CROSSINGS: u32 = 1 << 16;
 
 /// The next scattering surface along a ray.

@@ -105,7 +105,8 @@ fn extent(scene: &Scene, instance: u32) -> Extent {
     Extent::of(scene.shapes.meshes[instance.mesh as usize].positions.iter().map(|&p| instance.point(p)))
 }
 
-/// By emitter. A lamp's triangle is looked at as a whole where the lamp is clear of the surfaces of all solids, or the triangle of the solids that they bound.
+/// By emitter. A lamp's triangle is looked at as a whole where the lamp is clear of the surfaces of all solids, or the
+/// triangle of the solids that they bound.
 fn around_lights(scene: &Scene) -> Vec<Around> {
     let solids = Solid::all(scene);
     let mut crossed: HashMap<u32, Vec<&Solid>> = HashMap::new();

@@ -37,6 +37,12 @@ impl<'a> Volume<'a> {
         volume
     }
 
+    /// The radii squared, in the order in which they are measured.
+    #[inline]
+    pub(super) fn radii2(&self) -> &[f32] {
+        &self.radius2[..self.count]
+    }
+
     /// Radiance that photons in `medium` of at most `longest` segments scatter at `vertex`, all levels from one query: kernel density estimation over
     /// balls, the box kernel being `3 / (4 pi r^3)`.
     #[inline]
@@ -49,7 +55,7 @@ impl<'a> Volume<'a> {
         longest: u32,
     ) -> [Rgb; MAX_LEVELS] {
         let mut sums = [Rgb::ZERO; MAX_LEVELS];
-        let radius2 = &self.radius2[..self.count];
+        let radius2 = self.radii2();
         let largest2 = radius2.iter().fold(0.0, |largest: f32, &radius2| largest.max(radius2));
         let phase = vertex.phase();
         self.photons.gather(near, vertex.met.p, NO_NORMAL, largest2, |photon, distance2| {
