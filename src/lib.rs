@@ -5,6 +5,8 @@
 
 pub mod error;
 
+pub mod memory;
+
 pub mod math;
 
 pub mod random;
@@ -30,8 +32,6 @@ pub mod light;
 pub mod camera;
 
 pub mod scene;
-
-pub mod memory;
 
 pub mod plan;
 

@@ -17,6 +17,7 @@ use caustique::render::output::Present;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
+use caustique::stat::floor;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 use caustique::transport::{Indirect, LightPass, Surroundings};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
@@ -412,7 +413,8 @@ fn properties_of_the_scene_are_weighed() {
     for effect in [Effect::Textures, Effect::Environment] {
         let without = picture(&switch::without(&pinhole, effect).expect("it is built"));
         let pixels = whole.iter().zip(&without);
-        let found = pixels.map(|(a, b)| (a - b).powi(2) / (a * a + 0.01)).sum::<f64>() / whole.len() as f64;
+        let floor = floor::relative(whole.iter().copied());
+        let found = pixels.map(|(a, b)| (a - b).powi(2) / (a * a + floor)).sum::<f64>() / whole.len() as f64;
         let told = weight(&weights, effect).expect("it is weighed");
         println!("{told:?}, {:.4} found", found.sqrt());
         let error = told.error_if_off.expect("it stands out");

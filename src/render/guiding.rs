@@ -16,7 +16,6 @@ use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
-use crate::stat::floor;
 use crate::transport::{Eye, Indirect, LightPass, Photons, Probe, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -34,6 +33,9 @@ const PIXELS_PER_EYE_PATH: u64 = 4;
 const CHUNK: u32 = 256;
 /// Photons of either kind that a pixel gathers.
 const NEIGHBOURS: usize = 16;
+/// Added to a pixel's squared value, as the papers' relMSE has it. Of all errors this one still depends on the unit of
+/// radiance: it decides how well light paths are guided, not what is reported.
+const DARK: f32 = 0.01;
 
 /// A guide that leaves more than this of what unguided light paths leave of squared error, times what an iteration costs, is no gain.
 const WORTH: f64 = 0.9;
@@ -154,31 +156,15 @@ impl Left {
         Left { of_cells: vec![0.0; cells], unguided: 0.0 }
     }
 
-    /// Adds what the photons of an eye path leave, relative to its pixel above the [`floor`].
-    fn add(&mut self, seen: &Seen, floor: f64) {
-        let inverse = 1.0 / (f64::from(seen.value).powi(2) + floor);
-        for &(cell, light, weight) in &seen.light {
-            let share = f64::from(light).powi(2) * inverse;
-            let unguided = share / f64::from(weight);
-            if unguided.is_finite() {
-                self.of_cells[cell as usize] += share;
-                self.unguided += unguided;
-            }
-        }
+    fn add(&mut self, other: &Left) {
+        self.of_cells.iter_mut().zip(&other.of_cells).for_each(|(sum, more)| *sum += more);
+        self.unguided += other.unguided;
     }
 
     /// What guiding leaves of the error.
     fn ratio(&self) -> f64 {
         self.of_cells.iter().sum::<f64>() / self.unguided
     }
-}
-
-/// What an eye path sees.
-struct Seen {
-    /// The value of its pixel.
-    value: f32,
-    /// Photons that it gathers: cell, light of theirs in the pixel, weight.
-    light: Vec<(u32, f32, f32)>,
 }
 
 /// What the photons of a round leave where its eye paths look.
@@ -189,7 +175,7 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>,
     // Pixels in even steps from a first one drawn anew every round.
     let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
-        let mut seen = Vec::new();
+        let mut error = Left::none(cells);
         let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
@@ -198,26 +184,25 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>,
             let pixel = pixel.min(pixels - 1);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
             if let Some(probe) = eye.probe(&arena, &(eye.start(at, stream), stream)) {
-                seen.push(gather(eye, maps, &mut nearest, &probe));
+                weigh(eye, maps, &mut nearest, &probe, &mut error);
             }
         }
-        seen
+        error
     };
-    let parts: Vec<Vec<Seen>> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
-    let all = || parts.iter().flatten();
-    let floor = floor::relative(all().map(|seen| f64::from(seen.value)));
+    let parts: Vec<Left> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
     let mut sum = Left::none(cells);
-    all().for_each(|seen| sum.add(seen, floor));
+    parts.iter().for_each(|part| sum.add(part));
     sum
 }
 
-/// What the photons around a probe bring to its pixel.
-fn gather(
+/// Adds what the photons around a probe leave in its pixel.
+fn weigh(
     eye: &Eye<'_>,
     maps: &ByKind<PhotonMap<Marked>>,
     nearest: &mut ByKind<Nearest<Marked>>,
     probe: &Probe,
-) -> Seen {
+    error: &mut Left,
+) {
     let point = &probe.point;
     let cap = SCREEN_CAP * span(eye.camera, point.length);
     let mut light = Vec::with_capacity(2 * NEIGHBOURS);
@@ -234,5 +219,14 @@ fn gather(
             }
         });
     }
-    Seen { value: luminance(sum + probe.direct), light }
+    let value = luminance(sum + probe.direct);
+    let inverse = 1.0 / (value * value + DARK);
+    for (cell, light, weight) in light {
+        let share = f64::from(light * light * inverse);
+        let unguided = share / f64::from(weight);
+        if unguided.is_finite() {
+            error.of_cells[cell as usize] += share;
+            error.unguided += unguided;
+        }
+    }
 }
