@@ -25,7 +25,7 @@ pub struct Surface {
     pub primitive: u32,
     /// Index of the material.
     pub material: u32,
-    /// Others lie on it here, and it is known which comes first (`transport/contact.rs`).
+    /// Others lie on it here, and it is known which comes first (`scene/contact.rs`).
     pub touching: bool,
 }
 

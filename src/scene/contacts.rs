@@ -1,5 +1,5 @@
 //! Which triangles that light passes may have others lying on them: only there does a ray look for more than what it hits
-//! (`transport/contact.rs`).
+//! (`scene/contact.rs`).
 
 use crate::geometry::{Shapes, error};
 use crate::material::Materials;

@@ -1,6 +1,7 @@
 //! The scene: read from a file into a plain [`Description`], then validated and committed into a [`Scene`].
 
 mod build;
+pub mod contact;
 mod contacts;
 pub mod description;
 pub mod environment_file;

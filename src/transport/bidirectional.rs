@@ -4,7 +4,6 @@
 //! and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves splats (its vertices connected to the
 //! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
 
-use super::contact::Place;
 use super::eye::Eye;
 use super::mis::{Eta, MisState, Ratios};
 use super::shares::leads;
@@ -14,6 +13,7 @@ use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::plan::{Beam, ClassSet, Event, Sight};
+use crate::scene::contact::Place;
 
 /// Which strategies take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

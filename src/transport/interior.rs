@@ -6,9 +6,9 @@
 //! \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path that leaves a solid it never entered
 //! (the eye or a lamp was inside) is taken to have been in it.
 
-use super::contact::Along;
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
+use crate::scene::contact::Along;
 use crate::scene::{OPEN, Scene, Stack};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;

@@ -1,6 +1,5 @@
 //! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
 
-use super::contact::{self, Along, Place};
 use super::eye::FirstHit;
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
@@ -9,6 +8,7 @@ use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
+use crate::scene::contact::{self, Along, Place};
 use crate::trace::{Hit, Ray};
 
 /// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a

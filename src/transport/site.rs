@@ -1,6 +1,5 @@
 //! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
 
-use super::contact::Place;
 use super::interior::Interior;
 use super::segment::{Between, MediumArrival, Start, Way, way};
 use super::walk::Vertex;
@@ -10,6 +9,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::{Flight, HenyeyGreenstein};
 use crate::random::Draws;
 use crate::scene::Scene;
+use crate::scene::contact::Place;
 use crate::spectrum::Wavelength;
 
 /// A vertex of a path in a medium.

@@ -1,7 +1,6 @@
 //! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm is a
 //! [`Visitor`].
 
-use super::contact::Place;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::segment::{Arrival, Attenuate, Clear, End, Known, Start, next_vertex, token};
@@ -12,6 +11,7 @@ use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
+use crate::scene::contact::Place;
 use crate::spectrum::{Hue, Wavelength};
 use bumpalo::Bump;
 

@@ -3,8 +3,8 @@
 use crate::geometry::Surface;
 use crate::math::Vec3;
 use crate::scene::Scene;
+use crate::scene::contact::Along;
 use crate::trace::Ray;
-use crate::transport::Along;
 
 /// A ray through more surfaces than this that let it pass is given up.
 const MOST_SURFACES: usize = 64;

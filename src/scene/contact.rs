@@ -2,19 +2,19 @@
 //!
 //! A ray goes on a little past the surface it leaves ([`error`]), for rounding decides about what is nearer; so whatever lies in
 //! that little way has to be met by other means. Where light passes a triangle that others may lie on
-//! ([`Contacts`](crate::scene::Contacts)), all others there are looked for, and taken to lie on each other in this order, whichever
+//! ([`Contacts`](super::Contacts)), all others there are looked for, and taken to lie on each other in this order, whichever
 //! Embree finds first:
 //!
 //! - what lets no light pass comes first: glass and the table that it stands on are in contact;
-//! - a solid is entered before another is left, so that solids overlap, and nested dielectrics (`interior.rs`) say what fills the space:
+//! - a solid is entered before another is left, so that solids overlap, and nested dielectrics (`transport/interior.rs`) say what fills the space:
 //!   liquid and glass are in contact, without air between them;
 //! - what has no inside is behind solids that are in front of it.
 //!
 //! Seen from the other side, the order is the reverse, but for the opaque, which nothing passes: light and importance go the same ways.
 
+use super::Scene;
 use crate::geometry::{Surface, error};
 use crate::math::Vec3;
-use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
 
@@ -23,7 +23,7 @@ const OPPOSITE: f32 = -0.99;
 
 /// Whether rays may go on behind the surface.
 #[inline(always)]
-pub(super) fn passes(scene: &Scene, surface: &Surface) -> bool {
+fn passes(scene: &Scene, surface: &Surface) -> bool {
     scene.materials.list[surface.material as usize].transmission > 0.0
 }
 
@@ -116,7 +116,7 @@ fn next(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Option<Hit
 /// Surfaces at a place that a ray along `direction` has to pass before it reaches the one there, in order.
 #[cold]
 #[inline(never)]
-pub(super) fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
+pub fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
     // They come after it for light on its way back.
     let back = after(scene, place, -direction, token);
     let surface = |(_, hit): &(Place, Hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
