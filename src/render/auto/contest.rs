@@ -222,9 +222,13 @@ impl Left {
         more < ((UNCLEAR - 1.0) * best.squared_error()).max(TOLD * noise)
     }
 
+    /// By the judges' noise, and not by a few pixels alone, in which chance has put a splotch.
     fn is_clearly_worse(&self, than: &Left) -> bool {
+        let (Some(pixels), Some(others)) = (&self.0, &than.0) else { return self.0.is_none() };
         let (more, noise) = self.more_than(than);
-        more > TOLD * noise
+        let square = |(a, b): (&Judged, &Judged)| (a.error - b.error).powi(2);
+        let spread = (mean(pixels.iter().zip(others).map(square)) / pixels.len().max(1) as f64).sqrt();
+        more > (TOLD * noise).max(spread)
     }
 }
 
