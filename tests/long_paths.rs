@@ -77,8 +77,8 @@ fn furnace_of_dense_media() {
 }
 
 /// The same ball in a glass, in a scene a thousand times as wide: the light paths that come there are those that are
-/// sent there. They ended where the medium scattered them first, all but one in a million, so that milk was black by
-/// photons.
+/// sent there. They ended where the medium scattered them first, all but one in some hundred thousand: 0.20 by photons,
+/// which is light scattered once.
 #[test]
 fn milk_in_a_wide_scene_is_lit() {
     let mut description = Description::default();

@@ -289,8 +289,8 @@ fn taken_on_the_way(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
 }
 
 /// Kernels a third as wide as the box that holds the fog, be it of walls or a mesh of the medium's own: what they would
-/// hold behind its border is made up for. Divided by the volume of the whole ball, the light was too weak by a tenth
-/// and more (3 r / 8 d, of half the box's width d).
+/// hold behind its border is made up for. Divided by the volume of the whole ball, it was 0.865 instead of 0.899,
+/// 0.495 instead of 0.536.
 #[test]
 fn kernels_that_reach_behind_borders_lose_nothing() {
     let sigma = [1.5, 0.5, 1.0];

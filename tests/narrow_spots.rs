@@ -33,8 +33,8 @@ fn flux(inner: f64, outer: f64) -> f64 {
 }
 
 /// The flux that light paths leave with, and the irradiance of next-event estimation integrated over the floor,
-/// whatever the angle. With cosines, and borders 1e-6 apart in the cosine, a spot of 0.05 degrees sent 2.35 times its
-/// flux, and one of 0.001 degrees a thousand times as much.
+/// whatever the angle. With cosines, and borders at least 1e-6 apart in them, a spot that is all edge had the solid
+/// angle of 0.08 degrees: at 0.05 degrees 2.7 times its flux, at 0.001 degrees 6,600 times.
 #[test]
 fn narrow_spots_send_what_they_should() {
     for degrees in [0.001f32, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 30.0] {
