@@ -238,6 +238,21 @@ mod tests {
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
 
+    /// A start of light from infinity, drawn through the disc of the scene, whose area is `whole`, before it is aimed.
+    fn start(origin: Vec3, direction: Vec3, whole: f32) -> EmissionSample {
+        let onward = 1.0 / whole;
+        EmissionSample {
+            origin,
+            direction,
+            flux: Rgb::splat(whole),
+            light: 0,
+            delta: true,
+            infinite: true,
+            entry: Entry::Whole,
+            density: EmissionDensity { direct: 1.0, start: 1.0, onward, cos: 1.0, infinite: true, delta: true },
+        }
+    }
+
     /// The flux that passes any place is the same with and without aiming and with a region of interest, and so is what goes on of it after it is thinned to the share of
     /// paths that light everything: here through small discs that a target or the region overlaps in part.
     #[test]
@@ -261,23 +276,7 @@ mod tests {
             for i in 0..n {
                 let draws = Stream::new(9, 0, Domain::Test, i).vertex(0);
                 let q = warp::disc_concentric(draws.two(Purpose::Pixel)) * sky.radius;
-                let mut emission = EmissionSample {
-                    origin: Vec3::new(q.x, sky.radius, q.y),
-                    direction: d,
-                    flux: Rgb::splat(whole),
-                    light: 0,
-                    delta: true,
-                    infinite: true,
-                    entry: Entry::Whole,
-                    density: EmissionDensity {
-                        direct: 1.0,
-                        start: 1.0,
-                        onward: 1.0 / whole,
-                        cos: 1.0,
-                        infinite: true,
-                        delta: true,
-                    },
-                };
+                let mut emission = start(Vec3::new(q.x, sky.radius, q.y), d, whole);
                 let (u, point) = (draws.one(Purpose::Lobe), draws.two(Purpose::Lens));
                 let unaimed = match region {
                     Some(region) => {
@@ -328,23 +327,7 @@ mod tests {
             for i in 0..n {
                 let draws = Stream::new(10, 0, Domain::Test, i).vertex(0);
                 let point = draws.two(Purpose::Lens);
-                let mut emission = EmissionSample {
-                    origin: Vec3::ZERO,
-                    direction: warp::sphere_uniform(draws.two(Purpose::Direction)),
-                    flux: Rgb::splat(whole),
-                    light: 0,
-                    delta: true,
-                    infinite: true,
-                    entry: Entry::Whole,
-                    density: EmissionDensity {
-                        direct: 1.0,
-                        start: 1.0,
-                        onward: 1.0 / whole,
-                        cos: 1.0,
-                        infinite: true,
-                        delta: true,
-                    },
-                };
+                let mut emission = start(Vec3::ZERO, warp::sphere_uniform(draws.two(Purpose::Direction)), whole);
                 let lit = EmissionSample { ..emission };
                 targets.through(&sky, &mut emission, 0, point);
                 mean += f64::from(emission.flux.x) / n as f64;

@@ -44,9 +44,15 @@ impl Material {
         }
     }
 
+    /// Whether light may go on behind it.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        self.transmission > 0.0
+    }
+
     /// Whether the mesh that wears it bounds a solid that light enters.
     pub fn is_solid_glass(&self) -> bool {
-        self.transmission > 0.0 && !self.thin
+        self.transmits() && !self.thin
     }
 
     /// Whether its base (coatings aside) reflects or bends light into narrow lobes somewhere.

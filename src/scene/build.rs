@@ -83,7 +83,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         );
     }
     let scattering = Scattering::new(&materials.list);
-    let contacts = Contacts::new(&shapes, &materials);
+    let contacts = Arc::new(Contacts::new(&shapes, &materials));
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     let lenses = description.cameras.iter().any(|camera| camera.aperture_radius > 0.0);
     if let Some(lacking) = survey.lacking(&materials, lenses) {
@@ -126,6 +126,11 @@ pub(super) fn dress(
     let (shapes, materials) = (Arc::clone(&scene.shapes), Arc::new(materials));
     // Embree asks about cut-outs the materials that it was given.
     let cut = |materials: &Materials| materials.list.iter().map(|material| material.alpha).collect::<Vec<Alpha>>();
+    let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<bool>>();
+    let contacts = match passing(&materials) == passing(&scene.materials) {
+        true => Arc::clone(&scene.contacts),
+        false => Arc::new(Contacts::new(&shapes, &materials)),
+    };
     let tracer = match cut(&materials) == cut(&scene.materials) {
         true => scene.tracer.clone(),
         false => tracer(&shapes, &materials, rayon::current_num_threads())?,
@@ -147,7 +152,7 @@ pub(super) fn dress(
         medium,
         scattering: scene.scattering.again(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
-        contacts: Contacts::new(&shapes, &materials),
+        contacts,
         nestings: Nestings::default(),
         warnings: Vec::new(),
         shapes,
@@ -261,12 +266,17 @@ fn axis(light: &PunctualLight) -> Vec3 {
     (light.to_world.matrix3 * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y).as_vec3()
 }
 
+/// 1 - cos of an angle, with all its digits where it is small.
+fn one_minus_cos(angle: f64) -> f64 {
+    2.0 * (0.5 * angle).sin().powi(2)
+}
+
 fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
     let p = (light.to_world.translation - origin).as_vec3();
     match light.kind {
         PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
         PunctualKind::Spot { inner, outer } => {
-            let [inner, outer] = [inner, outer].map(|angle| 2.0 * (0.5 * f64::from(angle)).sin().powi(2));
+            let [inner, outer] = [inner, outer].map(|angle| one_minus_cos(f64::from(angle)));
             Emitter::Spot {
                 p,
                 frame: Frame::from_normal(axis(light)),
@@ -276,14 +286,11 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
                 outer: outer.max(inner * (1.0 + 1e-6)) as f32,
             }
         }
-        PunctualKind::Sun { angle } => {
-            let half = 0.5 * f64::from(angle);
-            Emitter::Sun {
-                frame: Frame::from_normal(-axis(light)),
-                irradiance: light.intensity,
-                one_minus_cos: (2.0 * (0.5 * half).sin().powi(2)) as f32,
-            }
-        }
+        PunctualKind::Sun { angle } => Emitter::Sun {
+            frame: Frame::from_normal(-axis(light)),
+            irradiance: light.intensity,
+            one_minus_cos: one_minus_cos(0.5 * f64::from(angle)) as f32,
+        },
     }
 }
 

@@ -13,18 +13,16 @@
 //! Seen from the other side, the order is the reverse, but for the opaque, which nothing passes: light and importance go the same ways.
 
 use super::Scene;
+use super::contacts::face_each_other;
 use crate::geometry::{Surface, error};
 use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
 
-/// Two surfaces of one mesh lie on each other where their normals are opposite: closer than this cosine. What is not is its neighbour.
-const OPPOSITE: f32 = -0.99;
-
 /// Whether rays may go on behind the surface.
 #[inline(always)]
 fn passes(scene: &Scene, surface: &Surface) -> bool {
-    scene.materials.list[surface.material as usize].transmission > 0.0
+    scene.materials.list[surface.material as usize].transmits()
 }
 
 /// A point of a surface, by what tells it from others there.
@@ -55,7 +53,7 @@ impl Place {
 fn order(scene: &Scene, place: &Place, direction: Vec3) -> (u8, i64, i64) {
     let front = direction.dot(place.ng) < 0.0;
     let material = &scene.materials.list[place.material as usize];
-    let rank = match (material.transmission > 0.0, material.thin, front) {
+    let rank = match (material.transmits(), material.thin, front) {
         (false, ..) => 0,
         (true, true, false) => 1,
         (true, false, true) => 2,
@@ -78,8 +76,7 @@ fn others(scene: &Scene, at: &Place, token: u32) -> Others {
             return;
         }
         let Some(other) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
-        // Where triangles of a mesh meet, they are one surface.
-        let one = |place: &Place| place.instance == other.instance && place.ng.dot(other.ng) > OPPOSITE;
+        let one = |place: &Place| place.instance == other.instance && !face_each_other(place.ng, other.ng);
         if !one(at) && !others.iter().any(|(place, _)| one(place)) {
             others.push((Place::of(&other), hit));
         }

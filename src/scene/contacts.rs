@@ -14,6 +14,12 @@ const PARALLEL: f32 = 0.99;
 /// In a scene of more triangles than this, copies counted, any that light passes is taken to have others on it.
 const MOST: usize = 1 << 26;
 
+/// Whether two surfaces of one mesh that are at one place lie on each other there. Those that do not are neighbours, one surface where
+/// they meet.
+pub(super) fn face_each_other(a: Vec3, b: Vec3) -> bool {
+    a.dot(b) < -PARALLEL
+}
+
 /// A triangle in world space.
 #[derive(Clone, Copy)]
 struct Triangle {
@@ -26,17 +32,12 @@ struct Triangle {
 }
 
 impl Triangle {
-    fn envelope(&self) -> AABB<[f32; 3]> {
-        let [a, b, c] = self.corners;
-        let (low, high) = (a.min(b).min(c) - self.error, a.max(b).max(c) + self.error);
-        AABB::from_corners(low.to_array(), high.to_array())
-    }
-
     /// Whether another may lie on it: it is as good as parallel and reaches its plane.
     fn may_touch(&self, other: &Triangle) -> bool {
-        let cosine = self.normal.dot(other.normal);
-        // Triangles of one mesh are one surface unless they face each other.
-        let parallel = if self.instance == other.instance { cosine < -PARALLEL } else { cosine.abs() > PARALLEL };
+        let parallel = match self.instance == other.instance {
+            true => face_each_other(self.normal, other.normal),
+            false => self.normal.dot(other.normal).abs() > PARALLEL,
+        };
         let heights = other.corners.map(|corner| (corner - self.corners[0]).dot(self.normal));
         let reach = 2.0 * (self.error + other.error);
         parallel && heights.iter().any(|height| *height >= -reach) && heights.iter().any(|height| *height <= reach)
@@ -47,7 +48,9 @@ impl RTreeObject for Triangle {
     type Envelope = AABB<[f32; 3]>;
 
     fn envelope(&self) -> AABB<[f32; 3]> {
-        Triangle::envelope(self)
+        let [a, b, c] = self.corners;
+        let (low, high) = (a.min(b).min(c) - self.error, a.max(b).max(c) + self.error);
+        AABB::from_corners(low.to_array(), high.to_array())
     }
 }
 
@@ -63,8 +66,7 @@ pub struct Contacts {
 impl Contacts {
     /// Looks through a scene.
     pub fn new(shapes: &Shapes, materials: &Materials) -> Contacts {
-        let passes =
-            |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].transmission > 0.0;
+        let passes = |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].transmits();
         let instances = 0..shapes.instances.len() as u32;
         if !instances.clone().any(passes) {
             return Contacts::default();

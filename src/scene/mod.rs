@@ -60,7 +60,7 @@ pub struct Scene {
     /// What is present.
     pub survey: Survey,
     /// Triangles that others may lie on.
-    pub contacts: Contacts,
+    pub contacts: Arc<Contacts>,
     /// Deep stacks of solids that paths have been in.
     pub nestings: Nestings,
     /// Whatever was ignored or approximated, from the reader and from building.

@@ -16,6 +16,7 @@ use crate::math::{Frame, Vec3, warp};
 use crate::photon::Kernel;
 use crate::random::Purpose;
 use crate::scene::Scene;
+use crate::scene::contact::Along;
 use crate::trace::{Hit, Ray};
 use std::f32::consts::TAU;
 
@@ -62,14 +63,14 @@ impl Volume<'_> {
 }
 
 /// Follows a ray behind `hit` and calls `lost` for all parts of it, as far as it goes, that are not in the medium.
-fn leave(scene: &Scene, mut ray: Ray, hit: Hit, interior: Interior, medium: u32, lost: &mut impl FnMut(f32, f32)) {
+fn leave(scene: &Scene, ray: Ray, hit: Hit, interior: Interior, medium: u32, lost: &mut impl FnMut(f32, f32)) {
     let reach = ray.tmax;
-    let mut at = Place { interior, bodies: 0 };
-    let (mut met, mut before, mut outside) = (Some(hit), 0.0, None);
+    let mut along = Along::new(ray, None);
+    let mut at = Whereabouts { interior, bodies: 0 };
+    let (mut met, mut outside) = (along.met(scene, &hit), None);
     for _ in 0..MAX_BORDERS {
-        let Some(hit) = met else { break };
-        let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { break };
-        let distance = before + hit.t;
+        let Some((surface, t)) = met else { break };
+        let distance = reach - along.ray().tmax + t;
         let stays = at.cross(scene, &surface, ray.direction);
         match (stays && at.is_in(scene, medium), outside) {
             (true, Some(from)) => {
@@ -79,13 +80,11 @@ fn leave(scene: &Scene, mut ray: Ray, hit: Hit, interior: Interior, medium: u32,
             (false, None) => outside = Some(distance),
             _ => {}
         }
-        let next = surface.spawn(ray.direction);
-        before += (next - ray.origin).dot(ray.direction);
-        (ray.origin, ray.tmax) = (next, reach - before);
-        if !stays || ray.tmax <= 0.0 {
+        along.pass(&surface);
+        if !stays || along.ray().tmax <= 0.0 {
             break;
         }
-        met = scene.tracer.intersect(&ray);
+        met = along.next(scene);
     }
     if let Some(from) = outside {
         lost(from, f32::INFINITY);
@@ -93,14 +92,14 @@ fn leave(scene: &Scene, mut ray: Ray, hit: Hit, interior: Interior, medium: u32,
 }
 
 /// Where a ray is.
-struct Place {
+struct Whereabouts {
     /// Among solids that light enters.
     interior: Interior,
     /// In how many others.
     bodies: u32,
 }
 
-impl Place {
+impl Whereabouts {
     fn is_in(&self, scene: &Scene, medium: u32) -> bool {
         self.bodies == 0 && self.interior.material(scene).unwrap_or(u32::MAX) == medium
     }

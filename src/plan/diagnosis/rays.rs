@@ -31,7 +31,7 @@ pub(super) fn first_opaque(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f
     let mut along = Along::new(Ray { origin, direction, tmax, token }, None);
     for _ in 0..MOST_SURFACES {
         let (surface, _) = along.next(scene)?;
-        if scene.materials.list[surface.material as usize].transmission == 0.0 {
+        if !scene.materials.list[surface.material as usize].transmits() {
             return Some(surface);
         }
         along.pass(&surface);

@@ -67,8 +67,6 @@ pub struct Choice {
     pub way: Way,
     /// All that were tried; none where the render is too short.
     pub trials: Vec<Trial>,
-    /// Index of the one chosen.
-    pub chosen: Option<usize>,
     /// What effects of light mean to the picture; none where the render is too short.
     pub weights: Vec<Weight>,
     /// Why nothing was tried.
@@ -80,7 +78,7 @@ pub struct Choice {
 impl Choice {
     /// The trial of what was chosen.
     pub fn trial(&self) -> Option<&Trial> {
-        self.chosen.map(|chosen| &self.trials[chosen])
+        self.trials.iter().find(|trial| trial.chosen)
     }
 }
 
@@ -97,16 +95,16 @@ pub fn choose(
     let pilot = Pilot::new(scene, camera, &gathering);
     let (weighed, weighing) = pilot.weigh();
     let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
-    let chosen = trials.iter().position(|trial| trial.chosen);
+    let chosen = trials.iter().find(|trial| trial.chosen);
     let untried = || if make(Way::USUAL).is_some() { Way::USUAL } else { Way::GATHERING };
-    let way = chosen.map_or_else(untried, |chosen| trials[chosen].way);
+    let way = chosen.map_or_else(untried, |chosen| chosen.way);
     let mut settings = make(way)?;
-    let cost = chosen.map_or(pilot.cost, |chosen| trials[chosen].cost);
+    let cost = chosen.map_or(pilot.cost, |chosen| chosen.cost);
     let saving = |weighed: Weighed| weighed.saving([&cost, &pilot.cost], way, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
-    Some(Choice { settings, way, trials, chosen, weights, because, spent })
+    Some(Choice { settings, way, trials, weights, because, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.
