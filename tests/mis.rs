@@ -19,7 +19,7 @@ use caustique::plan::ClassSet;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use caustique::transport::mis::{self, Eta, MisState, Ratios};
+use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
     Bidirectional, Eye, EyeMeasure, Indirect, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next,
     PathStart, Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
@@ -28,6 +28,8 @@ use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_l
 
 const SIZE: u32 = 16;
 const TOLERANCE: f64 = 1e-4;
+/// Photons that are taken to share an eye path.
+const SHARING: f32 = 7.0;
 
 /// How a vertex scatters.
 // As in the library: no box for each vertex.
@@ -253,8 +255,13 @@ impl<'s> Whole<'s> {
         pdf * self.nodes[j].cos[1] / self.distance2[j + 1] * self.flies(j + 1, self.in_medium(j))
     }
 
-    /// Number of samples times density of the path by a strategy.
-    fn density(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: Eta) -> f64 {
+    /// No vertex between this one and the eye might have sent the eye path elsewhere.
+    fn is_clear(&self, m: usize) -> bool {
+        self.nodes[m + 1..].iter().all(|node| node.delta)
+    }
+
+    /// Number of samples times density of the path by a strategy, of merges what they are worth.
+    fn density(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
         let k = self.nodes.len();
         let smooth = |j: usize| !self.nodes[j].delta;
         let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.start);
@@ -273,26 +280,32 @@ impl<'s> Whole<'s> {
                 if !smooth(m) || self.in_medium(m) || !which.light_merges(from_light) || !which.eye_merges(from_eye) {
                     return 0.0;
                 }
-                f64::from(eta.0) * light(m + 1) * eye(m)
+                let worth = if self.is_clear(m) { 1.0 } else { 1.0 / (1.0 + f64::from(SHARING)) };
+                worth * eta * light(m + 1) * eye(m)
             }
             _ => 0.0,
         }
     }
 
-    fn weight(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: Eta) -> f64 {
+    fn weight(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
         let sum: f64 = self.strategies().into_iter().map(|s| self.density(s, which, light_paths, eta)).sum();
         self.density(strategy, which, light_paths, eta) / sum
     }
 
     /// Weights of all strategies by the recursion.
-    fn recursive(&self, which: &Strategies, light_paths: f64, eta: Eta, bug: Option<Bug>) -> Vec<f64> {
+    fn recursive(&self, which: &Strategies, light_paths: f64, (eta, oracle): (Eta, f64), bug: Option<Bug>) -> Vec<f64> {
         let k = self.nodes.len();
+        let one = |merges: bool, clear: bool| {
+            if merges { one_merge(clear) } else { Merges::ZERO }
+        };
+        let by_light = |j: usize, merges: bool| one(merges && !self.in_medium(j), bug == Some(Bug::NothingShared));
+        let by_eye = |j: usize| one(which.eye_merges((k - j) as u32) && !self.in_medium(j), self.is_clear(j));
         let cosine = |c: f64| if bug == Some(Bug::Cosine) { 1.0 } else { c as f32 };
         let flight = |j: usize, eye_side: bool| {
             let Flight { forward, reverse } = if bug == Some(Bug::Flight) { Flight::FREE } else { self.flight(j) };
             if eye_side { Flight { forward: reverse, reverse: forward } } else { Flight { forward, reverse } }
         };
-        let go = |mis: MisState, j: usize, to_light: bool, merges: bool| {
+        let go = |mis: MisState, j: usize, to_light: bool, merges: Merges| {
             let cos = self.nodes[j].cos[usize::from(!to_light)] as f32;
             let cos = if to_light { self.nodes[j].cos[0] as f32 } else { cos };
             if self.nodes[j].delta {
@@ -313,18 +326,18 @@ impl<'s> Whole<'s> {
             lights.push(mis);
             let from = if bug == Some(Bug::DirectMerged) { 1 } else { j as u32 + 1 };
             let merges = which.light_merges(from) || (bug == Some(Bug::DirectMerged) && which.merge);
-            mis = go(mis, j, false, merges && !self.in_medium(j));
+            mis = go(mis, j, false, by_light(j, merges));
         }
         let mut mis = MisState::camera(light_paths as f32, self.camera_pdf_w as f32);
         let mut before_light = mis;
         for j in (0..k).rev() {
             mis = mis.arrive(self.distance2[j + 1] as f32, cosine(self.nodes[j].cos[1])).fly(flight(j + 1, true));
             eyes[j] = mis;
-            mis = go(mis, j, true, which.eye_merges((k - j) as u32) && !self.in_medium(j));
+            mis = go(mis, j, true, by_eye(j));
             before_light = mis;
         }
-        let possible = |s: Strategy| self.density(s, which, light_paths, eta) > 0.0;
-        let one = |s: Strategy| -> f64 {
+        let possible = |s: Strategy| self.density(s, which, light_paths, oracle) > 0.0;
+        let weight = |s: Strategy| -> f64 {
             if !possible(s) {
                 return 0.0;
             }
@@ -353,13 +366,13 @@ impl<'s> Whole<'s> {
                         mis: &lights[s - 1],
                         reverse_pdf_w: reverse(s - 1, true),
                         arrival_pdf_a: self.eye_pdf_a(s - 1) as f32,
-                        merges: which.light_merges(s as u32) && !self.in_medium(s - 1),
+                        merges: by_light(s - 1, which.light_merges(s as u32)),
                     };
                     let eye = mis::End {
                         mis: &eyes[s],
                         reverse_pdf_w: reverse(s, false),
                         arrival_pdf_a: self.light_pdf_a(s) as f32,
-                        merges: which.eye_merges((k - s) as u32) && !self.in_medium(s),
+                        merges: by_eye(s),
                     };
                     mis::connect(&light, &eye).weight(eta)
                 }
@@ -368,11 +381,11 @@ impl<'s> Whole<'s> {
                     mis::camera(&lights[k - 1], pdf_a, light_paths as f32, back).weight(eta)
                 }
                 Strategy::Merge(m) => {
-                    mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false)).merge_weight(eta)
+                    mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false), by_eye(m)).merge_weight(eta)
                 }
             })
         };
-        self.strategies().into_iter().map(one).collect()
+        self.strategies().into_iter().map(weight).collect()
     }
 }
 
@@ -388,9 +401,11 @@ enum Bug {
     Flight,
     /// Lights chosen for a point as they are for emission.
     Chosen,
+    /// Merges at the vertices of light paths taken for independent, those of eye paths not.
+    NothingShared,
 }
 
-const BUGS: [Bug; 5] = [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::Flight, Bug::Chosen];
+const BUGS: [Bug; 6] = [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::Flight, Bug::Chosen, Bug::NothingShared];
 
 /// What the library has said.
 #[derive(Default)]
@@ -426,7 +441,7 @@ struct Tally {
     weights: usize,
     techniques: std::collections::BTreeMap<&'static str, usize>,
     sums: usize,
-    bugs: [f64; 4],
+    bugs: [f64; BUGS.len()],
     /// Weights of paths with vertices in media.
     in_media: usize,
 }
@@ -447,10 +462,11 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let strategies = Strategies::vcm(true);
     let shared =
         Bidirectional { eye, surroundings: &surroundings, strategies, light_paths: pixels, merged_paths: 2.0 * pixels };
-    let eta = Eta::new(radius * radius, 2.0 * pixels);
+    let eta = Eta::new(radius * radius, 2.0 * pixels).sharing(SHARING);
+    let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
     // Wider than eta says, so that enough is merged: weights know nothing of distances.
     let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
-    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; 4], in_media: 0 };
+    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; BUGS.len()], in_media: 0 };
     for path in 0..paths {
         let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
         let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
@@ -594,7 +610,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     ("merge", Strategy::Merge(s - 1))
                 }
             };
-            let expected = whole.weight(strategy, &strategies, f64::from(pixels), eta);
+            let expected = whole.weight(strategy, &strategies, f64::from(pixels), oracle);
             let found = match strategy {
                 Strategy::Merge(_) => ratios.merge_weight(eta),
                 _ => ratios.weight(eta),
@@ -608,7 +624,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
             tally.in_media += usize::from(whole.nodes.iter().any(|node| node.scatters.in_medium()));
             *tally.techniques.entry(name).or_default() += 1;
             if strategy != Strategy::Hit || whole.strategies().len() > 2 {
-                let sum = |bug| whole.recursive(&strategies, f64::from(pixels), eta, bug).iter().sum::<f64>();
+                let sum = |bug| whole.recursive(&strategies, f64::from(pixels), (eta, oracle), bug).iter().sum::<f64>();
                 let error = (sum(None) - 1.0).abs();
                 assert!(error <= TOLERANCE, "{what}, path {path}, {technique:?}: the weights sum to 1 + {error}");
                 tally.sums += 1;
@@ -629,7 +645,11 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         // Some need a scene that has what they forget.
         let possible = match bug {
             Bug::Flight => media,
-            Bug::Chosen => scene.lights.emitters().len() > 1,
+            // The triangles of a lamp are chosen alike for emission and for a point.
+            Bug::Chosen => {
+                let emitters = scene.lights.emitters();
+                emitters.len() > 1 && emitters.iter().any(Emitter::is_infinite)
+            }
             _ => true,
         };
         if !possible {

@@ -16,7 +16,7 @@ use super::settings::Settings;
 use super::techniques::{TechniquePicture, TilePictures, Watch, collect};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
-use crate::estimator::bandwidth::initial_bandwidths;
+use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::Guide;
@@ -64,6 +64,8 @@ pub struct Passes<'a> {
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     /// Pictures per technique, by tile, if asked for.
     techniques: Option<Vec<TilePictures>>,
+    /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it covers.
+    covered: f32,
 }
 
 impl<'a> Passes<'a> {
@@ -115,6 +117,7 @@ impl<'a> Passes<'a> {
             measures,
             photons: None,
             techniques,
+            covered: 0.0,
         }
     }
 
@@ -175,13 +178,14 @@ impl<'a> Passes<'a> {
         let factor = radius2_factor(i, self.settings.alpha) as f32;
         let merged = self.photons.is_some();
         let count = self.settings.levels.count;
+        let expected = self.covered * self.pairs.len() as f32;
         let levels = |bandwidth: f32, pair: &Pair| {
-            let largest2 = bandwidth * bandwidth * factor;
             MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
-                let radius2 = largest2 * 0.5f32.powi((count - 1 - level) as i32);
+                let shrunk = factor * 0.5f32.powi((count - 1 - level) as i32);
+                let radius2 = bandwidth * bandwidth * shrunk;
                 let eta = match (merged, shared.strategies.connect) {
                     (false, _) => Eta::NONE,
-                    (true, true) => Eta::new(radius2, shared.merged_paths),
+                    (true, true) => Eta::new(radius2, shared.merged_paths).sharing(expected * shrunk),
                     (true, false) => Eta::MERGE_ONLY,
                 };
                 (radius2, eta)
@@ -285,8 +289,19 @@ impl Iterate for Passes<'_> {
             _ => InitialBandwidth::Footprint,
         };
         let Settings { widest: [widest, _], seed, .. } = *self.settings;
-        let none = PhotonMap::build(Vec::new());
-        initial_bandwidths(&self.eye(), initial, widest, seed, [&none; 2]).into_iter().map(Pixel::new).collect()
+        let (none, eye) = (PhotonMap::build(Vec::new()), self.eye());
+        let all = initial_bandwidths(&eye, initial, widest, seed, [&none; 2]);
+        // A footprint is the same number of pixels everywhere; a fixed radius is compared with the median one.
+        let mut ratios: Vec<f32> =
+            initial_bandwidths(&eye, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1])
+                .iter()
+                .zip(&all)
+                .map(|([footprint], [bandwidth, _])| FOOTPRINT_PIXELS * bandwidth / footprint)
+                .collect();
+        let middle = ratios.len() / 2;
+        let pixels = *ratios.select_nth_unstable_by(middle, f32::total_cmp).1;
+        self.covered = std::f32::consts::PI * pixels * pixels;
+        all.into_iter().map(Pixel::new).collect()
     }
 
     fn guide(&self) -> Option<&Guide> {

@@ -5,7 +5,7 @@
 //! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
 
 use super::eye::Eye;
-use super::mis::{Eta, MisState, Ratios};
+use super::mis::{Eta, Merges, MisState, Ratios, one_merge};
 use super::shares::leads;
 use super::surroundings::Surroundings;
 use crate::bsdf::{LobeSet, Shading, Transport};
@@ -52,6 +52,18 @@ impl Strategies {
     #[inline]
     pub fn eye_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[1]
+    }
+
+    /// The merge that weights count at an eye path's vertex at `depth`, if any; `clear`: all before it are delta.
+    #[inline]
+    pub fn eye_merge(&self, depth: u32, clear: bool) -> Merges {
+        if self.eye_merges(depth) { one_merge(clear) } else { Merges::ZERO }
+    }
+
+    /// The merge that weights count at a light path's vertex at `depth`, if any: the eye path's vertex behind it is not delta.
+    #[inline]
+    pub fn light_merge(&self, depth: u32) -> Merges {
+        if self.light_merges(depth) { one_merge(false) } else { Merges::ZERO }
     }
 }
 

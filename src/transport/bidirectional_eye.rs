@@ -3,7 +3,7 @@
 use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Technique, Trail};
 use super::bidirectional_light::{add, scatter};
 use super::eye::{Eye, EyeMeasure, Features, FirstHit};
-use super::mis::{self, End, MisState, Ratios};
+use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
 use super::segment::token;
 use super::shares::{connected, shares, wanted};
@@ -172,13 +172,17 @@ impl<R: Record> EyeWalk<'_, R> {
                 mis: &light.mis,
                 reverse_pdf_w: light.reverse_pdf(-d),
                 arrival_pdf_a: pdf_eye * cos_light / distance2 * way.flight.forward,
-                merges: strategies.light_merges(light.depth) && !light.in_medium(),
+                merges: if light.in_medium() { Merges::ZERO } else { strategies.light_merge(light.depth) },
             },
             &End {
                 mis: &self.mis,
                 reverse_pdf_w: vertex.reverse_pdf(d, Transport::Importance),
                 arrival_pdf_a: pdf_light * cos_eye / distance2 * way.flight.reverse,
-                merges: strategies.eye_merges(vertex.depth()) && !S::IN_MEDIUM,
+                merges: if S::IN_MEDIUM {
+                    Merges::ZERO
+                } else {
+                    strategies.eye_merge(vertex.depth(), self.trail.delta)
+                },
             },
         );
         let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
@@ -229,8 +233,9 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
                         Part::Indirect => &mut measure.indirect_photons[level],
                     } += radiance;
                 };
-                let seen = (&self.mis, self.trail.sight, eye.classes);
-                merge_photons(photons, self.meets.levels, vertex, seen, longest, self.record, add);
+                let own = one_merge(self.trail.delta);
+                let seen = (self.trail.sight, eye.classes);
+                merge_photons(photons, self.meets.levels, vertex, (&self.mis, own), seen, longest, self.record, add);
             }
         }
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
@@ -244,7 +249,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
-        let merges = self.shared.strategies.eye_merges(vertex.depth);
+        let merges = self.shared.strategies.eye_merge(vertex.depth, self.trail.delta);
         self.mis = scatter(self.mis, vertex, sample, Transport::Importance, merges);
     }
 
@@ -268,7 +273,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
 
     #[inline]
     fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
-        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, false);
+        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, Merges::ZERO);
     }
 
     #[inline]

@@ -3,7 +3,7 @@
 use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Technique};
 use super::eye::EyeMeasure;
 use super::light::LightPass;
-use super::mis::{self, MisState, Ratios};
+use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::segment::token;
 use super::shares::{shares, wanted};
@@ -198,12 +198,12 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
 
     #[inline]
     fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
-        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, false);
+        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, Merges::ZERO);
     }
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 's>, sample: &BsdfSample) {
-        let merges = self.shared.strategies.light_merges(vertex.depth);
+        let merges = self.shared.strategies.light_merge(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, merges);
     }
 }
@@ -215,7 +215,7 @@ pub(super) fn scatter(
     vertex: &Vertex<'_, '_>,
     sample: &BsdfSample,
     back: Transport,
-    merges: bool,
+    merges: Merges,
 ) -> MisState {
     let cos = sample.wi.dot(vertex.surface.ng).abs();
     if sample.lobe == LobeSet::DELTA {

@@ -6,6 +6,13 @@
 //! of one pass may be merged in the next. Since `dVM = dVC / eta` holds at the start and is kept by (34) to (36), one pair of coefficients
 //! serves both. [`Eta::NONE`] is bidirectional path tracing; [`Eta::MERGE_ONLY`] leaves merging as the only strategy.
 //!
+//! All photons merged at one vertex share the eye path up to there, and the balance heuristic counts them as if they did not. Given the eye path
+//! they are independent: with `X` what one of `n` light paths brings, `E[(sum X)^2] = n E[X^2] + n (n - 1) E[E[X | eye path]^2]`. `X` is nothing but
+//! where the light path lands in the disc, with probability `N / n`, so the second term is about `N` times the first, and those merges are
+//! worth `1 / (1 + N)` of what they are counted for: correlation-aware MIS \[Grittmann et al. 2021\]. Where all earlier vertices of the eye path are
+//! delta, other eye paths of the pixel come to the same disc, nothing varies with them, and a merge counts in full. So merges have two
+//! coefficients, [`Merges`]. Light paths know but one: behind each of their vertices but the last merged the eye path has a vertex that is not delta.
+//!
 //! An eye path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at its last vertex must not
 //! count when it is: [`MisState::last`] keeps that term apart for one more vertex.
 //!
@@ -16,6 +23,7 @@
 //! were equal \[(53) to (55)\], which neglects n^2 ratios, the same for all strategies.
 
 use crate::light::EmissionDensity;
+use crate::math::Vec2;
 use crate::medium::Flight;
 
 /// Directions nearer to a surface (cosine) than this count as if they were this far from it.
@@ -23,18 +31,38 @@ const LEAST_COSINE: f32 = 1e-6;
 
 /// `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: how many merges there are for a connection, per unit of density.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Eta(pub f32);
+pub struct Eta {
+    value: f32,
+    /// What a merge of either kind is worth, see [`Merges`].
+    worth: Merges,
+}
+
+/// A number each for merges where all earlier vertices of the eye path are delta (`x`), and for those that share a path which might have gone elsewhere (`y`).
+pub type Merges = Vec2;
+
+/// The merge of a vertex: `clear` says that all earlier vertices of the eye path are delta.
+#[inline]
+pub fn one_merge(clear: bool) -> Merges {
+    if clear { Vec2::X } else { Vec2::Y }
+}
 
 impl Eta {
     /// Nothing is merged.
-    pub const NONE: Eta = Eta(0.0);
+    pub const NONE: Eta = Eta { value: 0.0, worth: Vec2::ONE };
     /// Nothing but merging.
-    pub const MERGE_ONLY: Eta = Eta(f32::INFINITY);
+    pub const MERGE_ONLY: Eta = Eta { value: f32::INFINITY, worth: Vec2::ONE };
 
-    /// `light_paths` of a pass merged within a squared radius, one connected.
+    /// `light_paths` of a pass merged within a squared radius, one connected; merges count as if they were independent.
     #[inline]
     pub fn new(radius2: f32, light_paths: f32) -> Eta {
-        Eta(std::f32::consts::PI * radius2 * light_paths)
+        Eta { value: std::f32::consts::PI * radius2 * light_paths, worth: Vec2::ONE }
+    }
+
+    /// The same where so many photons of a pass are expected in a disc, all of one eye path.
+    #[must_use]
+    #[inline]
+    pub fn sharing(self, photons: f32) -> Eta {
+        Eta { worth: Vec2::new(1.0, 1.0 / (1.0 + photons)), ..self }
     }
 }
 
@@ -43,25 +71,28 @@ impl Eta {
 pub struct Ratios {
     /// The part without eta.
     pub plain: f32,
-    /// The coefficient of eta.
-    pub merged: f32,
+    /// The coefficients of eta.
+    pub merged: Merges,
+    /// Of a merge: its own part of the coefficients.
+    pub own: Merges,
 }
 
 impl Ratios {
     /// No other strategy can do it.
-    pub const ALONE: Ratios = Ratios { plain: 1.0, merged: 0.0 };
+    pub const ALONE: Ratios = Ratios { plain: 1.0, merged: Vec2::ZERO, own: Vec2::ZERO };
 
     /// Weight of any strategy but merging \[(37), the balance heuristic\].
     #[inline]
     pub fn weight(self, eta: Eta) -> f32 {
+        let merged = self.merged.dot(eta.worth);
         // Without the test a path that cannot be merged would weigh 0 * infinity under MERGE_ONLY.
-        1.0 / if self.merged > 0.0 { self.plain + eta.0 * self.merged } else { self.plain }
+        1.0 / if merged > 0.0 { self.plain + eta.value * merged } else { self.plain }
     }
 
     /// Weight of merging; eta above 0.
     #[inline]
     pub fn merge_weight(self, eta: Eta) -> f32 {
-        1.0 / (self.merged + self.plain / eta.0)
+        self.own.dot(eta.worth) / (self.merged.dot(eta.worth) + self.plain / eta.value)
     }
 }
 
@@ -72,10 +103,10 @@ pub struct MisState {
     pub d_vcm: f32,
     /// The part of dVC \[(32)\] without eta.
     pub plain: f32,
-    /// The coefficient of eta in dVC, but for the merge at the vertex before.
-    pub merged: f32,
+    /// The coefficients of eta in dVC, but for the merge at the vertex before.
+    pub merged: Merges,
     /// The merge at the vertex before.
-    pub last: f32,
+    pub last: Merges,
 }
 
 impl MisState {
@@ -84,7 +115,7 @@ impl MisState {
     #[inline]
     pub fn light(start: &EmissionDensity) -> MisState {
         let plain = if start.delta { 0.0 } else { start.cos / (start.start * start.onward) };
-        MisState { d_vcm: 1.0 / start.onward, plain, merged: 0.0, last: 0.0 }
+        MisState { d_vcm: 1.0 / start.onward, plain, ..MisState::default() }
     }
 
     /// An eye path's start \[(31)\]: light paths that are connected to the camera for every eye path of a pixel, over the density per solid
@@ -133,16 +164,16 @@ impl MisState {
     }
 
     /// Departure by a lobe that is not delta \[(34), (35)\]: cosine, and densities per solid angle of the direction and of its reverse.
-    /// `merges`: photons may be merged at this vertex.
+    /// `merges`: the [`one_merge`] of this vertex, or none.
     #[must_use]
     #[inline]
-    pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: bool) -> MisState {
+    pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: Merges) -> MisState {
         let ratio = cos / pdf_w;
         MisState {
             d_vcm: 1.0 / pdf_w,
             plain: ratio * (self.plain * reverse_pdf_w + self.d_vcm),
-            merged: ratio * (self.merged + self.last) * reverse_pdf_w,
-            last: if merges { ratio } else { 0.0 },
+            merged: (self.merged + self.last) * (ratio * reverse_pdf_w),
+            last: merges * ratio,
         }
     }
 
@@ -150,28 +181,30 @@ impl MisState {
     #[must_use]
     #[inline]
     pub fn scatter_delta(self, cos: f32) -> MisState {
-        MisState { d_vcm: 0.0, plain: self.plain * cos, merged: (self.merged + self.last) * cos, last: 0.0 }
+        MisState { d_vcm: 0.0, plain: self.plain * cos, merged: (self.merged + self.last) * cos, last: Vec2::ZERO }
     }
 
     /// Densities of all strategies that end this side earlier, over that of ending here; `reverse_pdf_w` is the density of scattering back
     /// along the path.
     #[inline]
-    fn earlier(&self, reverse_pdf_w: f32) -> Ratios {
-        Ratios { plain: self.d_vcm + self.plain * reverse_pdf_w, merged: (self.merged + self.last) * reverse_pdf_w }
+    fn earlier(&self, reverse_pdf_w: f32) -> Side {
+        Side { plain: self.d_vcm + self.plain * reverse_pdf_w, merged: (self.merged + self.last) * reverse_pdf_w }
     }
 }
 
-/// Adds 1 to what eta multiplies where photons may be merged.
-#[inline]
-fn and_merge(side: Ratios, merges: bool) -> Ratios {
-    Ratios { plain: side.plain, merged: side.merged + if merges { 1.0 } else { 0.0 } }
+/// One side's part of [`Ratios`].
+#[derive(Clone, Copy)]
+struct Side {
+    plain: f32,
+    merged: Merges,
 }
 
 /// An eye path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is never merged.
 #[inline]
 pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
     let emission = light.start * light.onward;
-    Ratios { plain: 1.0 + light.direct * eye.d_vcm + emission * eye.plain, merged: emission * eye.merged }
+    let plain = 1.0 + light.direct * eye.d_vcm + emission * eye.plain;
+    Ratios { plain, merged: eye.merged * emission, own: Vec2::ZERO }
 }
 
 /// Next-event estimation \[(44), (45)\].
@@ -188,7 +221,7 @@ pub fn next_event(
 ) -> Ratios {
     let hit = if delta { 0.0 } else { pdf_w / light_pdf_w };
     let eye = eye.earlier(reverse_pdf_w);
-    Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: arrival_pdf_a * eye.merged }
+    Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: eye.merged * arrival_pdf_a, own: Vec2::ZERO }
 }
 
 /// A light vertex connected to the camera \[(46), (47)\]: density of an eye path's arrival per area there, over the number of light paths
@@ -197,7 +230,7 @@ pub fn next_event(
 pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
     let light = light.earlier(reverse_pdf_w);
     let scale = camera_pdf_a / light_paths;
-    Ratios { plain: 1.0 + scale * light.plain, merged: scale * light.merged }
+    Ratios { plain: 1.0 + scale * light.plain, merged: light.merged * scale, own: Vec2::ZERO }
 }
 
 /// One side of a connection.
@@ -209,25 +242,25 @@ pub struct End<'a> {
     pub reverse_pdf_w: f32,
     /// Density per area at which the other end's path would arrive here.
     pub arrival_pdf_a: f32,
-    /// Photons may be merged here.
-    pub merges: bool,
+    /// The [`one_merge`] of the vertex, or none.
+    pub merges: Merges,
 }
 
 /// Two vertices connected \[(40), (41)\].
 #[inline]
 pub fn connect(light: &End<'_>, eye: &End<'_>) -> Ratios {
-    let side = |end: &End<'_>| and_merge(end.mis.earlier(end.reverse_pdf_w), end.merges);
-    let (l, e) = (side(light), side(eye));
+    let (l, e) = (light.mis.earlier(light.reverse_pdf_w), eye.mis.earlier(eye.reverse_pdf_w));
     Ratios {
         plain: light.arrival_pdf_a * l.plain + 1.0 + eye.arrival_pdf_a * e.plain,
-        merged: light.arrival_pdf_a * l.merged + eye.arrival_pdf_a * e.merged,
+        merged: (l.merged + light.merges) * light.arrival_pdf_a + (e.merged + eye.merges) * eye.arrival_pdf_a,
+        own: Vec2::ZERO,
     }
 }
 
-/// A light vertex merged into an eye vertex \[(38), (39)\]: densities there of scattering towards the photon's past and towards the eye.
-/// For [`Ratios::merge_weight`].
+/// A light vertex merged into an eye vertex \[(38), (39)\]: densities there of scattering towards the photon's past and towards the eye, and the
+/// vertex's [`one_merge`]. For [`Ratios::merge_weight`].
 #[inline]
-pub fn merge(light: &MisState, eye: &MisState, pdf_w: f32, reverse_pdf_w: f32) -> Ratios {
+pub fn merge(light: &MisState, eye: &MisState, pdf_w: f32, reverse_pdf_w: f32, own: Merges) -> Ratios {
     let (l, e) = (light.earlier(pdf_w), eye.earlier(reverse_pdf_w));
-    Ratios { plain: l.plain + e.plain, merged: 1.0 + l.merged + e.merged }
+    Ratios { plain: l.plain + e.plain, merged: own + l.merged + e.merged, own }
 }

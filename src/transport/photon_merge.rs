@@ -1,7 +1,7 @@
 //! Photons that are merged with multiple importance sampling.
 
 use super::bidirectional::{MergeLevels, Record, Technique};
-use super::mis::{self, MisState};
+use super::mis::{self, Merges, MisState};
 use super::shares::Merged;
 use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
@@ -22,7 +22,7 @@ pub struct MergePhoton {
     pub ng: Vec3,
     /// Flux (W), already divided by the number of light paths of the pass.
     pub flux: Rgb,
-    /// Partial sums of the weights: dVCM, and dVC's two coefficients.
+    /// Partial sums of the weights: dVCM, and dVC's coefficients; the merges of a light path are of one kind.
     d_vcm: f32,
     plain: f32,
     merged: f32,
@@ -62,7 +62,7 @@ impl MergePhoton {
             flux,
             d_vcm: mis.d_vcm,
             plain: mis.plain,
-            merged: mis.merged + mis.last,
+            merged: mis.merged.y + mis.last.y,
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             beam,
             band: Band::of(vertex.wavelength.as_ref()),
@@ -72,7 +72,8 @@ impl MergePhoton {
     /// Partial sums of the weights.
     #[inline]
     pub fn mis(&self) -> MisState {
-        MisState { d_vcm: self.d_vcm, plain: self.plain, merged: self.merged, last: 0.0 }
+        let merged = Merges::new(0.0, self.merged);
+        MisState { d_vcm: self.d_vcm, plain: self.plain, merged, last: Merges::ZERO }
     }
 }
 
@@ -82,7 +83,8 @@ pub(super) fn merge_photons<R: Record>(
     photons: &PhotonMap<MergePhoton>,
     levels: &MergeLevels,
     vertex: &Vertex<'_, '_>,
-    (mis, sight, classes): (&MisState, Sight, ClassSet),
+    (mis, own): (&MisState, Merges),
+    (sight, classes): (Sight, ClassSet),
     longest: u32,
     record: &mut R,
     mut add: impl FnMut(PathClass, usize, Rgb),
@@ -106,7 +108,7 @@ pub(super) fn merge_photons<R: Record>(
         }
         let shares = merged.shares(photon.beam, photon.wi, f);
         let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
-        let ratios = mis::merge(&photon.mis(), mis, pdf, reverse);
+        let ratios = mis::merge(&photon.mis(), mis, pdf, reverse, own);
         let technique = Technique::Merge { light: u32::from(photon.depth), eye: vertex.depth };
         record.contribution(technique, value, photon.p, ratios);
         for (level, (&radius2, &eta)) in radii.iter().zip(levels.eta()).enumerate() {

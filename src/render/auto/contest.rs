@@ -1,8 +1,8 @@
 //! Candidates against each other, each by the finished picture that it makes of the same counted work.
 //!
 //! The first half of a candidate's iterations is finished as the render will be, and so is each quarter of them: what more iterations bring is told by both, and
-//! carried on to the end of the render as the power of their number that they show. All pictures are judged alike, by the second halves of candidates that
-//! find all light, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
+//! carried on to the end of the render as the power of their number that they show. All pictures are judged alike, by the second halves of all
+//! candidates, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
 use super::Way;
@@ -11,7 +11,6 @@ use crate::finish::told::{self, Judged};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
 use crate::light::Guide;
 use crate::render::cost::Cost;
-use crate::render::method::Method;
 use crate::render::session::{Session, Stage};
 use crate::stat::floor;
 use rayon::prelude::*;
@@ -24,8 +23,6 @@ const FIRST: f64 = 0.4;
 const UNCLEAR: f64 = 2.0;
 /// Standard errors that a difference has to stand out by: before a candidate is out, and before the usual way is left for a better one.
 const TOLD: f64 = 2.0;
-/// A judge has to have seen this share of the caustics that any other has.
-const SEEN: f64 = 0.5;
 
 /// A candidate and how it did.
 #[derive(Clone, Copy, Debug)]
@@ -60,9 +57,8 @@ struct Shown {
     /// Finished from either quarter of it.
     earlier: [Vec<[f32; 3]>; 2],
     judges: [Vec<[f32; 3]>; 2],
-    /// Relative variance of the judges and the mean of all caustics, both without the worst pixels.
+    /// Relative variance of the judges, without the worst pixels.
     noise: f64,
-    caustics: f64,
 }
 
 impl Trial {
@@ -99,11 +95,8 @@ impl<'a> Candidate<'a> {
         let [first, second, a, b] = quarters;
         let mut quarter = |mean| finish.picture(&estimate.of_some(mean, 4.0)).ok();
         let earlier = [quarter(first)?, quarter(second)?];
-        let caustics =
-            self.session.pixels().iter().map(|p| p.parts.caustic.element_sum() / f64::from(p.iterations.max(1)));
-        let caustics = without_worst(caustics.collect());
         let noise = variance(&a, &b, &finished);
-        Some(Shown { finished, earlier, judges: [a, b], noise, caustics })
+        Some(Shown { finished, earlier, judges: [a, b], noise })
     }
 }
 
@@ -125,42 +118,20 @@ fn without_worst(mut values: Vec<f64>) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Whether a way finds all light of a scene: connections do where no glass focuses any, which they find too rarely; merging and gathering do everywhere.
-fn is_complete(way: Way, focuses: bool) -> bool {
-    match way.method {
-        Method::Path | Method::Bdpt => !focuses,
-        Method::Vcm => true,
-        _ => false,
-    }
-}
-
-/// The judges, and the candidate whose finished picture says what pixels are worth: means of those of the candidates that find all light, by what their noise is; where these have not seen the caustics that another shows, that one.
-fn judges(candidates: &[Candidate<'_>], shown: &[Option<Shown>], focuses: bool) -> Option<([Vec<[f32; 3]>; 2], usize)> {
-    let all =
-        || candidates.iter().zip(shown).enumerate().filter_map(|(k, (c, shown))| Some((k, c.way, shown.as_ref()?)));
-    let most = all()
-        .filter(|(_, way, _)| way.method.gathers() || way.guided)
-        .max_by(|a, b| a.2.caustics.total_cmp(&b.2.caustics));
-    let seen = |shown: &Shown| most.as_ref().is_none_or(|(.., most)| shown.caustics >= SEEN * most.caustics);
-    let mut chosen: Vec<(usize, &Shown)> = all()
-        .filter(|(_, way, shown)| is_complete(*way, focuses) && seen(shown))
-        .map(|(k, _, shown)| (k, shown))
-        .collect();
-    if chosen.is_empty() {
-        chosen.extend(most.map(|(k, _, shown)| (k, shown)).or_else(|| all().next().map(|(k, _, shown)| (k, shown))));
-    }
-    let least = chosen.iter().min_by(|a, b| a.1.noise.total_cmp(&b.1.noise))?.0;
-    let weights: Vec<f64> = chosen.iter().map(|(_, shown)| 1.0 / shown.noise.max(f64::MIN_POSITIVE)).collect();
+/// The judges, means of all candidates' by what their noise is, and the candidate whose finished picture says what pixels are worth.
+fn judges(shown: &[Option<Shown>]) -> Option<([Vec<[f32; 3]>; 2], &Shown)> {
+    let all: Vec<&Shown> = shown.iter().flatten().collect();
+    let least = *all.iter().min_by(|a, b| a.noise.total_cmp(&b.noise))?;
+    let weights: Vec<f64> = all.iter().map(|shown| 1.0 / shown.noise.max(f64::MIN_POSITIVE)).collect();
     let total: f64 = weights.iter().sum();
     let mean = |judge: usize| {
         let pixel = |index: usize| {
             std::array::from_fn(|c| {
-                let parts =
-                    chosen.iter().zip(&weights).map(|((_, shown), w)| w * f64::from(shown.judges[judge][index][c]));
+                let parts = all.iter().zip(&weights).map(|(shown, w)| w * f64::from(shown.judges[judge][index][c]));
                 (parts.sum::<f64>() / total) as f32
             })
         };
-        (0..chosen[0].1.finished.len()).map(pixel).collect()
+        (0..least.finished.len()).map(pixel).collect()
     };
     Some(([mean(0), mean(1)], least))
 }
@@ -237,7 +208,6 @@ impl Left {
 pub(super) fn hold(
     candidates: &mut [Candidate<'_>],
     finish: &mut Finish,
-    focuses: bool,
     (allowed, budget): (f64, f64),
     stop: &dyn Fn() -> bool,
 ) -> Vec<Trial> {
@@ -248,7 +218,7 @@ pub(super) fn hold(
     };
     let share = FIRST * allowed / all as f64;
     candidates.iter_mut().for_each(|candidate| candidate.advance(share, stop));
-    let mut left = compare(candidates, finish, focuses, budget);
+    let mut left = compare(candidates, finish, budget);
     let best = least(&left, &vec![true; all]);
     let open: Vec<bool> = left.iter().map(|one| one.is_open(&left[best])).collect();
     let count = open.iter().filter(|open| **open).count();
@@ -258,7 +228,7 @@ pub(super) fn hold(
         let share = (allowed - closed) / count as f64;
         let again = candidates.iter_mut().zip(&open).filter(|(_, open)| **open);
         again.for_each(|(candidate, _)| candidate.advance(share, stop));
-        let second = compare(candidates, finish, focuses, budget);
+        let second = compare(candidates, finish, budget);
         // Those that are out stay out: they have had less.
         let both = left.into_iter().zip(second).zip(&open);
         left = both.map(|((first, second), open)| if *open { second } else { first }).collect();
@@ -276,13 +246,12 @@ pub(super) fn hold(
 }
 
 /// What all are expected to leave after `budget` core-seconds.
-fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, focuses: bool, budget: f64) -> Vec<Left> {
+fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, budget: f64) -> Vec<Left> {
     let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
-    let judged = judges(candidates, &shown, focuses);
-    let values = judged.as_ref().and_then(|(_, worth)| shown[*worth].as_ref()).map(|shown| &shown.finished);
+    let judged = judges(&shown);
     let left = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Left> {
-        let (shown, ([a, b], _), values) = (shown.as_ref()?, judged.as_ref()?, values?);
-        let of = |picture: &[[f32; 3]]| told::judge(picture, [a, b], values);
+        let (shown, ([a, b], worth)) = (shown.as_ref()?, judged.as_ref()?);
+        let of = |picture: &[[f32; 3]]| told::judge(picture, [a, b], &worth.finished);
         let earlier = shown.earlier.each_ref().map(|picture| of(picture));
         // In the render's iterations over those of the half; the least number of iterations may have cost more than the share.
         let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);

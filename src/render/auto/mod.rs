@@ -1,6 +1,6 @@
-//! Choosing how to render: a short pilot renders every candidate on a small picture of the same view and finishes it as the
-//! render will be finished. Vertex connection and merging, which weighs all techniques against each other for every path, is
-//! taken unless another's finished picture is clearly closer to the truth: further than the pilot's own noise can say.
+//! Choosing how to render. Vertex connection and merging, which weighs all techniques against each other for every path, is taken where glass or mirrors
+//! focus light. Elsewhere a short pilot renders it and paths without photons on a small picture of the same view, finished as
+//! the render will be, and another is taken where its picture is clearly closer to the truth: further than the pilot's own noise can say.
 //!
 //! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times constants (`super::cost`). So the
 //! same arguments give the same choice on any machine and any number of threads. Candidates get the same work, near to the render's own work
@@ -41,6 +41,9 @@ impl Way {
     /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is left to a
     /// technique that finds it badly.
     pub const USUAL: Way = Way::plain(Method::Vcm);
+    /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where others would have found the
+    /// glass, and without which it is hardly found where it is small.
+    pub const FOCUSED: Way = Way { guided: true, ..Way::USUAL };
     /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
     pub const GATHERING: Way = Way::plain(Method::Sppm);
 
@@ -96,7 +99,10 @@ pub fn choose(
     let (weighed, weighing) = pilot.weigh();
     let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
     let chosen = trials.iter().find(|trial| trial.chosen);
-    let untried = || if make(Way::USUAL).is_some() { Way::USUAL } else { Way::GATHERING };
+    let untried = || {
+        let focused = pilot::focuses(scene).then_some(Way::FOCUSED);
+        focused.into_iter().chain([Way::USUAL]).find(|way| make(*way).is_some()).unwrap_or(Way::GATHERING)
+    };
     let way = chosen.map_or_else(untried, |chosen| chosen.way);
     let mut settings = make(way)?;
     let cost = chosen.map_or(pilot.cost, |chosen| chosen.cost);

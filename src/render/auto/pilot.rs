@@ -12,7 +12,6 @@ use crate::render::method::Method;
 use crate::render::session::Stage;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::transport::Indirect;
 
 /// Share of the render's cost that the pilot may take.
 const SHARE: f64 = 0.05;
@@ -33,33 +32,18 @@ const CORES: f64 = 2.0;
 /// What a render until an error is reached is taken for (core-seconds).
 const UNLIMITED: f64 = 1000.0;
 
-fn focuses(scene: &Scene) -> bool {
+pub(super) fn focuses(scene: &Scene) -> bool {
     !scene.lights.targets().spheres().is_empty()
 }
 
-/// The ways worth trying in a scene.
-fn candidates(scene: &Scene) -> Vec<Way> {
-    let focusing = focuses(scene);
-    let (sizeless, scattering) = (Presence::has_sizeless_lights(scene), scene.survey.scattering());
-    let mut ways = vec![Way::USUAL];
-    // Photons alone find caustics through glass; where nothing focuses, the usual way has all that they could bring.
-    if focusing {
-        ways.push(Way::GATHERING);
-        // Photons of all light are not guided: as few as a fifth of them would be left for what is no caustic, and guided paths take longer.
-        if !scattering {
-            ways.push(Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true });
-        }
-    }
-    // What photons alone find, these leave out.
-    if !(focusing && sizeless) {
-        ways.extend([Way::plain(Method::Path), Way::plain(Method::Bdpt)]);
-    }
-    ways
-}
-
-/// The candidates that other wishes leave, with their settings.
+/// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors focus light it is one: what connections and
+/// photons leave out there a pilot is too short to miss, and would praise them for it.
 fn ways(scene: &Scene, make: &impl Fn(Way) -> Option<Settings>) -> Vec<(Way, Settings)> {
-    candidates(scene).into_iter().filter_map(|way| make(way).map(|settings| (way, settings))).collect()
+    let with_settings = |way: &Way| make(*way).map(|settings| (*way, settings));
+    if focuses(scene) {
+        return [Way::FOCUSED, Way::USUAL].iter().find_map(with_settings).into_iter().collect();
+    }
+    [Way::USUAL, Way::plain(Method::Path), Way::plain(Method::Bdpt)].iter().filter_map(with_settings).collect()
 }
 
 /// What a pilot is of.
@@ -129,7 +113,12 @@ impl<'a> Pilot<'a> {
         let Pilot { scene, camera, gathering, cost, pixels, budget } = *self;
         let ways = ways(scene, make);
         if ways.len() < 2 {
-            return (Vec::new(), Some("the one way that these options leave"));
+            let why = if focuses(scene) {
+                "light is focused here, which it finds by all techniques"
+            } else {
+                "the one way that these options leave"
+            };
+            return (Vec::new(), Some(why));
         }
         let allowed = SHARE * budget - weighing;
         let Some((small, allowed)) = self.size(&ways, allowed, LEAST_SHARE * budget - weighing) else {
@@ -152,7 +141,7 @@ impl<'a> Pilot<'a> {
                 })
             })
             .collect();
-        (contest::hold(&mut candidates, finish, focuses(scene), (allowed, budget), stop), None)
+        (contest::hold(&mut candidates, finish, (allowed, budget), stop), None)
     }
 
     /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too little for the smallest picture; `None` where even that takes
