@@ -1,8 +1,10 @@
 //! Scattering in world space: shading normals, decided once.
 //!
-//! A direction whose sides of the shading plane and of the geometric plane differ is scattered neither from nor to: whether light is
-//! reflected or transmitted is then never in doubt, nothing leaks, and every algorithm sees the same function. Light carried the other
-//! way takes the adjoint of Veach \[1997, 5.3\].
+//! Light whose sides of the shading plane and of the geometric plane differ is not scattered: whether light is reflected or transmitted is then never in doubt, nothing
+//! leaks, and a surface is dark where its shading normal faces away from the lamp. A viewer whose sides differ, as on steep normal maps seen from
+//! the side, stands for the opposite direction: so there is no black, and since the directions that light is scattered to which are on the wrong side of
+//! the surface are just the opposites of those that it is not, each carries what its opposite would have, and all that is scattered leaves.
+//! Every algorithm sees the same function. Light carried the other way takes the adjoint of Veach \[1997, 5.3\].
 
 use super::layered::Seen;
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
@@ -18,8 +20,10 @@ pub struct Shading<'a> {
     /// Scattering in the frame.
     pub bsdf: Bsdf<'a>,
     pub(super) seen: Seen,
-    /// Cosine of the direction with the geometric normal; 0 where the two normals disagree about its side.
+    /// Cosine of the direction with the geometric normal.
     pub(super) cos_og: f32,
+    /// The two normals disagree about its side: `seen` is its opposite.
+    opposite: bool,
 }
 
 impl<'a> Shading<'a> {
@@ -28,16 +32,23 @@ impl<'a> Shading<'a> {
     pub fn new(frame: Frame, ng: Vec3, bsdf: Bsdf<'a>, wo: Vec3) -> Shading<'a> {
         let local = frame.to_local(wo);
         let cos = wo.dot(ng);
-        let cos_og = if local.z * cos > 0.0 { cos.abs() } else { 0.0 };
-        Shading { frame, ng, bsdf, seen: bsdf.seen(local), cos_og }
+        let opposite = local.z * cos < 0.0;
+        let cos_og = if local.z == 0.0 { 0.0 } else { cos.abs() };
+        Shading { frame, ng, bsdf, seen: bsdf.seen(if opposite { -local } else { local }), cos_og, opposite }
     }
 
-    /// `w` in the frame, and its cosine with the geometric normal; `None` where the two normals disagree about its side.
+    /// `w`, which paths of `transport` come from, in the frame, and its cosine with the geometric normal; `None` where the two normals disagree about the side of
+    /// light, be it `w` or the direction seen along.
     #[inline]
-    fn local(&self, w: Vec3) -> Option<(Vec3, f32)> {
+    fn local(&self, w: Vec3, transport: Transport) -> Option<(Vec3, f32)> {
         let local = self.frame.to_local(w);
         let cos = w.dot(self.ng);
-        (local.z * cos > 0.0).then_some((local, cos.abs()))
+        let agrees = local.z * cos > 0.0;
+        let lit = match transport {
+            Transport::Radiance => agrees,
+            Transport::Importance => !self.opposite && local.z * cos != 0.0,
+        };
+        (lit && self.cos_og > 0.0).then_some((if agrees { local } else { -local }, cos.abs()))
     }
 
     /// The BSDF times the cosine that belongs to it: `f |wi.ns|` for radiance, and for importance
@@ -45,9 +56,7 @@ impl<'a> Shading<'a> {
     /// [`Shading::sample`] draws `wi`.
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
-        let (true, Some((i, cos_ig))) = (self.cos_og > 0.0, self.local(wi)) else {
-            return (Rgb::ZERO, 0.0);
-        };
+        let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
         let (f, pdf) = self.bsdf.evaluate_seen(&self.seen, i, transport, set);
         let cosine = match transport {
             Transport::Radiance => i.z.abs(),
@@ -71,7 +80,12 @@ impl<'a> Shading<'a> {
     /// Density per solid angle with which a path that comes along `wi` would be sent along the direction the surface is seen along.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
-        let (true, Some((i, _))) = (self.cos_og > 0.0, self.local(wi)) else { return 0.0 };
+        // Whoever comes along `wi` looks for light if this path does not.
+        let own = match transport {
+            Transport::Radiance => Transport::Importance,
+            Transport::Importance => Transport::Radiance,
+        };
+        let Some((i, _)) = self.local(wi, own) else { return 0.0 };
         self.bsdf.pdf(i, self.seen.wo(), transport, set)
     }
 
@@ -80,7 +94,7 @@ impl<'a> Shading<'a> {
     /// not do: photons that graze it have met another facet nearby, whose share of them does not vanish with their cosine here.
     #[inline]
     pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
-        let (true, Some((i, _))) = (self.cos_og > 0.0 && cosine > 0.0, self.local(wi)) else {
+        let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {
             return Rgb::ZERO;
         };
         self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cosine)
@@ -95,16 +109,20 @@ impl<'a> Shading<'a> {
     /// Draws a direction, see [`Bsdf::sample`]; `wi` and the weight are those of the world.
     #[inline]
     pub fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if self.cos_og == 0.0 {
+        let importance = transport == Transport::Importance;
+        if self.cos_og == 0.0 || (importance && self.opposite) {
             return None;
         }
         let mut sample = self.bsdf.sample_seen(&self.seen, transport, set, u_lobe, u)?;
-        let wi = self.frame.to_world(sample.wi);
-        let cos_ig = wi.dot(self.ng);
+        let mut wi = self.frame.to_world(sample.wi);
+        let mut cos_ig = wi.dot(self.ng);
+        if sample.wi.z * cos_ig < 0.0 && importance {
+            (wi, cos_ig) = (-wi, -cos_ig);
+        }
         if sample.wi.z * cos_ig <= 0.0 {
             return None;
         }
-        if transport == Transport::Importance {
+        if importance {
             sample.weight *= self.seen.o.z * cos_ig.abs() / (self.cos_og * sample.wi.z.abs());
         }
         sample.wi = wi;
