@@ -125,7 +125,7 @@ fn nothing_white_is_seen_under_a_white_sky() {
 }
 
 /// A floor of steep bumps seen at a slant, so that many of their normals face away from the eye. The methods, which scatter at it from
-/// either side, find the same light, and the floor is not half black: with those normals black it had 0.6 of it.
+/// either side, find the same light: a mean of 0.71, where it was 0.61 with those normals black.
 #[test]
 fn steep_normal_maps_look_the_same_by_all_methods() {
     let mut description = white_sky();
