@@ -176,3 +176,24 @@ fn panes_far_away_are_panes() {
         is_white("a pane far away", &build(description), &[Method::Path, Method::Bdpt]);
     }
 }
+
+/// A pane that single precision has no room for where it is (its sides are 3 roundings of 0.24 mm apart in a scene of kilometres) is named, one
+/// with room is not.
+#[test]
+fn panes_too_thin_to_tell_are_named() {
+    for (thickness, named) in [(7e-4, true), (0.02, false)] {
+        let mut description = white_sky();
+        let pane = cuboid(Vec3::new(3000.0, -1.0, -1.0), Vec3::new(3000.0 + thickness, 1.0, 1.0), false);
+        add(&mut description, "pane", pane, glass(1.5));
+        add(&mut description, "ground", square_of(-4000.0, 4000.0), matte(0.5, 0.0));
+        description.cameras.push(look_at(DVec3::new(2997.0, 0.2, 0.3), DVec3::new(3000.0, 0.0, 0.0), 30.0));
+        let scene = build(description);
+        let told = scene.warnings.iter().any(|warning| warning.contains("\"pane\"") && warning.contains("thinner"));
+        assert_eq!(told, named, "{thickness}: {:?}", scene.warnings);
+    }
+}
+
+/// A square on the ground.
+fn square_of(low: f32, high: f32) -> Mesh {
+    quad(Vec3::new(low, -2.0, low), Vec3::Z * (high - low), Vec3::X * (high - low))
+}

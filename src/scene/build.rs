@@ -84,6 +84,12 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     }
     let scattering = Scattering::new(&materials.list);
     let contacts = Arc::new(Contacts::new(&shapes, &materials));
+    for &(instance, within) in &contacts.thin {
+        warnings.push(format!(
+            "object \"{}\": it has walls thinner than positions are exact where it is ({within:.1e} m), which light passes as if they were one surface (make them thicker, or the scene smaller)",
+            shapes.instances[instance as usize].name
+        ));
+    }
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     let lenses = description.cameras.iter().any(|camera| camera.aperture_radius > 0.0);
     if let Some(lacking) = survey.lacking(&materials, lenses) {

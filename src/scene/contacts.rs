@@ -6,6 +6,7 @@ use crate::material::Materials;
 use crate::math::Vec3;
 use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
+use std::collections::BTreeMap;
 
 /// Surfaces lie on each other where they are as good as parallel: cosine of the angle between them, or more. Where they cross, they do along
 /// a line, which no ray meets.
@@ -44,6 +45,15 @@ impl Triangle {
     }
 }
 
+impl Triangle {
+    /// Whether another of the same mesh lies on it, all of it, facing it: two sides of a pane that positions cannot tell apart.
+    fn is_one_with(&self, other: &Triangle) -> bool {
+        let reach = self.error + other.error;
+        let within = |corner: Vec3| (corner - self.corners[0]).dot(self.normal).abs() <= reach;
+        self.instance == other.instance && other.corners.into_iter().all(within)
+    }
+}
+
 impl RTreeObject for Triangle {
     type Envelope = AABB<[f32; 3]>;
 
@@ -61,6 +71,8 @@ pub struct Contacts {
     touched: Vec<Box<[bool]>>,
     /// They have not been looked for.
     unknown: bool,
+    /// Instances with walls that are thinner than positions are exact there, and how exact those are (metres).
+    pub thin: Vec<(u32, f32)>,
 }
 
 impl Contacts {
@@ -88,17 +100,26 @@ impl Contacts {
         };
         let passing: Vec<u32> = instances.clone().filter(|&instance| passes(instance)).collect();
         let tree = RTree::bulk_load(passing.iter().flat_map(|&instance| of(instance)).collect());
-        let touched_by = |instance: u32| -> Vec<(u32, u32)> {
+        let touched_by = |instance: u32| -> Vec<(u32, u32, f32)> {
             let met = |other: Triangle| {
                 let near = tree.locate_in_envelope_intersecting(other.envelope());
                 let touched = near.filter(move |triangle| triangle.may_touch(&other));
-                touched.map(|triangle| (triangle.instance, triangle.primitive)).collect::<Vec<_>>()
+                let found = |triangle: &Triangle| {
+                    let thin = if triangle.is_one_with(&other) { triangle.error + other.error } else { 0.0 };
+                    (triangle.instance, triangle.primitive, thin)
+                };
+                touched.map(found).collect::<Vec<_>>()
             };
             of(instance).flat_map(met).collect()
         };
         let mut touched: Vec<Box<[bool]>> = vec![Box::default(); shapes.instances.len()];
-        let found: Vec<(u32, u32)> = instances.into_par_iter().flat_map_iter(touched_by).collect();
-        for (instance, primitive) in found {
+        let found: Vec<(u32, u32, f32)> = instances.into_par_iter().flat_map_iter(touched_by).collect();
+        let mut thin: BTreeMap<u32, f32> = BTreeMap::new();
+        for (instance, primitive, within) in found {
+            if within > 0.0 {
+                let most = thin.entry(instance).or_default();
+                *most = most.max(within);
+            }
             let flags = &mut touched[instance as usize];
             if flags.is_empty() {
                 let mesh = &shapes.meshes[shapes.instances[instance as usize].mesh as usize];
@@ -109,7 +130,7 @@ impl Contacts {
         if touched.iter().all(|flags| flags.is_empty()) {
             touched.clear();
         }
-        Contacts { touched, unknown: false }
+        Contacts { touched, unknown: false, thin: thin.into_iter().collect() }
     }
 
     /// Whether others may lie on a triangle that light passes.
