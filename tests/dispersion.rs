@@ -321,7 +321,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
             radius: 0.0,
         });
         let scene = build(description);
-        assert_eq!(scene.survey.dispersion(), abbe < 1e6);
+        assert_eq!(scene.survey.dispersion, abbe < 1e6);
         let surroundings = Surroundings::new(&scene, Vec3::new(0.0, 5.0, 0.0));
         let mut means: [Vec<f64>; 3] = Default::default();
         for seed in 0..seeds {
@@ -666,7 +666,7 @@ fn without_dispersion_no_bit_changes() {
     for method in [Method::Path, Method::Sppm, Method::Vcm] {
         for (plain, dispersion, unused) in &cases {
             let [plain, other] = [(plain, false), (dispersion, *unused)].map(|(m, unused)| scene(m.clone(), unused));
-            assert!(!plain.survey.dispersion() && !other.survey.dispersion());
+            assert!(!plain.survey.dispersion && !other.survey.dispersion);
             let [a, b] = [&plain, &other].map(|s| bytes(&render(s, method, 16, &photons(2000, 0.1, 3, 1))));
             assert_eq!(a, b, "{method:?}");
         }
@@ -684,7 +684,7 @@ fn without_dispersion_no_bit_changes() {
 fn little_dispersion_is_nearly_none() {
     let none = rainbow(glass, true);
     let little = rainbow(|ior| Material { dispersion: 1e-5, ..glass(ior) }, true);
-    assert!(little.survey.dispersion());
+    assert!(little.survey.dispersion);
     let sppm = |scene: &Scene, first: u64| seeds(scene, Method::Sppm, |seed| photons(20_000, 0.06, 16, seed + first));
     let plain = sppm(&none, 0);
     agree("little dispersion, sppm", &sppm(&little, 100), &plain, 2e-3, 0.2);

@@ -639,7 +639,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         tally.weights, tally.in_media, tally.sums, tally.techniques, tally.bugs
     );
     assert!(tally.techniques.len() >= 4 && tally.weights > 1000, "{what}: too little happened");
-    let media = scene.survey.scattering();
+    let media = scene.survey.scattering;
     assert_eq!(tally.in_media > tally.weights / 4, media, "{what}: {} paths through media", tally.in_media);
     for (bug, worst) in BUGS.into_iter().zip(tally.bugs) {
         // Some need a scene that has what they forget.

@@ -127,7 +127,7 @@ impl Camera {
 
     /// Whether a lens blurs.
     pub fn has_lens(&self) -> bool {
-        !cfg!(feature = "bare") && self.lens_radius > 0.0
+        self.lens_radius > 0.0
     }
 
     /// Film point in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size.

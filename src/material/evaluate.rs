@@ -9,7 +9,7 @@ use crate::texture::{Texture, TextureRef};
 /// A texture at a surface; white where there is none or its index is past the list.
 #[inline]
 fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]) -> Vec4 {
-    let Some(reference) = texture.as_ref().filter(|_| !cfg!(feature = "bare")) else { return Vec4::ONE };
+    let Some(reference) = texture else { return Vec4::ONE };
     match textures.get(reference.texture as usize) {
         Some(texture) => texture.sample(reference.coordinates(surface.uv)),
         None => Vec4::ONE,

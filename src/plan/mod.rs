@@ -87,7 +87,7 @@ impl Plan {
     pub fn new(scene: &Scene, camera: &Camera, asked: &Asked) -> Plan {
         let presence = Presence::of(scene, camera);
         let sizeless = Presence::has_sizeless_lights(scene);
-        let finds = |effect| asked.search.finds(effect, sizeless, scene.survey.scattering());
+        let finds = |effect| asked.search.finds(effect, sizeless, scene.survey.scattering);
         let plan = |effect: Effect| {
             let removed = asked.removed.because(effect);
             let because = if removed.is_empty() { presence.because(effect) } else { removed }.to_vec();
@@ -142,7 +142,7 @@ fn shortest(effect: Effect, scene: &Scene) -> u32 {
         Effect::Direct | Effect::Glossy => 2,
         Effect::Indirect | Effect::Caustic => 3,
         Effect::Sds => 4,
-        Effect::Volume if scene.survey.scattering() => 2,
+        Effect::Volume if scene.survey.scattering => 2,
         _ => 1,
     }
 }

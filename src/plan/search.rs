@@ -80,7 +80,7 @@ impl Search {
 
     /// What brings an effect into the picture.
     pub(super) fn carrier(self, effect: Effect, scene: &Scene) -> &'static str {
-        let media_scatter = scene.survey.scattering();
+        let media_scatter = scene.survey.scattering;
         // Photons of caustics, if there are any, share what sharp lobes show of lamps.
         let shared = scene.survey.glints && !scene.lights.targets().spheres().is_empty();
         let gathers = matches!(self, Search::Map | Search::Photons);

@@ -84,7 +84,7 @@ impl Cost {
         };
         let lengths = Lengths::new(&eye, &surroundings, seed, guide, reach);
         let triangles = scene.shapes.triangles().max(1) as f64;
-        let dispersion = if scene.survey.dispersion() { DISPERSION } else { 1.0 };
+        let dispersion = if scene.survey.dispersion { DISPERSION } else { 1.0 };
         Cost { lengths, present: Present::of(scene), factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
     }
 

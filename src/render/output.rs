@@ -29,7 +29,7 @@ impl Present {
     pub fn of(scene: &Scene) -> Present {
         Present {
             environment: scene.lights.sky().environment.is_some(),
-            volume: scene.survey.scattering(),
+            volume: scene.survey.scattering,
             narrow_lobes: scene.survey.narrow_lobes,
         }
     }

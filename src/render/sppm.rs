@@ -234,7 +234,7 @@ impl<'a> Sppm<'a> {
 
     /// Maps of the photons of iteration `i`, and of how many light paths, if sharp lobes may merge them: those of caustics, if they are sent.
     fn build(&self, photons: Photons, paths: u32, i: u64) -> Maps {
-        let scatters = self.eye.scene.survey.scattering();
+        let scatters = self.eye.scene.survey.scattering;
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
         let [others, caustics] = photons.surface.map(PhotonMap::build);
         let [_, caustics_sent] = self.kinds();
@@ -266,7 +266,7 @@ impl Iterate for Sppm<'_> {
             self.later2 = usual_radius2(&maps[Kind::Caustic as usize], k);
         }
         let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
-        if self.eye.scene.survey.scattering() {
+        if self.eye.scene.survey.scattering {
             let pilot = PhotonMap::build(pilot.volume);
             let bandwidths = initial_volume_bandwidths(&self.eye, initial, widest[1], seed, &pilot);
             for (pixel, bandwidth) in pixels.iter_mut().zip(bandwidths) {

@@ -2,7 +2,7 @@
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
 use super::{Contacts, Nestings, Scene, Survey};
-use crate::error::{Error, Kind, Result};
+use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
@@ -91,12 +91,6 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         ));
     }
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
-    let lenses = description.cameras.iter().any(|camera| camera.aperture_radius > 0.0);
-    if let Some(lacking) = survey.lacking(&materials, lenses) {
-        let cause = format!("the scene has {lacking}, and this program was built without");
-        let error = Error::new(Kind::Scene, description.source.display().to_string(), cause);
-        return Err(error.hint("build it without the feature 'bare'"));
-    }
     Ok(Scene {
         source: description.source,
         origin,

@@ -7,14 +7,18 @@ use crate::material::{Alpha, Materials, MediumParameters};
 /// Kinds of things present in a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Survey {
-    alpha: bool,
+    /// Some material has alpha cut-outs or blending.
+    pub alpha: bool,
     /// Some mesh bounds a solid that light enters.
     pub solids: bool,
     /// Rays may cross boundaries that do not scatter: index-matched solids, or solids inside others.
     pub null_boundaries: bool,
-    media: bool,
-    scattering: bool,
-    dispersion: bool,
+    /// Something absorbs or scatters between surfaces.
+    pub media: bool,
+    /// Something scatters between surfaces.
+    pub scattering: bool,
+    /// Some solid refracts colours differently.
+    pub dispersion: bool,
     /// Some surface may have narrow lobes: mirrors, glass, what shines.
     pub narrow_lobes: bool,
     /// Sharp lobes may show lamps that have a size, by way of perfect mirrors or clear glass.
@@ -25,47 +29,7 @@ pub struct Survey {
     pub infinite_lights: bool,
 }
 
-/// The program has all effects. Without some of them, only to measure what they cost scenes that do not call for them, it refuses scenes that do.
-const COMPLETE: bool = !cfg!(feature = "bare");
-
 impl Survey {
-    /// Some material has alpha cut-outs or blending.
-    #[inline(always)]
-    pub fn alpha(&self) -> bool {
-        COMPLETE && self.alpha
-    }
-
-    /// Something absorbs or scatters between surfaces.
-    #[inline(always)]
-    pub fn media(&self) -> bool {
-        COMPLETE && self.media
-    }
-
-    /// Something scatters between surfaces.
-    #[inline(always)]
-    pub fn scattering(&self) -> bool {
-        COMPLETE && self.scattering
-    }
-
-    /// Some solid refracts colours differently.
-    #[inline(always)]
-    pub fn dispersion(&self) -> bool {
-        COMPLETE && self.dispersion
-    }
-
-    /// What the scene calls for and the program lacks.
-    pub(super) fn lacking(&self, materials: &Materials, lenses: bool) -> Option<&'static str> {
-        let textures = !materials.textures.is_empty();
-        let all = [
-            (self.alpha, "alpha"),
-            (self.media, "media"),
-            (self.dispersion, "dispersion"),
-            (textures, "textures"),
-            (lenses, "lenses"),
-        ];
-        all.into_iter().find(|(called_for, _)| !COMPLETE && *called_for).map(|(_, name)| name)
-    }
-
     /// Looks through the scene.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());

@@ -171,7 +171,7 @@ impl Lengths {
         let paths = || (0..PATHS).into_par_iter().with_min_len(CHUNK);
         let light: Vec<Count<'_, false>> = paths().map(from_light).collect();
         let through: Vec<[f64; 6]> =
-            if eye.scene.survey.scattering() { paths().map(through).collect() } else { Vec::new() };
+            if eye.scene.survey.scattering { paths().map(through).collect() } else { Vec::new() };
         let eye: Vec<Count<'_, false>> = paths().map(from_eye).collect();
         let map = PhotonMap::build(light.iter().flat_map(|count| &count.open).copied().collect());
         // As many as are there are found in an area that is larger by as much as these paths are fewer.

@@ -175,7 +175,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
     let eta = if entering { after / before } else { before / after };
     // Of two glasses with one index some wavelengths are refracted all the same.
-    if eta == 1.0 && !material.emits() && !(scene.survey.dispersion() && crossing.disperses(scene)) {
+    if eta == 1.0 && !material.emits() && !(scene.survey.dispersion && crossing.disperses(scene)) {
         let parameters = material.parameters(surface, &scene.materials.textures, eta);
         if parameters.is_pure_transmission() {
             return Boundary::None(parameters.base_color, crossing.interior);
@@ -187,7 +187,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
 /// What decides where a ray passes what is there in part only; nothing is drawn where all is there.
 #[inline(always)]
 pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
-    if scene.survey.alpha() { draws.token(purpose) } else { 0 }
+    if scene.survey.alpha { draws.token(purpose) } else { 0 }
 }
 
 /// A ray from inside `interior`, about to be followed.
@@ -225,7 +225,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Known
             _ => along.next(scene),
         };
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
-        let medium = if T::MEDIA && scene.survey.media() { interior.medium(scene) } else { None };
+        let medium = if T::MEDIA && scene.survey.media { interior.medium(scene) } else { None };
         let Some((surface, t)) = met else {
             if let Some(medium) = medium {
                 let (distance, beyond) = (f32::INFINITY, None);
@@ -277,7 +277,7 @@ impl Way {
     /// Goes on through `distance` of what fills the space.
     #[inline]
     fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
-        if scene.survey.media() {
+        if scene.survey.media {
             *self = self.through(scene, interior, distance, starts, ends);
         }
     }
@@ -287,7 +287,7 @@ impl Way {
     fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> Way {
         let Some(medium) = interior.medium(scene) else { return self };
         let left = self.left * medium.transmittance(distance);
-        let scatters = scene.survey.scattering();
+        let scatters = scene.survey.scattering;
         let flight = if scatters { self.flight.through(&medium, distance, starts, ends) } else { self.flight };
         Way { left, flight }
     }

@@ -186,11 +186,11 @@ pub fn walk<'a, V: Visitor<'a>>(
     visitor: &mut V,
 ) {
     // Scenes without media or dispersion walk as if there were none in the world.
-    if scene.survey.dispersion() {
+    if scene.survey.dispersion {
         walk_aside::<V, DISPERSION>(scene, arena, start, stream, transport, max_depth, visitor);
-    } else if scene.survey.scattering() {
+    } else if scene.survey.scattering {
         walk_aside::<V, SCATTERING>(scene, arena, start, stream, transport, max_depth, visitor);
-    } else if scene.survey.media() {
+    } else if scene.survey.media {
         walk_aside::<V, ABSORPTION>(scene, arena, start, stream, transport, max_depth, visitor);
     } else {
         walk_in::<V, NOTHING>(scene, arena, start, stream, transport, max_depth, visitor);

@@ -82,7 +82,7 @@ pub fn why(choice: &Choice) -> String {
 pub fn check_media(job: &Job, scene: &Scene) -> Result<()> {
     let method = job.method.chosen();
     let (option, hint) = match method {
-        _ if !scene.survey.scattering() => return Ok(()),
+        _ if !scene.survey.scattering => return Ok(()),
         render::Method::Pm | render::Method::Bpm => {
             (format!("--method {}", method.name()), "choose --method sppm, cppm, vcm, bdpt or path")
         }

@@ -177,7 +177,7 @@ pub(super) fn weigh(
         }
     }
     let part = |k: usize| [0, 1].map(|half: usize| rest[half].iter().map(|parts| parts[k]).collect());
-    let own = |effect: Effect| presence.has(effect) && (effect != Effect::Volume || scene.survey.scattering());
+    let own = |effect: Effect| presence.has(effect) && (effect != Effect::Volume || scene.survey.scattering);
     let parts = WHOLE.into_iter().enumerate().filter(|(_, effect)| own(*effect));
     weighed.extend(parts.map(|(k, effect)| of_light(effect, &part(k))));
     for &effect in properties {
