@@ -51,4 +51,6 @@ pub mod finish;
 
 pub mod render;
 
+pub mod pipeline;
+
 pub mod report;

@@ -1,20 +1,12 @@
 //! Options of the finish that `render`, `combine` and `converge` have in common, and what they open.
 
 use super::say;
-use caustique::combine::{Combiner, Model, Runtime};
-use caustique::error::{Error, Kind, Result};
-use caustique::finish::{Account, Choice, Denoiser, Finish, Quality, Size};
-use caustique::render::Clock;
+use caustique::error::{Error, Result};
+use caustique::finish::Choice;
+use caustique::pipeline::Ready;
+use caustique::pipeline::finish::{Order, open};
 use clap::ValueEnum;
 use serde::Serialize;
-use serde_json::{Value, json};
-
-/// Share of a render's time that denoising the picture may take at more than the least quality.
-const SHARE: f64 = 0.07;
-/// Side of the picture by which the denoiser is timed.
-const TIMED: usize = 192;
-/// A finish is let to take no more of a render's time.
-const MOST: f64 = 0.5;
 
 /// What makes the denoised picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
@@ -56,122 +48,28 @@ pub struct FinishArgs {
     pub model: Option<String>,
 }
 
-/// A finish that is ready, and the network that `--model` named.
-pub struct Ready {
-    finish: Finish,
-    model: Option<Network>,
-}
-
-/// Name and training of a network.
-struct Network {
-    name: String,
-    training: String,
-}
-
 impl FinishArgs {
-    /// Finds the libraries and loads the network; the current rayon pool says how many threads they get. `levels`: as many as the render will have.
+    /// What is asked of the pipeline.
+    pub fn order(&self) -> Order {
+        Order { denoiser: self.denoise.into(), model: self.model.clone() }
+    }
+
+    /// Opens it alone, see [`pipeline::finish::open`](open).
     ///
     /// # Errors
     /// A library that was asked for by name is missing, or the network takes other levels.
     pub fn open(&self, levels: Option<usize>) -> Result<Ready> {
-        let (denoiser, missing) = Denoiser::open(self.denoise.into())?;
-        if let Some(error) = missing {
-            say(&format!("warning: {error}: our own denoiser takes its place, whose pictures are grainier"));
-            if let Some(hint) = &error.hint {
-                say(&format!("hint: {hint}"));
-            }
-        }
-        let opened = self.model.as_deref().map(|name| open_network(name, levels)).transpose()?;
-        let (model, combiner) = opened.unzip();
-        Ok(Ready { finish: Finish::new(denoiser, combiner), model })
+        let ready = open(&self.order(), levels)?;
+        tell_missing(ready.missing.as_ref());
+        Ok(ready)
     }
 }
 
-/// A network that takes so many levels, if that is known.
-fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)> {
-    let model = Model::open(name)?;
-    let runtime = Runtime::find().map_err(|mut error| {
-        let advice = "or leave --model out: levels are not combined by the network then";
-        error.hint = Some(error.hint.map_or(advice.into(), |hint| format!("{hint}; {advice}")));
-        error
-    })?;
-    let combiner = Combiner::new(&model, &runtime)?;
-    let facts = combiner.facts();
-    if let Some(levels) = levels.filter(|levels| *levels != facts.levels) {
-        let cause = format!("the network {name} combines {} levels, not {levels}", facts.levels);
-        let error = Error::new(Kind::Usage, "command line", cause);
-        return Err(error.hint(format!("leave --model out, or render with --levels {}", facts.levels)));
-    }
-    let network = Network { name: name.into(), training: facts.training.clone() };
-    Ok((network, combiner))
-}
-
-impl Ready {
-    /// The finish itself.
-    pub fn finish(&mut self) -> &mut Finish {
-        &mut self.finish
-    }
-
-    /// Chooses the quality for a render that may take so many seconds, and returns how many of them the finish will take, with so many parts: by timing the
-    /// denoiser on a small picture. This clock is a stop condition's: it decides when a render ends and how well its one picture is denoised, nothing else.
-    ///
-    /// # Errors
-    /// The denoiser fails.
-    pub fn reserve(&mut self, seconds: f64, pixels: usize, parts: usize) -> Result<f64> {
-        let has_qualities = self.finish.has_qualities();
-        let small = Size { width: TIMED, height: TIMED };
-        let mut time = |quality: Quality| -> Result<f64> {
-            // The first run loads what the second finds ready.
-            self.finish.rehearse(small, quality)?;
-            let clock = Clock::start();
-            self.finish.rehearse(small, quality)?;
-            Ok(clock.seconds() * pixels as f64 / small.pixels() as f64)
-        };
-        let fast = time(Quality::Fast)?;
-        let mut picture = (Quality::Fast, fast);
-        if has_qualities {
-            for quality in [Quality::High, Quality::Balanced] {
-                let seconds_taken = time(quality)?;
-                if seconds_taken <= SHARE * seconds {
-                    picture = (quality, seconds_taken);
-                    break;
-                }
-            }
-        }
-        self.finish.quality = picture.0;
-        // The picture, half of it for its error, and its parts.
-        Ok((picture.1 + fast * (1.0 + parts as f64)).min(MOST * seconds))
-    }
-
-    /// The finish alone.
-    pub fn into_finish(self) -> Finish {
-        self.finish
-    }
-
-    /// For people.
-    pub fn name(&self) -> String {
-        let denoiser = self.finish.denoiser();
-        match &self.model {
-            Some(network) => format!("{}, {denoiser}", network.name),
-            None => denoiser,
-        }
-    }
-
-    /// What the header says of it.
-    pub fn facts(&self, account: &Account) -> Value {
-        let quality = match self.finish.quality {
-            Quality::High => "high",
-            Quality::Balanced => "balanced",
-            Quality::Fast => "fast",
-        };
-        json!({
-            "denoiser": self.finish.denoiser(),
-            "quality": quality,
-            "model": self.model.as_ref().map(|network| &network.name),
-            "levels": account.combined,
-            "training": self.model.as_ref().map(|network| &network.training),
-            "clamped": {"below_zero": account.clamped.below_zero, "too_bright": account.clamped.too_bright},
-            "error_at_half": account.told.map(|told| told.half),
-        })
+/// Says that our own denoiser takes the place of one that is missing.
+pub fn tell_missing(missing: Option<&Error>) {
+    let Some(error) = missing else { return };
+    say(&format!("warning: {error}: our own denoiser takes its place, whose pictures are grainier"));
+    if let Some(hint) = &error.hint {
+        say(&format!("hint: {hint}"));
     }
 }

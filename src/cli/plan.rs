@@ -2,10 +2,10 @@
 
 use super::number::threads;
 use super::progress::percent;
-use super::render::plan::{Wishes, check_media, plan};
 use super::render::{Job, Method};
 use super::{print, print_json, scene};
 use caustique::error::Result;
+use caustique::pipeline::{Loaded, check, plan};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::render::auto::choose;
 use serde_json::json;
@@ -36,20 +36,19 @@ pub fn run(args: &PlanArgs) -> Result<()> {
 fn report(args: &PlanArgs) -> Result<()> {
     let job = &args.job;
     // Options that contradict each other are errors here, too.
-    job.settings()?;
-    let loaded = scene::read(&job.scene, rayon::current_num_threads())?;
-    let camera = loaded.scene.camera(&job.view())?;
-    check_media(job, &loaded.scene)?;
+    let settings = job.settings()?;
+    let Loaded { scene, removed } = scene::read(&job.scene, rayon::current_num_threads())?;
+    let camera = scene.camera(&job.view())?;
+    check::media(&job.scene.path, &settings, &scene)?;
     let make = |way| job.allowed(way, camera.size());
     let choice = if job.method == Method::Auto {
-        let mut finish = job.pilot_finish()?;
-        choose((&loaded.scene, &camera), &mut finish, make, || false)
+        choose((&scene, &camera), &mut job.pilot_finish()?, make, || false)
     } else {
         None
     };
-    let wishes = Wishes::of(job, choice.as_ref());
-    let mut plan = plan(&wishes, &loaded.scene, &camera, &loaded.removed);
-    let of_scene = &loaded.scene.warnings;
+    let asked = plan::Asked { choice: choice.as_ref(), max_depth: job.max_depth, switches: job.scene.switches() };
+    let mut plan = plan::plan(&asked, settings.method, (&scene, &camera), &removed);
+    let of_scene = &scene.warnings;
     plan.warnings.splice(0..0, of_scene.iter().cloned());
     if args.json {
         print_json(&json!(plan))?

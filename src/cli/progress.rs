@@ -1,6 +1,7 @@
 //! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
 
 use super::say;
+pub use caustique::pipeline::plan::percent;
 use caustique::render::{Progress, Settings, Told};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -150,18 +151,6 @@ pub fn count(n: f64) -> String {
         n if n < 1e6 => format!("{:.0} k", n / 1e3),
         n if n < 1e9 => format!("{:.2} M", n / 1e6),
         n => format!("{:.2} G", n / 1e9),
-    }
-}
-
-/// A relative error in percent, two digits.
-pub fn percent(x: f64) -> String {
-    let p = 100.0 * x;
-    if p >= 10.0 {
-        format!("{p:.0} %")
-    } else if p >= 1.0 {
-        format!("{p:.1} %")
-    } else {
-        format!("{p:.2} %")
     }
 }
 

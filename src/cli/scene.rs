@@ -3,10 +3,10 @@
 use super::number::{finite, not_negative, rgb};
 use super::say;
 use caustique::error::{Error, Kind, Result};
+use caustique::pipeline::Loaded;
+use caustique::pipeline::load::{Environment, Order, load};
 use caustique::plan::Switches;
-use caustique::plan::switch::{self, Removed};
-use caustique::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
-use caustique::scene::{Scene, environment_file, gltf};
+use caustique::scene::gltf;
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -93,45 +93,12 @@ impl FromStr for EnvironmentChoice {
     }
 }
 
-/// A scene as the options ask for it.
-pub struct Loaded {
-    pub scene: Scene,
-    /// What it was built without.
-    pub removed: Removed,
-}
-
-/// Reads and builds the scene, with the environment that the options ask for, without the effects that they switch off.
+/// Reads and builds the scene as the options ask for it.
+///
+/// # Errors
+/// See [`load`].
 pub fn read(args: &SceneArgs, threads: usize) -> Result<Loaded> {
-    let off = args.switches().off;
-    let mut description = gltf::read(&args.path, &args.read_options())?;
-    environment(&mut description, args)?;
-    let removed = switch::off(&mut description, off);
-    Ok(Loaded { scene: Scene::build(description, threads)?, removed })
-}
-
-/// `--env`, `--env-rotation`, `--env-strength`: the last two also act on the scene's own environment.
-fn environment(description: &mut Description, args: &SceneArgs) -> Result<()> {
-    if let Some(choice) = &args.env {
-        let source = match choice {
-            EnvironmentChoice::Color(color) => EnvironmentSource::Color((*color).into()),
-            EnvironmentChoice::File(path) => environment_file::read(path, &mut description.warnings)?,
-        };
-        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
-        description.world_unsaid = false;
-    }
-    let given = [("--env-rotation", args.env_rotation), ("--env-strength", args.env_strength)];
-    let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
-    let Some(environment) = &mut description.environment else {
-        let error = Error::new(Kind::Usage, args.path.display(), format!("{option}: the scene has no environment"));
-        return Err(error.hint("give one with --env"));
-    };
-    if let Some(degrees) = args.env_rotation {
-        environment.rotation_deg = degrees as f32;
-    }
-    if let Some(strength) = args.env_strength {
-        environment.strength = strength as f32;
-    }
-    Ok(())
+    load(&args.order(), threads)
 }
 
 /// Prints a line for each warning; with `--strict` they are an error that lists them all.
@@ -165,6 +132,22 @@ impl SceneArgs {
             effects: None,
             allow_outside,
             strict: false,
+        }
+    }
+
+    /// What is asked of the pipeline.
+    pub fn order(&self) -> Order {
+        let environment = self.env.clone().map(|choice| match choice {
+            EnvironmentChoice::Color(color) => Environment::Color(color.into()),
+            EnvironmentChoice::File(path) => Environment::File(path),
+        });
+        Order {
+            path: self.path.clone(),
+            environment,
+            rotation: self.env_rotation,
+            strength: self.env_strength,
+            options: self.read_options(),
+            off: self.switches().off,
         }
     }
 

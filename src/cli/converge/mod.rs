@@ -8,15 +8,13 @@ mod runs;
 
 pub use options::ConvergeArgs;
 
-use super::finish::Ready;
-use super::render::plan::{self, Wishes as PlanWishes};
-use super::render::{Method, memory, ready};
-use super::say;
-use super::scene::{self, Loaded};
+use super::render::{Method, tell_plan};
 use super::signals::Interrupt;
+use super::{say, scene};
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::finish::Finish;
+use caustique::pipeline::{Loaded, Ready, check, memory, plan, sized};
 use caustique::plan::switch::Removed;
 use caustique::render::auto::{Choice, choose};
 use caustique::render::{Control, Settings};
@@ -53,7 +51,8 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
     for run in &runs {
-        let checked = plan::check_media(&run.args, &scene).and_then(|()| plan::check_bandwidth(&run.args, &scene));
+        let (path, settings) = (&run.args.scene.path, &run.entry.settings);
+        let checked = check::media(path, settings, &scene).and_then(|()| check::bandwidth(path, settings, &scene));
         checked.map_err(|mut error| {
             error.place = format!("--run \"{}\"", run.entry.name);
             error
@@ -142,7 +141,7 @@ fn choose_all(
     let choose_one = |run: &mut Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
-        run.entry.settings = run.args.sized(run.entry.settings.clone(), camera.size());
+        run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, camera.size());
         let make = |way| run.args.allowed(way, camera.size()).map(limits);
         if run.args.method != Method::Auto {
             return Ok(None);
@@ -169,13 +168,14 @@ fn open(
     let mut entries = Vec::new();
     let mut finishes = Vec::new();
     for (Run { mut entry, args: options }, choice) in runs.into_iter().zip(choices) {
-        let of_run = PlanWishes::of(&options, choice.as_ref());
-        let wishes = PlanWishes { max_depth: args.max_depth, switches: args.scene.switches(), ..of_run };
-        let plan = plan::plan(&wishes, scene, camera, removed);
+        let asked = plan::Asked { choice: choice.as_ref(), max_depth: args.max_depth, switches: args.scene.switches() };
+        let plan = plan::plan(&asked, entry.settings.method, (scene, camera), removed);
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| told.insert(warning.clone())).collect();
-        plan::tell(&args.scene.path, &new);
+        tell_plan(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);
-        let ready = ready(&options, entry.settings.levels.count).map_err(|mut error| {
+        let levels = entry.settings.levels.count;
+        let ready = (!options.no_combine).then(|| options.finish.open(Some(levels))).transpose();
+        let ready = ready.map_err(|mut error| {
             if error.kind == Kind::Usage {
                 error.place = place;
             }

@@ -9,6 +9,7 @@ use caustique::estimator::bandwidth::SCREEN_CAP;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use caustique::finish::{Choice, Denoiser, Finish};
+use caustique::pipeline::sized;
 use caustique::render::auto::Way;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
@@ -389,11 +390,6 @@ impl Job {
         Ok(Finish::new(Denoiser::open(choice)?.0, None))
     }
 
-    /// The settings for a picture of that size: what the number of light paths follows from where none is asked for.
-    pub fn sized(&self, settings: Settings, size: (u32, u32)) -> Settings {
-        Settings { photons: self.photons.unwrap_or(settings.usual_photons(size)), ..settings }
-    }
-
     /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out.
     pub fn allowed(&self, way: Way, size: (u32, u32)) -> Option<Settings> {
         let guide = match self.guide {
@@ -406,7 +402,7 @@ impl Job {
         let usual = self.settings().ok()?.levels;
         let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == usual;
         let allowed = self.settings_of(way).ok().filter(|settings| guide && indirect && levels(settings));
-        allowed.map(|settings| self.sized(settings, size))
+        allowed.map(|settings| sized(settings, self.photons, size))
     }
 
     fn settings_of(&self, way: Way) -> Result<Settings> {

@@ -6,7 +6,6 @@ use crate::cli::output::{Naming, PictureArgs};
 use crate::cli::progress::Form;
 use caustique::error::Result;
 use caustique::render::Settings;
-use caustique::render::auto::Way;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -67,12 +66,5 @@ impl RenderArgs {
             return Err(idle("--debug-techniques", settings.method.name(), "vcm"));
         }
         Ok(Settings { techniques: self.debug_techniques.is_some(), ..settings })
-    }
-
-    /// As [`Job::allowed`]; where techniques are to be told apart, of ways that have some.
-    pub fn allowed(&self, way: Way, size: (u32, u32)) -> Option<Settings> {
-        let techniques = self.debug_techniques.is_some();
-        let settings = self.job.allowed(way, size).filter(|_| !techniques || way.method.has_techniques())?;
-        Some(Settings { techniques, ..settings })
     }
 }

@@ -14,7 +14,10 @@ pub struct Summary {
     seconds: f64,
     phases: String,
     error: Option<f64>,
-    told: Told,
+    /// What the error before the finish tells of.
+    pub told: Told,
+    /// Photons are merged or gathered within bandwidths.
+    pub has_bandwidths: bool,
     rejected: u64,
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
@@ -34,6 +37,7 @@ impl Summary {
             ),
             error: rendered.relative_error(),
             told: rendered.settings.told(),
+            has_bandwidths: rendered.settings.method.has_bandwidths(),
             rejected: rendered.rejected(),
             stop: rendered.stop,
             full: rendered.map_is_full().then(|| {

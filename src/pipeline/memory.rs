@@ -1,14 +1,14 @@
 //! Whether a render fits into memory, asked before it begins.
 
-use caustique::camera::Camera;
-use caustique::error::{Error, Kind, Result};
-use caustique::estimator::Pixel;
-use caustique::estimator::rule::{adaptive, chi_squared, local};
-use caustique::memory;
-use caustique::photon;
-use caustique::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, photons_per_path};
-use caustique::scene::Scene;
-use caustique::transport::{EyeMeasure, MergePhoton};
+use crate::camera::Camera;
+use crate::error::{Error, Kind, Result};
+use crate::estimator::Pixel;
+use crate::estimator::rule::{adaptive, chi_squared, local};
+use crate::memory;
+use crate::photon;
+use crate::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, photons_per_path};
+use crate::scene::Scene;
+use crate::transport::{EyeMeasure, MergePhoton};
 use std::fmt::Display;
 use std::mem::size_of;
 

@@ -1,0 +1,77 @@
+//! From a scene file and wishes about it to a scene.
+
+use crate::error::{Error, Kind, Result};
+use crate::math::Rgb;
+use crate::plan::EffectSet;
+use crate::plan::switch::{self, Removed};
+use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
+use crate::scene::{Scene, environment_file, gltf};
+use std::path::PathBuf;
+
+/// A scene file and how it is read.
+pub struct Order {
+    /// The file.
+    pub path: PathBuf,
+    /// Light from all around in place of the scene's own.
+    pub environment: Option<Environment>,
+    /// Turn of the environment about the vertical (degrees).
+    pub rotation: Option<f64>,
+    /// Factor on the environment's radiance.
+    pub strength: Option<f64>,
+    /// What the file leaves open.
+    pub options: gltf::ReadOptions,
+    /// Effects to do without.
+    pub off: EffectSet,
+}
+
+/// Light from all around.
+pub enum Environment {
+    /// One radiance from everywhere.
+    Color(Rgb),
+    /// A latitude-longitude image.
+    File(PathBuf),
+}
+
+/// A scene as it was asked for.
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// What it was built without.
+    pub removed: Removed,
+}
+
+/// Reads and builds the scene, with the environment that is asked for, without the effects that are off.
+///
+/// # Errors
+/// The file or what it names, by place; an environment that is changed and is not there.
+pub fn load(order: &Order, threads: usize) -> Result<Loaded> {
+    let mut description = gltf::read(&order.path, &order.options)?;
+    environment(&mut description, order)?;
+    let removed = switch::off(&mut description, order.off);
+    Ok(Loaded { scene: Scene::build(description, threads)?, removed })
+}
+
+/// A turn and a strength also act on the scene's own environment.
+fn environment(description: &mut Description, order: &Order) -> Result<()> {
+    if let Some(choice) = &order.environment {
+        let source = match choice {
+            Environment::Color(color) => EnvironmentSource::Color(*color),
+            Environment::File(path) => environment_file::read(path, &mut description.warnings)?,
+        };
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.world_unsaid = false;
+    }
+    let given = [("--env-rotation", order.rotation), ("--env-strength", order.strength)];
+    let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
+    let Some(environment) = &mut description.environment else {
+        let error = Error::new(Kind::Usage, order.path.display(), format!("{option}: the scene has no environment"));
+        return Err(error.hint("give one with --env"));
+    };
+    if let Some(degrees) = order.rotation {
+        environment.rotation_deg = degrees as f32;
+    }
+    if let Some(strength) = order.strength {
+        environment.strength = strength as f32;
+    }
+    Ok(())
+}

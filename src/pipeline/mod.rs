@@ -1,0 +1,256 @@
+//! A render from beginning to end: load -> plan -> choose -> render -> finish -> deliver. Each step takes what the one before gave, plain data in
+//! and out. What asks for a render (the command line, a host program) fills an [`Order`], looks on through a [`Watch`] and gets a
+//! [`Delivery`]; none of it parses, prints, or knows of files other than those that are read.
+
+pub mod check;
+pub mod finish;
+pub mod layers;
+pub mod load;
+pub mod memory;
+pub mod plan;
+
+pub use finish::Ready;
+pub use load::Loaded;
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::film::{LayerSet, Naming, Selection, output as film};
+use crate::finish::{Account, Finish, finished_part, reads};
+use crate::image::exr::{self, Attributes};
+use crate::plan::{Plan, Switches};
+use crate::render::auto::{self, Choice, Way};
+use crate::render::output::{Present, shape};
+use crate::render::{Clock, Control, Progress, Rendered, Settings, TechniquePicture, cpu_seconds, peak_memory};
+use crate::scene::{Scene, View};
+use serde_json::{Map, Value, json};
+
+/// Settings of a way that auto may choose, for a picture of a size; `None` where other wishes rule it out.
+pub type Allowed<'a> = &'a dyn Fn(Way, (u32, u32)) -> Option<Settings>;
+
+/// What auto is to choose from, and what its pilots are finished with.
+pub struct Auto<'a> {
+    /// The ways.
+    pub allowed: Allowed<'a>,
+    /// The finish.
+    pub finish: Finish,
+}
+
+/// A render that is asked for.
+pub struct Order<'a> {
+    /// The scene, and how it is read.
+    pub scene: load::Order,
+    /// Camera and size.
+    pub view: View,
+    /// How light is found, and when to stop. With `auto` what its options come to for [`Way::GATHERING`].
+    pub settings: Settings,
+    /// Light paths of an iteration; `None`: what is usual.
+    pub photons: Option<u32>,
+    /// Longest light path in segments, if one was asked for.
+    pub max_depth: Option<u32>,
+    /// Effects that are switched.
+    pub switches: Switches,
+    /// The method is left to us.
+    pub auto: Option<Auto<'a>>,
+    /// How the estimate becomes the picture; `None`: not at all.
+    pub finish: Option<finish::Order>,
+    /// Layers that are wanted: `all`, `beauty`, or names separated by commas.
+    pub layers: String,
+    /// Names of channels, which the attributes of cryptomattes repeat.
+    pub naming: Naming,
+    /// What was asked for, for the header.
+    pub arguments: Value,
+    /// Leave clocks and the number of threads out of the header.
+    pub reproducible: bool,
+}
+
+/// Who looks on while a render goes on.
+pub trait Watch {
+    /// The scene is there. An error ends the render.
+    ///
+    /// # Errors
+    /// What is looked at will not do.
+    fn loaded(&mut self, scene: &Scene) -> Result<()>;
+    /// An end is asked for.
+    fn stops(&self) -> bool;
+    /// It is decided how to render. An error ends the render before its first iteration.
+    ///
+    /// # Errors
+    /// An end was asked for.
+    fn chosen(&mut self, choice: Option<&Choice>) -> Result<()>;
+    /// The finish is ready; where its library is missing and another takes its place, the error says how to get it.
+    fn finishes(&mut self, missing: Option<&Error>);
+    /// The render begins.
+    fn begins(&mut self, plan: &Plan, settings: &Settings);
+    /// An iteration is done.
+    fn progress(&mut self, progress: &Progress);
+    /// All are; the pixels are still there.
+    fn rendered(&mut self, rendered: &Rendered);
+}
+
+/// What a render gives.
+pub struct Delivery {
+    /// The layers that were asked for, finished; unfinished with what a finish reads, where that failed.
+    pub set: LayerSet,
+    /// The header's attributes.
+    pub attributes: Attributes,
+    /// Pictures per sampling technique, if they were asked for.
+    pub techniques: Vec<TechniquePicture>,
+    /// What finished the picture, and what it did.
+    pub finished: Option<(String, Account)>,
+    /// Seconds from the last iteration to here.
+    pub finishing: f64,
+    /// Why the picture is not finished, though that was asked for.
+    pub refusal: Option<Error>,
+}
+
+/// Renders. All that can be wrong is found before the first light path, but for a finish that fails, which loses no picture ([`Delivery::refusal`]).
+///
+/// # Errors
+/// The scene, options that contradict it, memory, or an end that was asked for before the first iteration.
+pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
+    let auto = order.auto.take();
+    let Loaded { scene, removed } = load::load(&order.scene, rayon::current_num_threads())?;
+    watch.loaded(&scene)?;
+    let camera = scene.camera(&order.view)?;
+    let stage = (&scene, &camera);
+    let (settings, selection) = checked(&order, stage)?;
+    let choice = choose(&order, auto, stage, &settings, watch)?;
+    let settings = choice.as_ref().map_or(settings, |choice| choice.settings.clone());
+    memory::check(stage, &settings, layers::channels(&settings, Present::of(&scene)))?;
+    let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
+    let mut plan = plan::plan(&asked, settings.method, stage, &removed);
+    let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
+    watch.begins(&plan, &settings);
+    let rendered = crate::render::render(&scene, &camera, &settings, |progress, _| {
+        watch.progress(progress);
+        if watch.stops() { Control::Stop } else { Control::Continue }
+    });
+    watch.rendered(&rendered);
+    // As a plan of its own tells it.
+    plan.warnings.splice(0..0, scene.warnings.iter().cloned());
+    deliver(&order, &scene, &plan, rendered, &selection, ready.as_mut())
+}
+
+/// The settings for the picture's size, and the layers that are wanted, once both are known to fit the scene.
+fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Settings, Selection)> {
+    check::media(&order.scene.path, &order.settings, scene)?;
+    check::bandwidth(&order.scene.path, &order.settings, scene)?;
+    let settings = sized(order.settings.clone(), order.photons, camera.size());
+    let present = Present::of(scene);
+    let selection = layers::selection(&order.layers, &settings, present, order.finish.is_some())?;
+    // Before anything is tried, which takes time.
+    memory::check((scene, camera), &settings, layers::channels(&settings, present))?;
+    Ok((settings, selection))
+}
+
+/// Settings for a picture of that size: what the number of light paths follows from where none is asked for.
+pub fn sized(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Settings {
+    Settings { photons: photons.unwrap_or(settings.usual_photons(size)), ..settings }
+}
+
+/// What auto chooses, where it is to: among ways whose pictures have the layers asked for.
+fn choose(
+    order: &Order<'_>,
+    auto: Option<Auto<'_>>,
+    (scene, camera): (&Scene, &Camera),
+    settings: &Settings,
+    watch: &mut dyn Watch,
+) -> Result<Option<Choice>> {
+    let chosen = match auto {
+        None => None,
+        Some(mut auto) => {
+            let present = Present::of(scene);
+            let has_layers =
+                |of: &Settings| layers::selection(&order.layers, of, present, order.finish.is_some()).is_ok();
+            let techniques = settings.techniques;
+            let make = |way: Way| {
+                let able = !techniques || way.method.has_techniques();
+                let settings = (auto.allowed)(way, camera.size()).filter(|of| able && has_layers(of))?;
+                Some(Settings { techniques, ..settings })
+            };
+            auto::choose((scene, camera), &mut auto.finish, make, || watch.stops())
+        }
+    };
+    watch.chosen(chosen.as_ref())?;
+    Ok(chosen)
+}
+
+/// The finish, if there is to be one; its time is part of the time that was asked for.
+fn readied(
+    order: &Order<'_>,
+    (scene, camera): (&Scene, &Camera),
+    settings: Settings,
+    selection: &Selection,
+    watch: &mut dyn Watch,
+) -> Result<(Option<Ready>, Settings)> {
+    let Some(asked) = &order.finish else { return Ok((None, settings)) };
+    let mut ready = finish::open(asked, Some(settings.levels.count))?;
+    watch.finishes(ready.missing.as_ref());
+    let Some(time) = settings.time else { return Ok((Some(ready), settings)) };
+    let parts = film::names(&shape(&settings, 1, Present::of(scene)));
+    let wanted = parts.iter().filter_map(|name| finished_part(name)).filter(|part| selection.wants(part)).count();
+    let (width, height) = camera.size();
+    let left = time - ready.reserve(time, width as usize * height as usize, wanted)?;
+    Ok((Some(ready), Settings { time: Some(left), ..settings }))
+}
+
+/// From pixels to the layers that were asked for, finished, and the header that tells of all.
+fn deliver(
+    order: &Order<'_>,
+    scene: &Scene,
+    plan: &Plan,
+    mut rendered: Rendered,
+    selection: &Selection,
+    ready: Option<&mut Ready>,
+) -> Result<Delivery> {
+    let mut header = rendered.account((!order.reproducible).then_some(rayon::current_num_threads()));
+    let (clock, cpu_start) = (Clock::start(), cpu_seconds());
+    let finishes = ready.is_some();
+    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
+    let mut set = rendered.layers(Present::of(scene), wanted)?;
+    let mut attributes = layers::cryptomattes(scene, &rendered, selection, order.naming, &mut set)?;
+    let techniques = std::mem::take(&mut rendered.techniques);
+    // The pixels are most of the memory, and all that is wanted of them is in the layers now.
+    drop(rendered);
+    let applied = ready.map(|ready| {
+        let account = ready.finish().apply(&mut set, |name| selection.wants(name))?;
+        Ok((ready.name(), ready.facts(&account), account))
+    });
+    let finishing = clock.seconds();
+    let (finished, refusal) = match applied.transpose() {
+        Ok(finished) => (finished, None),
+        Err(error) => (None, Some(error)),
+    };
+    // A render that is still to be finished keeps what that reads.
+    if refusal.is_none() {
+        set = selection.apply(set)?;
+    }
+    header.insert("plan".into(), json!(plan));
+    let facts = finished.as_ref().map(|(_, facts, _)| facts.clone());
+    complete(&mut header, order, scene, facts, cpu_seconds() - cpu_start);
+    attributes.insert(exr::ATTRIBUTE, &header)?;
+    let finished = finished.map(|(name, _, account)| (name, account));
+    Ok(Delivery { set, attributes, techniques, finished, finishing, refusal })
+}
+
+/// What the header says besides the render's own account.
+fn complete(
+    header: &mut Map<String, Value>,
+    order: &Order<'_>,
+    scene: &Scene,
+    finished: Option<Value>,
+    core_seconds: f64,
+) {
+    let mut put = |key: &str, value: Value| header.insert(key.into(), value);
+    put("arguments", order.arguments.clone());
+    put("warnings", json!(scene.warnings));
+    // That of the finished picture is in `combined`.
+    put("error_of", "Noisy".into());
+    put("combined", finished.unwrap_or(Value::Null));
+    if !order.reproducible
+        && let Some(Value::Object(phases)) = header.get_mut("phases")
+    {
+        phases.insert("layers_and_finish".into(), core_seconds.into());
+        header.insert("peak_memory".into(), peak_memory().into());
+    }
+}
