@@ -1,0 +1,162 @@
+"""The README and docs/ do what they say: commands run as they stand, links lead somewhere, options exist, and lines are short."""
+
+import re
+import shlex
+import subprocess
+import unittest
+
+import support
+
+README = support.ROOT / "README.md"
+DOCS = sorted((support.ROOT / "docs").glob("*.md"))
+PAGES = [README, *DOCS]
+PROGRAM = "target/release/caustique"
+#: What sets everything up: it is there, and too much for a test.
+WHOLE = ("./scripts/demo.sh", "./scripts/test.sh")
+#: Scripts that need Blender.
+EXPORTER = "scripts/blender/export.py"
+MOST_LINES = 200
+WIDEST = 120
+
+
+def split(page):
+    """Lines of a page outside and inside its code blocks, each with its number from 1."""
+    prose, code, inside = [], [], False
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+        if line.startswith("```"):
+            inside = not inside
+        else:
+            (code if inside else prose).append((number, line))
+    return prose, code
+
+
+def commands(page):
+    """Command lines in the code blocks of a page; what is no command (formulas, printed tables) is left out."""
+    starts = (PROGRAM + " ", "python3 scripts/", "./scripts/", "blender ")
+    return [line for _, line in split(page)[1] if line.startswith(starts)]
+
+
+def prose(page):
+    return "\n".join(line for _, line in split(page)[0])
+
+
+def without_code(text):
+    return re.sub(r"`[^`]*`", "", text)
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub makes them."""
+    found = set()
+    for _, line in split(page)[0]:
+        heading = re.match(r"#+ (.*)", line)
+        if heading:
+            slug = re.sub(r"[^\w\- ]", "", heading[1].strip().lower()).replace(" ", "-")
+            count = 0
+            while (name := f"{slug}-{count}" if count else slug) in found:
+                count += 1
+            found.add(name)
+    return found
+
+
+def shortened(command):
+    """A command that takes seconds: as it stands but for time limits and the width of pictures."""
+    command = re.sub(r"--time \S+", "--time 2", command)
+    if re.match(rf"{PROGRAM} (render|plan|converge)\b", command) and "--help" not in command:
+        command, widths = re.subn(r"--width \S+", "--width 64", command)
+        if not widths:
+            command += " --width 64"
+        if "--target-error" in command:
+            command += " --iterations 8"
+    return command
+
+
+class Commands(support.Scratch):
+    """In a folder that looks like the repository after scripts/demo.sh."""
+
+    def setUp(self):
+        super().setUp()
+        for name in ("scenes", "scripts"):
+            (self.dir / name).symlink_to(support.ROOT / name)
+        (self.dir / PROGRAM).parent.mkdir(parents=True)
+        (self.dir / PROGRAM).symlink_to(support.binary().resolve())
+        (self.dir / "out").mkdir()
+        demo = ["render", support.scene("pool"), "-o", "out/demo.exr", "--png", "out/demo.png", "--width", 64]
+        support.run([*demo, "--iterations", 8, "--progress", "none"], check=0, cwd=self.dir)
+
+    def run_all(self, page):
+        for command in commands(page):
+            with self.subTest(command):
+                words = shlex.split(command)
+                if words[0] in WHOLE:
+                    path = support.ROOT / words[0]
+                    self.assertTrue(path.is_file() and path.stat().st_mode & 0o111, f"{path} is not executable")
+                elif EXPORTER in words:
+                    self.assertTrue((support.ROOT / EXPORTER).is_file())
+                    # What it would export stands in for a scene of ours.
+                    (self.dir / words[-1]).write_bytes(support.scene("blocks").read_bytes())
+                else:
+                    done = subprocess.run(
+                        ["bash", "-c", shortened(command)], cwd=self.dir, capture_output=True, text=True, timeout=300, check=False
+                    )
+                    self.assertEqual(done.returncode, 0, f"{shortened(command)}\n{done.stdout}{done.stderr}")
+
+    def test_commands_of_the_readme_run_as_written(self):
+        self.assertGreater(len(commands(README)), 5)
+        self.run_all(README)
+
+    def test_every_line_of_the_readmes_code_is_a_command(self):
+        lines = [line for _, line in split(README)[1] if line.strip()]
+        self.assertEqual(lines, commands(README))
+
+    def test_commands_of_the_documentation_run(self):
+        for page in DOCS:
+            self.run_all(page)
+
+
+class Text(unittest.TestCase):
+    def test_the_readme_is_short(self):
+        self.assertLessEqual(len(README.read_text(encoding="utf-8").splitlines()), MOST_LINES)
+
+    def test_lines_are_short(self):
+        for page in PAGES:
+            outside, inside = split(page)
+            for number, line in outside + (inside if page == README else []):
+                if not line.startswith("|"):
+                    self.assertLessEqual(len(line), WIDEST, f"{page.name}:{number}")
+
+    def test_links_lead_somewhere(self):
+        for page in PAGES:
+            for link in re.findall(r"\]\(([^)\s]+)\)", without_code(prose(page))):
+                if re.match(r"[a-z]+:", link):
+                    continue
+                name, _, anchor = link.partition("#")
+                target = page.parent / name if name else page
+                with self.subTest(f"{page.name}: {link}"):
+                    self.assertTrue(target.exists())
+                    if anchor:
+                        self.assertIn(anchor, anchors(target))
+
+    def test_every_page_of_the_documentation_is_linked_from_the_readme(self):
+        text = prose(README)
+        for page in DOCS:
+            self.assertIn(f"(docs/{page.name}", text)
+
+    def test_options_that_are_named_exist(self):
+        names = ("render", "plan", "combine", "compare", "converge", "info", "doctor")
+        known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
+        known = set(re.findall(r"--[a-z][a-z-]*", known))
+        for page in PAGES:
+            if page.name in ("measurements.md", "architecture.md"):  # They name options of cargo and of scripts, too.
+                continue
+            for code in re.findall(r"`([^`]*)`", prose(page)):
+                for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", code):
+                    self.assertIn(option, known, f"{page.name}: {code}")
+
+    def test_files_that_are_named_exist(self):
+        for page in PAGES:
+            for name in re.findall(r"`((?:src|scripts|tests|scenes|docs|ffi)/[\w./-]+)`", prose(page)):
+                self.assertTrue((support.ROOT / name).exists(), f"{page.name}: {name}")
+
+
+if __name__ == "__main__":
+    unittest.main()
