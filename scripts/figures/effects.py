@@ -3,7 +3,7 @@
 leaving it out.
 
 sppm with one level, on one thread; renders take turns, and the fastest stretches of all rounds count. CAUSTIQUE_BIN is the program. SCENES, ROUNDS (4), ITERATIONS (5) and
-WIDTH (320) shorten a trial. The last lines are a table for the README.
+WIDTH (320) shorten a trial. The last lines are a table for docs/measurements.md.
 """
 
 import math

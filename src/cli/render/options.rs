@@ -11,8 +11,8 @@ use std::path::PathBuf;
 
 /// Render a scene to a multichannel EXR, and to a PNG to look at.
 ///
-/// Without options: 64 iterations of 100000 light paths at 1280 pixels across, seen through the scene's first camera, five
-/// bandwidth levels combined by the learned combiner. Ctrl-C finishes the running iteration and writes what there is.
+/// Without options: 64 iterations of the method that suits the scene, at 1280 pixels across, seen through the scene's first camera, and
+/// denoised. Ctrl-C finishes the running iteration and writes what there is.
 #[derive(clap::Args, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_line_help = true)]
