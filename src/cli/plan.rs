@@ -138,9 +138,9 @@ fn text(plan: &Plan) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::render::plan::plan;
     use caustique::plan::switch::Removed;
     use caustique::plan::{Effect, Switches};
+    use caustique::render;
     use caustique::scene::{Description, Scene, View};
 
     /// Columns of figures are there when something has measured them, with a dash where it has not.
@@ -148,8 +148,8 @@ mod tests {
     fn figures_have_columns() {
         let scene = Scene::build(Description::default(), 1).unwrap();
         let camera = scene.camera(&View::default()).unwrap();
-        let wishes = Wishes { method: Method::Vcm, choice: None, max_depth: None, switches: Switches::default() };
-        let mut plan = plan(&wishes, &scene, &camera, &Removed::default());
+        let asked = plan::Asked { choice: None, max_depth: None, switches: Switches::default() };
+        let mut plan = plan::plan(&asked, render::Method::Vcm, (&scene, &camera), &Removed::default());
         assert_eq!(columns(&plan).len(), 2);
         let caustic = &mut plan.effects[Effect::Caustic as usize];
         (caustic.energy, caustic.seconds_per_iteration, caustic.error_if_off) = (Some(0.123), Some(0.25), Some(0.4));

@@ -4,7 +4,7 @@
 //! Variances are compared by their ratio. With hits as rare as here the relative error of a variance is 1 / sqrt(hits), stated with each test; limits are five
 //! of those away, so that a test fails by chance less than once in a million runs.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::material::Material;

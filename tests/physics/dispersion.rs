@@ -3,7 +3,7 @@
 //! Statistical tests have a family-wise error rate of 0.1 % each (Sidak over their checks), plus the stated bias of kernels. Every check has to reject a
 //! planted error: glass that does not disperse, colours put together as if they were independent, a picture brighter by a stated share.
 
-mod support;
+use crate::support;
 
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, Transport};

@@ -1,10 +1,8 @@
 //! Every light path is in one class, every class has one owner, and what is switched off is what is missing: on random paths, and in pictures.
 
-mod support;
+use crate::support;
 
-#[path = "classes/owners.rs"]
 mod owners;
-#[path = "classes/switches.rs"]
 mod switches;
 
 use caustique::material::Material;

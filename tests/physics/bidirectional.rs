@@ -2,9 +2,9 @@
 //!
 //! Closed forms are t tests over independent seeds, and tiles are compared by Welch's t statistic over seeds; the family-wise error rate is 0.1 %
 //! for a scene (Sidak over methods and tiles), plus the stated bias of the kernel for methods that merge. Every comparison is shown to have power: a
-//! tile brighter by a stated share is rejected, and so are the bugs planted in the arithmetic of weights (`tests/mis.rs`).
+//! tile brighter by a stated share is rejected, and so are the bugs planted in the arithmetic of weights (`tests/physics/mis.rs`).
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};

@@ -4,7 +4,7 @@
 //! Furnaces are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks), and every check
 //! has to reject a furnace that is off by 5 % (photons: 12 %). What is black is black in every pixel, without any error rate.
 
-mod support;
+use crate::support;
 
 use caustique::camera::Camera;
 use caustique::geometry::Mesh;

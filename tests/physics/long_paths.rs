@@ -4,7 +4,7 @@
 //! What the old rule, a survival of 0.95 at every bounce after the 64th, gave is noted at each; a planted error of a
 //! stated size is rejected.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};

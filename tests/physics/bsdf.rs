@@ -3,7 +3,7 @@
 //! Statistical checks run at a family-wise error rate of 0.1 % (Sidak over the checks of a test) with fixed seeds. Planted bugs are
 //! rejected by the same checks.
 
-mod support;
+use crate::support;
 
 use caustique::bsdf::{
     Bsdf, BsdfSample, Coverings, DELTA_ALPHA, EnergyTables, LobeSet, Parameters, SHARP_ALPHA, Transport,

@@ -5,7 +5,7 @@
 //! [`Check::detects`], which is smaller than what the bugs it guards against would do (a Fresnel factor forgotten, an eta squared
 //! in the wrong direction, direct light counted twice, a photon left out).
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::light::Emitter;

@@ -3,7 +3,7 @@
 //! Closed forms are t tests over independent seeds and tiles Welch's t tests, at a family-wise error rate of 0.1 % for each test (Sidak over its
 //! checks), plus the stated bias of closed form or kernel. Every check has to reject a planted error of a stated size.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};

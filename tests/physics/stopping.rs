@@ -1,6 +1,6 @@
 //! When renders stop by their estimated error.
 
-mod support;
+use crate::support;
 
 use caustique::film::{Layer, LayerSet};
 use caustique::image::{Floor, metrics};

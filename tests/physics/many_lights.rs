@@ -1,6 +1,6 @@
 //! Light straight from many lamps, under a sky: what a point gets is known in closed form, whichever lamp is asked.
 
-mod support;
+use crate::support;
 
 use caustique::light::{DirectSample, Receiver};
 use caustique::math::{DVec3, Rgb, Vec3};

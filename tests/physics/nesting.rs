@@ -1,6 +1,6 @@
 //! Solids inside each other, as many as there are, and where paths start among them.
 
-mod support;
+use crate::support;
 
 use caustique::geometry::Mesh;
 use caustique::material::{Material, MediumParameters};

@@ -1,12 +1,9 @@
 //! What a scene calls for, what of it can be switched off, and what looks like a mistake in it.
 
-mod support;
+use crate::support;
 
-#[path = "plan/diagnosis.rs"]
 mod diagnosis;
-#[path = "plan/presence.rs"]
 mod presence;
-#[path = "plan/switch.rs"]
 mod switch;
 
 use caustique::math::{DVec3, Vec3};

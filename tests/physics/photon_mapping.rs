@@ -4,7 +4,7 @@
 //! bias: nearest neighbours of points as regular as emission draws them give up to 1 / 2k too little. Each also rejects an expectation shifted by
 //! a little more, which is less than what a wrong number of light paths or direct light counted twice would do.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};

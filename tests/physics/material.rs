@@ -1,6 +1,6 @@
 //! Materials at a surface as the glTF specification says, and scattering in world space with shading normals.
 
-mod support;
+use crate::support;
 
 use caustique::bsdf::{Coverings, EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;

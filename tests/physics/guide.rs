@@ -2,7 +2,7 @@
 //!
 //! The light is compared by t tests over independent passes at a family-wise error rate of 0.1 %; each rejects paths whose flux forgets the guide.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::finish::{Denoiser, Finish};

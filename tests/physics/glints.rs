@@ -1,6 +1,6 @@
 //! Lamps behind glass, shown by sharp lobes: photons and eye paths share that light out, and together bring all of it.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;

@@ -2,7 +2,7 @@
 //!
 //! t tests over independent seeds at a family-wise error rate of 0.1 % a test function (Sidak), plus stated biases of kernels; each rejects a planted bug.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;

@@ -1,21 +1,13 @@
 //! The glTF reader: what it reads, what it warns of, what it refuses, and that damaged files never bring it down.
 
-#[path = "gltf/glb.rs"]
 mod glb;
 
-#[path = "gltf/bad_input.rs"]
 mod bad_input;
-#[path = "gltf/fuzz.rs"]
 mod fuzz;
-#[path = "gltf/geometry.rs"]
 mod geometry;
-#[path = "gltf/lights.rs"]
 mod lights;
-#[path = "gltf/materials.rs"]
 mod materials;
-#[path = "gltf/outside.rs"]
 mod outside;
-#[path = "gltf/scenes.rs"]
 mod scenes;
 
 use caustique::error::Error;

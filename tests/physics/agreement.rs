@@ -3,7 +3,7 @@
 //! Standard errors come from independent passes (photons correlate pixels); the family-wise error rate is 0.1 % a scene (Sidak over tiles). A planted bug,
 //! one tile brighter by a stated share, must be rejected.
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;

@@ -5,7 +5,7 @@
 //! recursion gave. Then the recursion is run by hand over the same vertices for all strategies of a path: the weights must sum to one, and no longer do
 //! when a bug is planted in it.
 
-mod support;
+use crate::support;
 
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};

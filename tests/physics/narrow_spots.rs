@@ -1,6 +1,6 @@
 //! Spots down to a thousandth of a degree: what they send and what arrives, in closed form.
 
-mod support;
+use crate::support;
 
 use caustique::light::Receiver;
 use caustique::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};

@@ -6,7 +6,7 @@
 //! gathered, for kernels on a curved surface (3 %); every check has to reject a furnace that is off by 5 % (photons: 20 %, as few as `bpm` has
 //! 40 %, those that frosted glass has focused on itself 90 %).
 
-mod support;
+use crate::support;
 
 use caustique::estimator::InitialBandwidth;
 use caustique::material::Material;

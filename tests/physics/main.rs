@@ -1,0 +1,26 @@
+//! The physics: estimators against closed forms, each other and planted faults. Every file declares its error rate.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod agreement;
+mod analytic;
+mod bidirectional;
+mod bsdf;
+mod classes;
+mod contact;
+mod dispersion;
+mod furnaces;
+mod glints;
+mod guide;
+mod long_paths;
+mod many_lights;
+mod material;
+mod media;
+mod merging;
+mod mis;
+mod narrow_spots;
+mod nesting;
+mod photon_mapping;
+mod progressive;
+mod stopping;
