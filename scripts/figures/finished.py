@@ -209,6 +209,7 @@ def main():
         except Failed as failed:
             print(f"\n{_references.name(scene)}: no reference: {failed}", flush=True)
     said = {"program": program(), "width": WIDTH, "threads": THREADS, "clock": _renders.CLOCK, "seeds": SEEDS}
+    said["set"] = os.environ.get("SCENES") or _references.SET
     said.update({"options": _renders.OPTIONS, "figures": FIGURES, "counts": count(cells), "references": known})
     save(CACHE / "last.json", {**said, "cells": cells})
     record("finished", {**said, "cells": [short(cell) for cell in cells]})

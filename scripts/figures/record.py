@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Appends a figure to scripts/figures/results.jsonl, with the commit, the date and the machine it was measured on.
+"""Stores a figure in scripts/figures/results.jsonl, with the commit, the date and the machine it was measured on: in
+place of what was stored of the same figure before. A figure of a tree with changes that are not committed is of no
+commit, and is not stored.
 
 From a shell:   scripts/figures/record.py interior-iteration scene=interior core_seconds=1.42 photons=100000
 From Python:    from record import record; record("interior-iteration", {"core_seconds": 1.42})
@@ -14,10 +16,13 @@ import json
 import os
 import platform
 import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = Path(__file__).resolve().parent / "results.jsonl"
+# Values that tell apart figures of one name.
+APART = ("scene", "rule", "parameters", "set")
 
 
 def commit():
@@ -49,8 +54,14 @@ def machine():
     return {"cpu": cpu, "cores": len(os.sched_getaffinity(0)), "memory_gib": round(memory, 1), "system": system}
 
 
+def same(one, other):
+    """Whether two entries are of the same figure."""
+    values = [[entry["values"].get(key) for key in APART] for entry in (one, other)]
+    return one["name"] == other["name"] and values[0] == values[1]
+
+
 def record(name, values, file=RESULTS):
-    """Appends one line and returns the object. `values`: a dict of what JSON can say, without NaN."""
+    """Stores one line and returns the object. `values`: a dict of what JSON can say, without NaN."""
     now = datetime.datetime.now(datetime.timezone.utc)
     entry = {
         "name": name,
@@ -59,9 +70,16 @@ def record(name, values, file=RESULTS):
         "date": now.strftime("%Y-%m-%dT%H:%M:%SZ"),
         "machine": machine(),
     }
-    line = json.dumps(entry, allow_nan=False)
-    with open(file, "a", encoding="utf-8") as sink:
-        sink.write(line + "\n")
+    json.dumps(entry, allow_nan=False)
+    if entry["commit"].endswith("-dirty"):
+        print(f"record: {name} is not stored: the tree has changes that are not committed", file=sys.stderr)
+        return entry
+    file = Path(file)
+    stored = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
+    kept = [other for other in stored if not same(other, entry)] + [entry]
+    draft = file.with_suffix(".part")
+    draft.write_text("".join(json.dumps(one, allow_nan=False) + "\n" for one in kept), encoding="utf-8")
+    draft.replace(file)
     return entry
 
 

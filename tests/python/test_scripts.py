@@ -5,8 +5,12 @@ import shutil
 import subprocess
 import sys
 import unittest
+from unittest import mock
 
 import support
+
+sys.path.insert(0, str(support.ROOT / "scripts" / "figures"))
+import record  # noqa: E402
 
 COUNTS = support.ROOT / "scripts" / "test_counts.awk"
 RECORD = support.ROOT / "scripts" / "figures" / "record.py"
@@ -54,18 +58,24 @@ class Record(support.Scratch):
             check=False,
         )
 
-    def test_lines_are_appended_with_commit_and_machine(self):
-        for rays in (3.5, 4):
-            done = self.record("rays", f"mrays={rays}", "scene=torus")
-            self.assertEqual(done.returncode, 0, done.stderr)
-        lines = [json.loads(line) for line in (self.dir / "results.jsonl").read_text().splitlines()]
-        self.assertEqual([line["values"] for line in lines], [{"mrays": r, "scene": "torus"} for r in (3.5, 4)])
+    def test_the_last_of_a_figure_is_kept_with_commit_and_machine(self):
+        file = self.dir / "results.jsonl"
+        with mock.patch.object(record, "commit", lambda: "a" * 40):
+            for rays, scene in ((3.5, "torus"), (5, "pool"), (4, "torus")):
+                record.record("rays", {"mrays": rays, "scene": scene}, file)
+        lines = [json.loads(line) for line in file.read_text().splitlines()]
+        self.assertEqual([(line["values"]["mrays"], line["values"]["scene"]) for line in lines], [(5, "pool"), (4, "torus")])
         for line in lines:
-            self.assertEqual(line["name"], "rays")
+            self.assertEqual((line["name"], line["commit"]), ("rays", "a" * 40))
             self.assertRegex(line["date"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
-            self.assertRegex(line["commit"], r"^([0-9a-f]{40}(-dirty)?|unknown)$")
             self.assertGreaterEqual(line["machine"]["cores"], 1)
             self.assertTrue(line["machine"]["cpu"])
+
+    def test_a_tree_that_no_commit_has_stores_nothing(self):
+        file = self.dir / "results.jsonl"
+        with mock.patch.object(record, "commit", lambda: "a" * 40 + "-dirty"), mock.patch("sys.stderr"):
+            record.record("rays", {"mrays": 3.5}, file)
+        self.assertFalse(file.exists())
 
     def test_a_value_without_a_name_is_refused(self):
         done = self.record("rays", "3.5")
