@@ -2,7 +2,7 @@
 
 use super::say;
 use caustique::error::{Error, Result};
-use caustique::finish::Choice;
+use caustique::finish::DenoiserChoice;
 use caustique::pipeline::Ready;
 use caustique::pipeline::finish::{Order, open};
 use clap::ValueEnum;
@@ -23,13 +23,13 @@ pub enum Denoise {
     None,
 }
 
-impl From<Denoise> for Choice {
+impl From<Denoise> for DenoiserChoice {
     fn from(denoise: Denoise) -> Self {
         match denoise {
-            Denoise::Auto => Choice::Auto,
-            Denoise::Oidn => Choice::Oidn,
-            Denoise::Own => Choice::Own,
-            Denoise::None => Choice::None,
+            Denoise::Auto => DenoiserChoice::Auto,
+            Denoise::Oidn => DenoiserChoice::Oidn,
+            Denoise::Own => DenoiserChoice::Own,
+            Denoise::None => DenoiserChoice::None,
         }
     }
 }

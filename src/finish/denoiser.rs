@@ -13,7 +13,7 @@ const MEMORY_MIB: u32 = 3000;
 
 /// `--denoise`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Choice {
+pub enum DenoiserChoice {
     /// Open Image Denoise where it is found, else our own.
     #[default]
     Auto,
@@ -41,16 +41,16 @@ pub enum Denoiser {
 }
 
 impl Denoiser {
-    /// The one asked for, with as many threads as the current rayon pool has. With [`Choice::Auto`] also why it is not Open Image Denoise.
+    /// The one asked for, with as many threads as the current rayon pool has. With [`DenoiserChoice::Auto`] also why it is not Open Image Denoise.
     ///
     /// # Errors
-    /// [`Kind::Library`] where [`Choice::Oidn`] cannot be had.
-    pub fn open(choice: Choice) -> Result<(Denoiser, Option<Error>)> {
+    /// [`Kind::Library`] where [`DenoiserChoice::Oidn`] cannot be had.
+    pub fn open(choice: DenoiserChoice) -> Result<(Denoiser, Option<Error>)> {
         match choice {
-            Choice::None => Ok((Denoiser::None, None)),
-            Choice::Own => Ok((Denoiser::Own, None)),
-            Choice::Oidn => Ok((oidn()?, None)),
-            Choice::Auto => Ok(oidn().map_or_else(|error| (Denoiser::Own, Some(error)), |found| (found, None))),
+            DenoiserChoice::None => Ok((Denoiser::None, None)),
+            DenoiserChoice::Own => Ok((Denoiser::Own, None)),
+            DenoiserChoice::Oidn => Ok((oidn()?, None)),
+            DenoiserChoice::Auto => Ok(oidn().map_or_else(|error| (Denoiser::Own, Some(error)), |found| (found, None))),
         }
     }
 

@@ -15,7 +15,7 @@ pub mod statistical;
 pub mod told;
 mod window;
 
-pub use denoiser::{Choice, Denoiser, Quality};
+pub use denoiser::{Denoiser, DenoiserChoice, Quality};
 pub use window::{Size, window};
 
 use crate::combine::{Combiner, LevelStack};

@@ -5,7 +5,7 @@ use super::aim::Targets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emitter::{Emitter, Sky, spot_falloff, spot_solid_angle};
-use super::receiver::{Choice, Receiver};
+use super::receiver::{LightSampler, Receiver};
 use crate::geometry::{Shapes, Surface, spawn};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
@@ -109,7 +109,7 @@ impl EmissionSample {
 /// The lights of a scene.
 pub struct Lights {
     emitters: Vec<Emitter>,
-    choice: Option<Choice>,
+    choice: Option<LightSampler>,
     /// Index of the first emitter of an instance, `u32::MAX` for instances that do not emit; and then the emitter of each
     /// of its triangles, relative to it (`u32::MAX` for those without area).
     first: Vec<u32>,
@@ -199,7 +199,7 @@ impl Lights {
         // to all lights alike. It also keeps every probability above the resolution of the random numbers.
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
-        let choice = Choice::new(&emitters, &sky, floored);
+        let choice = LightSampler::new(&emitters, &sky, floored);
         Lights { emitters, choice, first, relative, suns, environment, sky, targets: Targets::new(shapes, materials) }
     }
 
@@ -225,7 +225,7 @@ impl Lights {
 
     /// The choice of lights by power; `None` if there is none.
     pub(super) fn choice(&self) -> Option<&Cdf> {
-        self.choice.as_ref().map(Choice::power)
+        self.choice.as_ref().map(LightSampler::power)
     }
 
     /// Probability of choosing a light for a receiver over that of choosing it for emission.

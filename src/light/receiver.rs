@@ -38,7 +38,7 @@ fn mixed(by_power: f32, near: f32) -> f32 {
 }
 
 /// Which light is asked for light.
-pub(super) struct Choice {
+pub(super) struct LightSampler {
     power: Cdf,
     /// Where there is more to choose from than the halves of one rectangle.
     near: Option<Near>,
@@ -51,9 +51,9 @@ struct Near {
     infinite: Option<Cdf>,
 }
 
-impl Choice {
+impl LightSampler {
     /// `None` if no light gives any light; `powers` are those of the emitters, with a floor.
-    pub fn new(emitters: &[Emitter], sky: &Sky, powers: impl Iterator<Item = f64>) -> Option<Choice> {
+    pub fn new(emitters: &[Emitter], sky: &Sky, powers: impl Iterator<Item = f64>) -> Option<LightSampler> {
         let power = Cdf::new(powers)?;
         let near = several(emitters).then(|| LightTree::new(emitters)).flatten().map(|tree| {
             let irradiance = |emitter: &Emitter| match emitter {
@@ -63,7 +63,7 @@ impl Choice {
             };
             Near { tree, infinite: Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter)))) }
         });
-        Some(Choice { power, near })
+        Some(LightSampler { power, near })
     }
 
     /// By power alone, as emission is chosen.

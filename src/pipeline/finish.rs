@@ -2,7 +2,7 @@
 
 use crate::combine::{Combiner, Model, Runtime};
 use crate::error::{Error, Kind, Result};
-use crate::finish::{Account, Choice, Denoiser, Finish, Quality, Size};
+use crate::finish::{Account, Denoiser, DenoiserChoice, Finish, Quality, Size};
 use crate::render::Clock;
 use serde_json::{Value, json};
 
@@ -16,7 +16,7 @@ const MOST: f64 = 0.5;
 /// How the estimate is to become the picture.
 pub struct Order {
     /// What makes the denoised picture.
-    pub denoiser: Choice,
+    pub denoiser: DenoiserChoice,
     /// The network that combines levels: a name that ships, or an ONNX file.
     pub model: Option<String>,
 }

@@ -18,14 +18,14 @@ use crate::film::{LayerSet, Naming, Selection, output as film};
 use crate::finish::{Account, Finish, finished_part, reads};
 use crate::image::exr::{self, Attributes};
 use crate::plan::{Plan, Switches};
-use crate::render::auto::{self, Choice, Way};
+use crate::render::auto::{self, Choice, Strategy};
 use crate::render::output::{Present, shape};
 use crate::render::{Clock, Control, Progress, Rendered, Settings, TechniquePicture, cpu_seconds, peak_memory};
 use crate::scene::{Scene, View};
 use serde_json::{Map, Value, json};
 
 /// Settings of a way that auto may choose, for a picture of a size; `None` where other wishes rule it out.
-pub type Allowed<'a> = &'a dyn Fn(Way, (u32, u32)) -> Option<Settings>;
+pub type Allowed<'a> = &'a dyn Fn(Strategy, (u32, u32)) -> Option<Settings>;
 
 /// What auto is to choose from, and what its pilots are finished with.
 pub struct Auto<'a> {
@@ -41,7 +41,7 @@ pub struct Order<'a> {
     pub scene: load::Order,
     /// Camera and size.
     pub view: View,
-    /// How light is found, and when to stop. With `auto` what its options come to for [`Way::GATHERING`].
+    /// How light is found, and when to stop. With `auto` what its options come to for [`Strategy::GATHERING`].
     pub settings: Settings,
     /// Light paths of an iteration; `None`: what is usual.
     pub photons: Option<u32>,
@@ -163,7 +163,7 @@ fn choose(
             let has_layers =
                 |of: &Settings| layers::selection(&order.layers, of, present, order.finish.is_some()).is_ok();
             let techniques = settings.techniques;
-            let make = |way: Way| {
+            let make = |way: Strategy| {
                 let able = !techniques || way.method.has_techniques();
                 let settings = (auto.allowed)(way, camera.size()).filter(|of| able && has_layers(of))?;
                 Some(Settings { techniques, ..settings })

@@ -24,11 +24,11 @@
 //! So the effect *glossy* is what narrow lobes show, caustics excepted: first of all events that are not clear there is a narrow lobe. Nobody sees a light
 //! without size but by a lobe that has a width: where only perfect mirrors and glass are between the two, that lobe, if it is sharp, shows a caustic.
 //!
-//! [`Sight`] reads a path from the camera, [`Beam`] from the light, and where they meet they tell the class ([`Sight::receives`]).
+//! [`EyeSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class ([`EyeSuffix::receives`]).
 
 mod sight;
 
-pub use sight::{Beam, Sight};
+pub use sight::{EyeSuffix, LightPrefix};
 
 use super::effect::{Effect, EffectSet};
 use crate::bsdf::LobeSet;
@@ -135,7 +135,7 @@ impl PathClass {
 
     /// Of a whole path, from the camera to a light, `sizeless` or not.
     pub fn of(events: impl IntoIterator<Item = Event>, sizeless: bool) -> PathClass {
-        events.into_iter().fold(Sight::START, Sight::then).lit(sizeless)
+        events.into_iter().fold(EyeSuffix::START, EyeSuffix::then).lit(sizeless)
     }
 
     /// The part of the picture that it belongs to.

@@ -12,7 +12,7 @@ mod presence;
 mod search;
 pub mod switch;
 
-pub use class::{Beam, ClassSet, Event, Part, PathClass, Sight};
+pub use class::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
 pub use effect::{Effect, EffectSet, Switches};
 pub use presence::Presence;
 pub use search::{Owner, Search};

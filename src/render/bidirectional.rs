@@ -26,8 +26,8 @@ use crate::scene::Scene;
 use crate::spectrum::Comb;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Eye, EyeMeasure, Indirect, Left, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
-    Surroundings, path_measure,
+    Bidirectional, Deposits, Eye, EyeMeasure, Indirect, LightPass, LightVertices, Meets, MergeLevels, MergePhoton,
+    Splat, Surroundings, path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -151,7 +151,7 @@ impl<'a> Passes<'a> {
         for pair in &self.pairs {
             let pass = self.light_pass(i, pair, self.guide.as_deref());
             let walk = |tile| {
-                let (mut left, mut arena) = (Left::default(), Bump::new());
+                let (mut left, mut arena) = (Deposits::default(), Bump::new());
                 for place in tiles.pixels(tile) {
                     arena.reset();
                     let mut vertices = LightVertices::new_in(&arena);
@@ -206,7 +206,7 @@ impl<'a> Passes<'a> {
                 .zip(watches.par_iter_mut())
                 .enumerate()
                 .map(|(tile, (measures, watch))| {
-                    let (mut left, mut arena) = (Left::default(), Bump::new());
+                    let (mut left, mut arena) = (Deposits::default(), Bump::new());
                     for places in tiles.groups(tile) {
                         let mut starts = shared.eye.starts(&places, streams);
                         for (place, start) in places.iter().flatten().zip(starts.iter_mut().flatten()) {

@@ -1,7 +1,7 @@
 //! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh cost`); choices depend
 //! on their ratios.
 
-use super::auto::Way;
+use super::auto::Strategy;
 use super::method::Method;
 use super::output::Present;
 use super::settings::Settings;
@@ -89,7 +89,7 @@ impl Cost {
     }
 
     /// Core-seconds of an iteration of a picture of so many pixels.
-    pub fn of(&self, way: Way, settings: &Settings, pixels: f64) -> f64 {
+    pub fn of(&self, way: Strategy, settings: &Settings, pixels: f64) -> f64 {
         let Lengths { eye, eye_to_broad, light, light_to_broad, merged, textured, .. } = self.lengths;
         let Lengths { eye_media, light_media, on_the_way, eye_open, light_open, .. } = self.lengths;
         let paths = pixels * eye_paths(settings);

@@ -6,7 +6,7 @@
 //!
 //! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once learnt, does not leave less, there is none.
 
-use super::auto::Way;
+use super::auto::Strategy;
 use super::cost::{Cost, GUIDED_START};
 use super::settings::Settings;
 use super::sppm::chunks;
@@ -88,7 +88,7 @@ pub(super) fn learnt(
 fn dearer(eye: &Eye<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = eye.camera.size();
     let cost = |guide: Option<&Guide>| {
-        let way = Way { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
+        let way = Strategy { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
         Cost::count(eye.scene, eye.camera, settings, guide).of(way, settings, f64::from(width) * f64::from(height))
     };
     cost(Some(guide)) / cost(None)
@@ -145,18 +145,18 @@ fn photons(
 }
 
 /// Sums over a round's eye paths of the squared relative errors that photons leave.
-struct Left {
+struct CellErrors {
     of_cells: Vec<f64>,
     /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w unguided ones, each 1 / w times as bright.
     unguided: f64,
 }
 
-impl Left {
-    fn none(cells: usize) -> Left {
-        Left { of_cells: vec![0.0; cells], unguided: 0.0 }
+impl CellErrors {
+    fn none(cells: usize) -> CellErrors {
+        CellErrors { of_cells: vec![0.0; cells], unguided: 0.0 }
     }
 
-    fn add(&mut self, other: &Left) {
+    fn add(&mut self, other: &CellErrors) {
         self.of_cells.iter_mut().zip(&other.of_cells).for_each(|(sum, more)| *sum += more);
         self.unguided += other.unguided;
     }
@@ -168,14 +168,14 @@ impl Left {
 }
 
 /// What the photons of a round leave where its eye paths look.
-fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> Left {
+fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> CellErrors {
     let (width, height) = eye.camera.size();
     let pixels = u64::from(width) * u64::from(height);
     let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
     // Pixels in even steps from a first one drawn anew every round.
     let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
-        let mut error = Left::none(cells);
+        let mut error = CellErrors::none(cells);
         let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
@@ -189,8 +189,8 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>,
         }
         error
     };
-    let parts: Vec<Left> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
-    let mut sum = Left::none(cells);
+    let parts: Vec<CellErrors> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
+    let mut sum = CellErrors::none(cells);
     parts.iter().for_each(|part| sum.add(part));
     sum
 }
@@ -201,7 +201,7 @@ fn weigh(
     maps: &ByKind<PhotonMap<Marked>>,
     nearest: &mut ByKind<Nearest<Marked>>,
     probe: &Probe,
-    error: &mut Left,
+    error: &mut CellErrors,
 ) {
     let point = &probe.point;
     let cap = SCREEN_CAP * span(eye.camera, point.length);

@@ -1,6 +1,6 @@
 //! What a render is asked to do.
 
-use super::auto::Way;
+use super::auto::Strategy;
 use super::method::Method;
 use super::output::Present;
 use super::session::Spent;
@@ -166,7 +166,7 @@ impl Default for Settings {
 
 impl Settings {
     /// Those of a way to render when nothing else is asked for.
-    pub fn of(way: Way) -> Settings {
+    pub fn of(way: Strategy) -> Settings {
         let method = way.method;
         let levels = Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 });
         Settings {

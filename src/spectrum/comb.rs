@@ -1,6 +1,6 @@
 //! The wavelengths of one pass.
 
-use super::Hue;
+use super::WavelengthSample;
 use crate::random::mix;
 
 /// One wavelength in each band, at the same place in all of them. Whatever paths of a pass meet, if they are of one band, they are of one wavelength. Over all
@@ -26,8 +26,8 @@ impl Comb {
 
     /// The hue of its band.
     #[inline]
-    pub fn nearest(self, hue: Hue) -> Hue {
-        Hue::within(hue.band().0, self.offset)
+    pub fn nearest(self, hue: WavelengthSample) -> WavelengthSample {
+        WavelengthSample::within(hue.band().0, self.offset)
     }
 }
 
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn hues_keep_their_band() {
         for (seed, i) in (0..1000).map(|i| (i % 7, i)) {
-            let hue = Hue::new(i as f32 / 1000.0);
+            let hue = WavelengthSample::new(i as f32 / 1000.0);
             let near = Comb::new(seed, 5).nearest(hue);
             assert_eq!(near.wavelength().band, hue.wavelength().band, "{near:?}");
             assert!((near.0 - hue.0).abs() <= 1.0 / f32::from(BANDS) + 1e-6);

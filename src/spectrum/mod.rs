@@ -24,13 +24,13 @@ const LEAST_WEIGHT: f32 = 1e-6;
 
 /// A place in the spectrum, uniform on `[0, 1)`: what a path would take if it met dispersive glass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Hue(f32);
+pub struct WavelengthSample(f32);
 
-impl Hue {
+impl WavelengthSample {
     /// From a uniform number in `[0, 1)`.
     #[inline]
-    pub fn new(u: f32) -> Hue {
-        Hue(u)
+    pub fn new(u: f32) -> WavelengthSample {
+        WavelengthSample(u)
     }
 
     /// The band it is in, from 0, and how far, in `[0, 1]`.
@@ -42,8 +42,8 @@ impl Hue {
     }
 
     #[inline]
-    fn within(band: u8, offset: f32) -> Hue {
-        Hue((f32::from(band) + offset) * (1.0 / f32::from(BANDS)))
+    fn within(band: u8, offset: f32) -> WavelengthSample {
+        WavelengthSample((f32::from(band) + offset) * (1.0 / f32::from(BANDS)))
     }
 
     /// The wavelength here.
@@ -59,7 +59,7 @@ impl Hue {
     pub fn wavelength_of(self, channel: usize, u: f32) -> Wavelength {
         let offset = self.band().1;
         let weights: [f32; BANDS as usize] =
-            std::array::from_fn(|band| observer::at(Hue::within(band as u8, offset).0).1[channel]);
+            std::array::from_fn(|band| observer::at(WavelengthSample::within(band as u8, offset).0).1[channel]);
         let sum: f32 = weights.iter().sum();
         let mut left = u * sum;
         let mut band = 0;
@@ -68,7 +68,7 @@ impl Hue {
             band += 1;
         }
         let weight = Rgb::splat(sum / f32::from(BANDS));
-        Wavelength { weight, ..Hue::within(band as u8, offset).wavelength() }
+        Wavelength { weight, ..WavelengthSample::within(band as u8, offset).wavelength() }
     }
 }
 

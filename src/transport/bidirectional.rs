@@ -12,7 +12,7 @@ use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::medium::HenyeyGreenstein;
-use crate::plan::{Beam, ClassSet, Event, Sight};
+use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix};
 use crate::scene::contact::Place;
 
 /// Which strategies take part.
@@ -169,7 +169,7 @@ pub struct LightVertex<'s> {
     /// Partial sums of the weights.
     pub mis: MisState,
     /// What has happened on the way here.
-    pub beam: Beam,
+    pub beam: LightPrefix,
     /// The path has taken a wavelength, the one its eye path takes if it does.
     pub dispersed: bool,
 }
@@ -258,7 +258,7 @@ impl LightVertex<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trail {
     /// What has happened up to the last vertex.
-    pub sight: Sight,
+    pub sight: EyeSuffix,
     /// Lobes of the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     /// Length of the path so far.
@@ -268,7 +268,7 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    pub const START: Trail = Trail { sight: Sight::START, lobes: None, length: 0.0, delta: true };
+    pub const START: Trail = Trail { sight: EyeSuffix::START, lobes: None, length: 0.0, delta: true };
 
     /// The last vertex sent the path on by `lobe`.
     #[inline]

@@ -7,14 +7,14 @@ use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
 use super::segment::token;
 use super::shares::{connected, shares, wanted};
-use super::site::{MediumVertex, Site};
+use super::site::{MediumVertex, ScatterPoint};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::photon::PhotonMap;
-use crate::plan::{Beam, Part, PathClass};
+use crate::plan::{LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, mix};
 use bumpalo::Bump;
 
@@ -106,9 +106,9 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn next_event<S: Site>(&mut self, vertex: &S) {
+    fn next_event<S: ScatterPoint>(&mut self, vertex: &S) {
         let Eye { scene, classes, .. } = self.shared.eye;
-        let (draws, seen) = (vertex.draws(), (self.trail.sight, Beam::start(false)));
+        let (draws, seen) = (vertex.draws(), (self.trail.sight, LightPrefix::start(false)));
         if !wanted(vertex, seen.0, seen.1, classes) {
             return;
         }
@@ -123,7 +123,7 @@ impl<R: Record> EyeWalk<'_, R> {
         if !is_lit(value) {
             return;
         }
-        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
+        let way = vertex.shadow_ray(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
         if !is_lit(way.left) {
             return;
         }
@@ -139,7 +139,7 @@ impl<R: Record> EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn connect<S: Site>(&mut self, vertex: &S, light: &LightVertex<'_>) {
+    fn connect<S: ScatterPoint>(&mut self, vertex: &S, light: &LightVertex<'_>) {
         let Bidirectional { eye, strategies, .. } = self.shared;
         let to = light.p() - vertex.p();
         let distance2 = to.length_squared();
@@ -162,7 +162,7 @@ impl<R: Record> EyeWalk<'_, R> {
         }
         // Every pair of vertices has its own decisions at cut-outs.
         let token = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
-        let way = vertex.way_to(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium(), light.touching());
+        let way = vertex.shadow_ray_to(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium(), light.touching());
         if !is_lit(way.left) {
             return;
         }
@@ -194,7 +194,7 @@ impl<R: Record> EyeWalk<'_, R> {
 
     /// Next-event estimation and connections.
     #[inline]
-    fn connect_all(&mut self, vertex: &impl Site) {
+    fn connect_all(&mut self, vertex: &impl ScatterPoint) {
         self.next_event(vertex);
         let longest = self.shared.eye.max_depth - vertex.depth();
         for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {

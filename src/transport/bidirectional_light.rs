@@ -7,13 +7,13 @@ use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::segment::token;
 use super::shares::{shares, wanted};
-use super::site::{MediumVertex, Site};
+use super::site::{MediumVertex, ScatterPoint};
 use super::walk::{Next, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, is_lit};
 use crate::medium::Flight;
-use crate::plan::{Beam, Event, Part, PathClass, Sight};
+use crate::plan::{Event, EyeSuffix, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
@@ -60,7 +60,7 @@ pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
 
 /// What light paths leave for others than their own eye path.
 #[derive(Default)]
-pub struct Left {
+pub struct Deposits {
     /// For the film, of all paths so far.
     pub splats: Vec<Splat>,
     /// For the next pass, of all paths so far.
@@ -73,12 +73,12 @@ struct LightWalk<'a, 's, R> {
     /// Where it comes from.
     light: u32,
     infinite: bool,
-    beam: Beam,
+    beam: LightPrefix,
     /// Lobes of the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     photons_only: bool,
     vertices: &'a mut LightVertices<'s>,
-    left: &'a mut Left,
+    left: &'a mut Deposits,
     record: &'a mut R,
 }
 
@@ -96,9 +96,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
         self.mis = self.mis.arrive(distance2, cos).fly(flight);
     }
 
-    fn connect_camera<S: Site>(&mut self, vertex: &S) {
+    fn connect_camera<S: ScatterPoint>(&mut self, vertex: &S) {
         let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
-        let (draws, seen) = (vertex.draws(), (Sight::START, self.beam));
+        let (draws, seen) = (vertex.draws(), (EyeSuffix::START, self.beam));
         if !wanted(vertex, seen.0, seen.1, eye.classes) {
             return;
         }
@@ -111,7 +111,8 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if !is_lit(value) {
             return;
         }
-        let way = vertex.way(eye.scene, sample.wi, Some(sample.lens), token(eye.scene, draws, Purpose::ShadowAlpha));
+        let way =
+            vertex.shadow_ray(eye.scene, sample.wi, Some(sample.lens), token(eye.scene, draws, Purpose::ShadowAlpha));
         if !is_lit(way.left) {
             return;
         }
@@ -233,7 +234,7 @@ impl<'s> Bidirectional<'s> {
         index: u32,
         photons_only: bool,
         vertices: &mut LightVertices<'s>,
-        left: &mut Left,
+        left: &mut Deposits,
         record: &mut R,
     ) {
         let eye = &self.eye;
@@ -246,7 +247,7 @@ impl<'s> Bidirectional<'s> {
             mis: MisState::light(&emitted.density),
             light: emitted.light,
             infinite: emitted.density.infinite,
-            beam: Beam::start(emitted.delta),
+            beam: LightPrefix::start(emitted.delta),
             lobes: None,
             photons_only,
             vertices,

@@ -6,7 +6,7 @@
 //! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
 
 use super::segment::{End, Start, next_surface, token};
-use super::site::Site;
+use super::site::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
@@ -32,7 +32,7 @@ pub fn balance(pdf: f32, other: f32) -> f32 {
 /// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival` is the
 /// probability of going on with `onward`.
 #[inline]
-pub fn direct_light(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
     if scene.lights.is_empty() {
         return Rgb::ZERO;
     }
@@ -45,7 +45,7 @@ pub fn direct_light(scene: &Scene, vertex: &impl Site, gather: LobeSet, onward: 
 
 /// Light straight from a light for some sets of lobes, each with the probability of trying its second strategy, which is not done here.
 #[inline]
-pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) -> Rgb {
+pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f32); 2]) -> Rgb {
     let draws = vertex.draws();
     let choice = draws.one_fine(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
@@ -67,11 +67,11 @@ pub fn next_event(scene: &Scene, vertex: &impl Site, sets: [(LobeSet, f32); 2]) 
     if !is_lit(arriving) {
         return Rgb::ZERO;
     }
-    arriving * vertex.way(scene, sample.wi, sample.target, token(scene, draws, Purpose::ShadowAlpha)).left
+    arriving * vertex.shadow_ray(scene, sample.wi, sample.target, token(scene, draws, Purpose::ShadowAlpha)).left
 }
 
 #[inline]
-fn second_strategy(scene: &Scene, vertex: &impl Site, set: LobeSet) -> Rgb {
+fn second_strategy(scene: &Scene, vertex: &impl ScatterPoint, set: LobeSet) -> Rgb {
     let draws = vertex.draws();
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
     let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };

@@ -18,10 +18,10 @@ use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
-use super::segment::{Known, token};
+use super::segment::{PrecomputedHit, token};
 use super::shares::leads;
 use super::site::MediumVertex;
-use super::site::Site;
+use super::site::ScatterPoint;
 use super::surroundings::Around;
 use super::volume::Volume;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
@@ -31,10 +31,10 @@ use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::photon::{ByKind, Kernel, Kind, Near, Photon, PhotonMap, PhotonMaps, VolumePhoton};
-use crate::plan::{Beam, ClassSet, Event, Part, PathClass, Sight};
+use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
-use crate::spectrum::{Hue, Wavelength};
+use crate::spectrum::{Wavelength, WavelengthSample};
 use crate::trace::Ray;
 use std::f32::consts::FRAC_1_PI;
 
@@ -130,7 +130,7 @@ struct Gather<'a, B, K, const PATHS: bool> {
     /// Length of the path so far.
     length: f32,
     /// What has happened up to the last vertex.
-    sight: Sight,
+    sight: EyeSuffix,
     /// Lobes of the last vertex.
     lobes: LobeSet,
     classes: ClassSet,
@@ -181,7 +181,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
 
     /// What has happened to a path that arrives at the next vertex.
     #[inline]
-    fn arrived(&self, scattered: Option<Scattered>) -> Sight {
+    fn arrived(&self, scattered: Option<Scattered>) -> EyeSuffix {
         scattered.map_or(self.sight, |scattered| self.sight.then(Event::of(scattered.lobe, self.lobes)))
     }
 
@@ -195,7 +195,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
 
     /// Whether a medium is lit.
     #[inline]
-    fn lit_in_medium(&self, sight: Sight) -> bool {
+    fn lit_in_medium(&self, sight: EyeSuffix) -> bool {
         self.classes.has(sight.then(Event::Medium).lit(false))
     }
 
@@ -254,7 +254,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         // What a photon of a light without size makes of sharp lobes is in the same class.
         let sight = self.sight.then(Event::Broad);
         let place = B::place(vertex.surface.ng);
-        for (kind, beam) in [(Kind::Indirect, Beam::SCATTERED), (Kind::Caustic, Beam::FOCUSED)] {
+        for (kind, beam) in [(Kind::Indirect, LightPrefix::SCATTERED), (Kind::Caustic, LightPrefix::FOCUSED)] {
             let class = sight.receives(beam);
             let photons = &self.photons[kind as usize];
             // Where none has come this time, eye paths still leave photons their share.
@@ -290,7 +290,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let sharp = onward & LobeSet::SHARP;
         let shared = kind == Kind::Caustic
             && !sharp.is_empty()
-            && self.classes.has(self.sight.then(Event::Sharp).receives(Beam::FOCUSED));
+            && self.classes.has(self.sight.then(Event::Sharp).receives(LightPrefix::FOCUSED));
         let mut glints =
             shared.then(|| self.glints.merge(self.kernel, (vertex.shading, ng), (onward, going), &radii, photons));
         let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
@@ -422,7 +422,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
                 }
                 sums
             };
-            let wanted = self.classes.has(sight.then(Event::Medium).receives(Beam::SCATTERED));
+            let wanted = self.classes.has(sight.then(Event::Medium).receives(LightPrefix::SCATTERED));
             let gathered = self.volume.filter(|_| wanted).map(gather);
             let measure = &mut self.measure;
             let (light, photons) = if sight.is_clear() {
@@ -496,10 +496,10 @@ impl Eye<'_> {
             direction: ray.direction,
             throughput: Rgb::ONE,
             interior: self.interior.at(self.scene, ray.origin),
-            first: Known::Unknown,
+            first: PrecomputedHit::Unknown,
             far: false,
             channel: None,
-            hue: Hue::new(draws.one(Purpose::Wavelength)),
+            hue: WavelengthSample::new(draws.one(Purpose::Wavelength)),
         }
     }
 
@@ -520,7 +520,7 @@ impl Eye<'_> {
         for (start, place) in starts.iter_mut().zip(places) {
             if let Some(place) = place {
                 let stream = streams.path(place.index);
-                let first = Known::Nothing;
+                let first = PrecomputedHit::Nothing;
                 let film = film.path(place.index);
                 *start = Some((PathStart { first, ..self.start(place.pixel, film) }, stream));
             }
@@ -540,7 +540,7 @@ impl Eye<'_> {
         std::hint::black_box(self.scene.shapes.touch(triangles));
         for (start, hit) in starts.iter_mut().zip(hits) {
             if let (Some((start, _)), Some(hit)) = (start, hit) {
-                start.first = Known::Hit(hit);
+                start.first = PrecomputedHit::Hit(hit);
             }
         }
         starts
@@ -592,7 +592,7 @@ impl Eye<'_> {
             max_depth: self.max_depth,
             measure: EyeMeasure::default(),
             length: 0.0,
-            sight: Sight::START,
+            sight: EyeSuffix::START,
             lobes: LobeSet::NONE,
             classes: self.classes,
             broadly: false,

@@ -1,7 +1,7 @@
 //! Light paths that leave photons.
 
 use super::eye::Indirect;
-use super::segment::Known;
+use super::segment::PrecomputedHit;
 use super::site::MediumVertex;
 use super::surroundings::Surroundings;
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
@@ -12,7 +12,7 @@ use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
-use crate::spectrum::{Band, Comb, Hue};
+use crate::spectrum::{Band, Comb, WavelengthSample};
 use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
@@ -104,13 +104,13 @@ impl<'a> LightPass<'a> {
 
     /// The hue of path `index`.
     #[inline]
-    pub fn hue(&self, index: u32) -> Hue {
+    pub fn hue(&self, index: u32) -> WavelengthSample {
         self.hue_of(self.stream(u64::from(index)))
     }
 
     #[inline]
-    fn hue_of(&self, stream: Stream) -> Hue {
-        let hue = Hue::new(stream.vertex(0).one(Purpose::Wavelength));
+    fn hue_of(&self, stream: Stream) -> WavelengthSample {
+        let hue = WavelengthSample::new(stream.vertex(0).one(Purpose::Wavelength));
         self.comb.map_or(hue, |comb| comb.nearest(hue))
     }
 
@@ -157,7 +157,7 @@ impl<'a> LightPass<'a> {
                 direction: emission.direction,
                 throughput: flux,
                 interior: surroundings.light(scene, emission.light, emission.origin),
-                first: Known::Unknown,
+                first: PrecomputedHit::Unknown,
                 far: emission.infinite,
                 channel: None,
                 hue: self.hue_of(stream),

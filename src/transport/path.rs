@@ -8,13 +8,13 @@ use super::bidirectional_eye::{look, look_in_medium};
 use super::eye::{Eye, EyeMeasure};
 use super::segment::token;
 use super::shares::{shares, wanted};
-use super::site::{MediumVertex, Site};
+use super::site::{MediumVertex, ScatterPoint};
 use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
-use crate::plan::{Beam, ClassSet, Part, PathClass};
+use crate::plan::{ClassSet, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -41,8 +41,8 @@ impl<R: Record> PathTracer<'_, R> {
     }
 
     /// Light straight from a light at a vertex.
-    fn lit<S: Site>(&mut self, vertex: &S) {
-        let (scene, draws, beam) = (self.scene, vertex.draws(), Beam::start(false));
+    fn lit<S: ScatterPoint>(&mut self, vertex: &S) {
+        let (scene, draws, beam) = (self.scene, vertex.draws(), LightPrefix::start(false));
         if vertex.depth() >= self.max_depth || !wanted(vertex, self.trail.sight, beam, self.classes) {
             return;
         }
@@ -56,7 +56,7 @@ impl<R: Record> PathTracer<'_, R> {
         if (f * light.radiance).max_element() <= 0.0 {
             return;
         }
-        let way = vertex.way(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
+        let way = vertex.shadow_ray(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
         let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);

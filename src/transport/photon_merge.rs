@@ -7,7 +7,7 @@ use super::walk::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap, same_surface};
-use crate::plan::{Beam, ClassSet, PathClass, Sight};
+use crate::plan::{ClassSet, EyeSuffix, LightPrefix, PathClass};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
@@ -29,7 +29,7 @@ pub struct MergePhoton {
     /// Segments of the light path up to here.
     pub depth: u16,
     /// What has happened on the way here.
-    pub beam: Beam,
+    pub beam: LightPrefix,
     /// Of the light path's wavelength.
     band: Band,
 }
@@ -54,7 +54,7 @@ impl Located for MergePhoton {
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
-    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, beam: Beam, mis: &MisState) -> MergePhoton {
+    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, beam: LightPrefix, mis: &MisState) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
@@ -84,7 +84,7 @@ pub(super) fn merge_photons<R: Record>(
     levels: &MergeLevels,
     vertex: &Vertex<'_, '_>,
     (mis, own): (&MisState, Merges),
-    (sight, classes): (Sight, ClassSet),
+    (sight, classes): (EyeSuffix, ClassSet),
     longest: u32,
     record: &mut R,
     mut add: impl FnMut(PathClass, usize, Rgb),

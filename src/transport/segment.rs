@@ -49,7 +49,7 @@ pub struct MediumArrival {
 
 /// What a ray meets, if that is known before it is followed.
 #[derive(Clone, Copy, Debug, Default)]
-pub enum Known {
+pub enum PrecomputedHit {
     /// It is not.
     #[default]
     Unknown,
@@ -208,20 +208,20 @@ pub struct Start {
 /// Follows a ray to the next surface that scatters; media on the way attenuate.
 #[inline(always)]
 pub fn next_surface(scene: &Scene, start: Start) -> End {
-    next_vertex(scene, start, &Known::Unknown, &mut Attenuate)
+    next_vertex(scene, start, &PrecomputedHit::Unknown, &mut Attenuate)
 }
 
 /// Follows a ray to the next surface that scatters, `through` whatever media.
 #[inline(always)]
-pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Known, through: &mut T) -> End {
+pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &PrecomputedHit, through: &mut T) -> End {
     let Start { origin, direction, mut interior, leaving, token } = start;
     let mut along = Along::new(Ray { origin, direction, tmax: f32::INFINITY, token }, leaving);
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
     for crossed in 0..MAX_NULL_CROSSINGS {
         let met = match known {
-            Known::Nothing if crossed == 0 => None,
-            Known::Hit(hit) if crossed == 0 => along.met(scene, hit),
+            PrecomputedHit::Nothing if crossed == 0 => None,
+            PrecomputedHit::Hit(hit) if crossed == 0 => along.met(scene, hit),
             _ => along.next(scene),
         };
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
@@ -262,17 +262,17 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Known
     End::Lost
 }
 
-/// A way between two points that light may have taken.
+/// What a ray to a light, or between two vertices, meets on its way.
 #[derive(Clone, Copy, Debug)]
-pub struct Way {
+pub struct ShadowRay {
     /// What is left of the light.
     pub left: Rgb,
     /// Densities of flying it both ways.
     pub flight: Flight,
 }
 
-impl Way {
-    const BLOCKED: Way = Way { left: Rgb::ZERO, flight: Flight::FREE };
+impl ShadowRay {
+    const BLOCKED: ShadowRay = ShadowRay { left: Rgb::ZERO, flight: Flight::FREE };
 
     /// Goes on through `distance` of what fills the space.
     #[inline]
@@ -284,12 +284,12 @@ impl Way {
 
     #[cold]
     #[inline(never)]
-    fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> Way {
+    fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> ShadowRay {
         let Some(medium) = interior.medium(scene) else { return self };
         let left = self.left * medium.transmittance(distance);
         let scatters = scene.survey.scattering;
         let flight = if scatters { self.flight.through(&medium, distance, starts, ends) } else { self.flight };
-        Way { left, flight }
+        ShadowRay { left, flight }
     }
 }
 
@@ -308,25 +308,25 @@ pub struct Between {
 
 /// What is left of light between two points (zero if anything scatters there, else absorption and tints), and the densities of flight.
 #[inline]
-pub fn way(scene: &Scene, between: &Between) -> Way {
+pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
     let [starts, ends] = between.in_medium;
     if scene.survey.null_boundaries || leaving.is_some() || reaching.is_some() {
         return way_through(scene, between);
     }
     if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
-        return Way::BLOCKED;
+        return ShadowRay::BLOCKED;
     }
-    let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
+    let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
     way.pass(scene, interior, tmax, starts, ends);
     way
 }
 
 /// The same through boundaries that do not scatter.
-fn way_through(scene: &Scene, between: &Between) -> Way {
+fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
     let mut along = Along::new(Ray { origin, direction, tmax, token }, leaving);
-    let mut way = Way { left: Rgb::ONE, flight: Flight::FREE };
+    let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some((surface, t)) = along.next(scene) else {
@@ -334,7 +334,7 @@ fn way_through(scene: &Scene, between: &Between) -> Way {
             let Some(place) = reaching else { return way };
             for surface in &contact::before(scene, &place, direction, token) {
                 match boundary(scene, surface, &interior, direction) {
-                    Boundary::Scattering(..) => return Way::BLOCKED,
+                    Boundary::Scattering(..) => return ShadowRay::BLOCKED,
                     Boundary::None(tint, behind) => (way.left, interior) = (way.left * tint, behind),
                 }
             }
@@ -345,7 +345,7 @@ fn way_through(scene: &Scene, between: &Between) -> Way {
             starts = false;
         }
         match boundary(scene, &surface, &interior, direction) {
-            Boundary::Scattering(..) => return Way::BLOCKED,
+            Boundary::Scattering(..) => return ShadowRay::BLOCKED,
             Boundary::None(tint, behind) => {
                 way.left *= tint;
                 interior = behind;
@@ -353,5 +353,5 @@ fn way_through(scene: &Scene, between: &Between) -> Way {
             }
         }
     }
-    Way::BLOCKED
+    ShadowRay::BLOCKED
 }

@@ -7,10 +7,10 @@
 //! densities, not to the lobes' own values, which nearly agree: the sum of the classes is exact.
 
 use super::bidirectional::LightVertex;
-use super::site::Site;
+use super::site::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
-use crate::plan::{Beam, ClassSet, Event, PathClass, Sight};
+use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, PathClass};
 
 /// Classes and their shares of some light, by channel.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,7 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
 
 /// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones first.
 #[inline]
-fn classes<S: Site>(vertex: &S, sight: Sight, beam: Beam) -> (PathClass, Option<PathClass>) {
+fn classes<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
     let class = |event| sight.then(event).receives(beam);
     (class(first), second.map(class))
@@ -64,7 +64,7 @@ fn classes<S: Site>(vertex: &S, sight: Sight, beam: Beam) -> (PathClass, Option<
 
 /// Whether any class of that light is wanted.
 #[inline]
-pub(super) fn wanted<S: Site>(vertex: &S, sight: Sight, beam: Beam, on: ClassSet) -> bool {
+pub(super) fn wanted<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix, on: ClassSet) -> bool {
     on.is_all() || {
         let (first, second) = classes(vertex, sight, beam);
         on.has(first) || second.is_some_and(|second| on.has(second))
@@ -72,7 +72,7 @@ pub(super) fn wanted<S: Site>(vertex: &S, sight: Sight, beam: Beam, on: ClassSet
 }
 
 /// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
-pub(super) fn leads(sight: Sight, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
+pub(super) fn leads(sight: EyeSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
     let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).ahead() & on).is_empty();
     each.filter(|lobe| set.has(*lobe)).any(ahead)
@@ -86,9 +86,9 @@ fn ratio(broad: Rgb, all: Rgb) -> Rgb {
 
 /// Shares of light that comes along `wi`, of which all lobes of the vertex scatter `f`.
 #[inline]
-pub(super) fn shares<S: Site>(
+pub(super) fn shares<S: ScatterPoint>(
     vertex: &S,
-    (sight, beam): (Sight, Beam),
+    (sight, beam): (EyeSuffix, LightPrefix),
     (wi, transport, f): (Vec3, Transport, Rgb),
     on: ClassSet,
 ) -> Shares {
@@ -97,7 +97,7 @@ pub(super) fn shares<S: Site>(
 
 /// The same where the classes are known.
 #[inline]
-fn shares_of<S: Site>(
+fn shares_of<S: ScatterPoint>(
     vertex: &S,
     classes: (PathClass, Option<PathClass>),
     (wi, transport, f): (Vec3, Transport, Rgb),
@@ -115,24 +115,24 @@ fn shares_of<S: Site>(
     shares
 }
 
-/// Shares of the light of many photons at one vertex: each kind of [`Beam`] is looked at once.
+/// Shares of the light of many photons at one vertex: each kind of [`LightPrefix`] is looked at once.
 pub(super) struct Merged<'v, S> {
     vertex: &'v S,
-    sight: Sight,
+    sight: EyeSuffix,
     on: ClassSet,
-    known: [Option<(PathClass, Option<PathClass>)>; Beam::COUNT],
+    known: [Option<(PathClass, Option<PathClass>)>; LightPrefix::COUNT],
 }
 
-impl<'v, S: Site> Merged<'v, S> {
+impl<'v, S: ScatterPoint> Merged<'v, S> {
     /// At a vertex at the end of `sight`.
     #[inline]
-    pub fn new(vertex: &'v S, sight: Sight, on: ClassSet) -> Merged<'v, S> {
-        Merged { vertex, sight, on, known: [None; Beam::COUNT] }
+    pub fn new(vertex: &'v S, sight: EyeSuffix, on: ClassSet) -> Merged<'v, S> {
+        Merged { vertex, sight, on, known: [None; LightPrefix::COUNT] }
     }
 
     /// Shares of light that comes by `beam` along `wi`, of which the vertex scatters `f` towards the eye.
     #[inline]
-    pub fn shares(&mut self, beam: Beam, wi: Vec3, f: Rgb) -> Shares {
+    pub fn shares(&mut self, beam: LightPrefix, wi: Vec3, f: Rgb) -> Shares {
         let known = &mut self.known[beam.index()];
         let classes = *known.get_or_insert_with(|| classes(self.vertex, self.sight, beam));
         shares_of(self.vertex, classes, (wi, Transport::Radiance, f), self.on)
@@ -141,10 +141,10 @@ impl<'v, S: Site> Merged<'v, S> {
 
 /// The same for light that a light path's vertex sends along `-d`, of which its lobes scatter `f_light`, to one from where it is along `d`.
 #[inline]
-pub(super) fn connected<S: Site>(
+pub(super) fn connected<S: ScatterPoint>(
     vertex: &S,
     light: &LightVertex<'_>,
-    sight: Sight,
+    sight: EyeSuffix,
     (d, f, f_light): (Vec3, Rgb, Rgb),
     on: ClassSet,
 ) -> Shares {

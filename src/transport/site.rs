@@ -1,7 +1,7 @@
 //! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
 
 use super::interior::Interior;
-use super::segment::{Between, MediumArrival, Start, Way, way};
+use super::segment::{Between, MediumArrival, ShadowRay, Start, shadow_ray};
 use super::walk::Vertex;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::Receiver;
@@ -60,7 +60,7 @@ impl MediumVertex {
 }
 
 /// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is broad.
-pub trait Site {
+pub trait ScatterPoint {
     /// Whether it is in a medium.
     const IN_MEDIUM: bool;
     /// World position.
@@ -107,13 +107,13 @@ pub trait Site {
 
     /// What is left of light on the way along `wi` to `target` (`None`: out of the scene).
     #[inline]
-    fn way(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> Way {
-        self.way_to(scene, wi, target, token, false, None)
+    fn shadow_ray(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> ShadowRay {
+        self.shadow_ray_to(scene, wi, target, token, false, None)
     }
 
     /// The same to a vertex of a medium or not, or to one on a surface that others lie on.
     #[inline]
-    fn way_to(
+    fn shadow_ray_to(
         &self,
         scene: &Scene,
         wi: Vec3,
@@ -121,7 +121,7 @@ pub trait Site {
         token: u32,
         to_medium: bool,
         reaching: Option<Place>,
-    ) -> Way {
+    ) -> ShadowRay {
         let origin = self.spawn(wi);
         let (direction, tmax) = match target {
             None => (wi, f32::INFINITY),
@@ -134,7 +134,7 @@ pub trait Site {
         };
         let interior = *self.interiors()[usize::from(self.crosses(wi))];
         let start = Start { origin, direction, interior, leaving: self.touching(), token };
-        way(scene, &Between { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
+        shadow_ray(scene, &Between { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
     }
 }
 
@@ -151,7 +151,7 @@ pub fn lit_side(shading: &Shading<'_>, ng: Vec3, wo: Vec3) -> Vec3 {
     }
 }
 
-impl Site for Vertex<'_, '_> {
+impl ScatterPoint for Vertex<'_, '_> {
     const IN_MEDIUM: bool = false;
 
     #[inline]
@@ -242,7 +242,7 @@ pub(super) fn phase_sample(phase: &HenyeyGreenstein, wo: Vec3, u: Vec2) -> BsdfS
     BsdfSample { wi, weight: Rgb::ONE, pdf_w: phase.pdf_w(wo, wi), lobe: LobeSet::BROAD, transmitted: false }
 }
 
-impl Site for MediumVertex {
+impl ScatterPoint for MediumVertex {
     const IN_MEDIUM: bool = true;
 
     #[inline]

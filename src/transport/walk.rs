@@ -3,8 +3,8 @@
 
 use super::flight::{Fly, Split};
 use super::interior::Interior;
-use super::segment::{Arrival, Attenuate, Clear, End, Known, Start, next_vertex, token};
-use super::site::{MediumVertex, Site};
+use super::segment::{Arrival, Attenuate, Clear, End, PrecomputedHit, Start, next_vertex, token};
+use super::site::{MediumVertex, ScatterPoint};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3, is_lit};
@@ -12,7 +12,7 @@ use crate::medium::Flight;
 use crate::random::{Draws, Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::Place;
-use crate::spectrum::{Hue, Wavelength};
+use crate::spectrum::{Wavelength, WavelengthSample};
 use bumpalo::Bump;
 
 /// After this many bounces even a path that loses nothing may end, so that light trapped between perfect mirrors ends
@@ -36,13 +36,13 @@ pub struct PathStart {
     /// The solids the origin is in.
     pub interior: Interior,
     /// What the first ray meets, if it has been traced already.
-    pub first: Known,
+    pub first: PrecomputedHit,
     /// It has come from infinity.
     pub far: bool,
     /// The one channel of a path that keeps its weight: what it would lose is the probability that it ends.
     pub channel: Option<usize>,
     /// The wavelength it takes if it meets dispersive glass.
-    pub hue: Hue,
+    pub hue: WavelengthSample,
 }
 
 /// A vertex of a path on a surface. What it refers to by `'a` outlives the walk.
@@ -131,7 +131,7 @@ pub trait Visitor<'a> {
 }
 
 impl Vertex<'_, '_> {
-    /// Probability that the walk goes on from here if the visitor asks for the lobes of `set`. Known before a direction
+    /// Probability that the walk goes on from here if the visitor asks for the lobes of `set`. PrecomputedHit before a direction
     /// is drawn, so that MIS weights can use it.
     #[inline]
     pub fn survival(&self, set: LobeSet) -> f32 {
@@ -241,7 +241,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     for depth in 1..=max_depth {
         let last = stream.vertex(depth - 1);
         let token = token(scene, last, Purpose::Alpha);
-        let met = std::mem::replace(&mut known, &Known::Unknown);
+        let met = std::mem::replace(&mut known, &PrecomputedHit::Unknown);
         let mut flight = Flight::FREE;
         let start = Start { origin, direction, interior, leaving, token };
         let end = if BESIDES < ABSORPTION {

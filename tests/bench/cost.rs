@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the last line is JSON for `scripts/figures`.
 
-use caustique::render::auto::{Way, counted_cost};
+use caustique::render::auto::{Strategy, counted_cost};
 use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
@@ -16,14 +16,14 @@ fn main() {
     let number = |name: &str| arguments.iter().find_map(|a| a.strip_prefix(name)?.parse().ok());
     let width = number("width=").unwrap_or(320);
     let levels = number("levels=").map(|levels| Levels::new(levels as usize));
-    let plain = |method| Way { method, indirect: Indirect::Photons, guided: false };
-    let caustics = Way { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
+    let plain = |method| Strategy { method, indirect: Indirect::Photons, guided: false };
+    let caustics = Strategy { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
     let ways = [
         plain(Method::Path),
         plain(Method::Bdpt),
         plain(Method::Vcm),
         plain(Method::Sppm),
-        Way { guided: true, ..plain(Method::Sppm) },
+        Strategy { guided: true, ..plain(Method::Sppm) },
         caustics,
     ];
     let mut rows = Vec::new();

@@ -479,7 +479,7 @@ fn techniques_share_the_picture() {
                 "{method:?}, {levels}, pixel {i}: {sum} {image}"
             );
         }
-        // Left out, weights would show: the strategies overlap.
+        // Deposits out, weights would show: the strategies overlap.
         let share = sums.iter().sum::<f64>() / alone;
         assert_eq!(share < 0.9, !matches!(method, Method::Light), "{method:?}: {share}");
     }

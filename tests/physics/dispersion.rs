@@ -15,7 +15,7 @@ use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Control, Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::spectrum::{BANDS, Band, Comb, Hue, Wavelength, observer};
+use caustique::spectrum::{BANDS, Band, Comb, Wavelength, WavelengthSample, observer};
 use caustique::transport::{
     Interior, LightPass, Next, PathStart, Photons, Scattered, Surroundings, Vertex, Visitor, light_path, walk,
 };
@@ -101,7 +101,9 @@ fn weights_are_white_on_average() {
 fn the_wavelengths_of_a_pass_are_nearly_white() {
     let of_pass = |pass| {
         let comb = Comb::new(9, pass);
-        let band = |band: u8| comb.nearest(Hue::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength().weight;
+        let band = |band: u8| {
+            comb.nearest(WavelengthSample::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength().weight
+        };
         (0..BANDS).map(band).sum::<Rgb>() / f32::from(BANDS)
     };
     let mut mean = Rgb::ZERO;
@@ -118,7 +120,7 @@ fn the_wavelengths_of_a_pass_are_nearly_white() {
 fn paths_of_one_channel_carry_the_same() {
     for channel in 0..3 {
         let offset = 0.37;
-        let hue = |band: u8| Hue::new((f32::from(band) + offset) / f32::from(BANDS));
+        let hue = |band: u8| WavelengthSample::new((f32::from(band) + offset) / f32::from(BANDS));
         let weights: Vec<f64> = (0..BANDS).map(|band| f64::from(hue(band).wavelength().weight[channel])).collect();
         let total: f64 = weights.iter().sum();
         let n = 100_000;
@@ -137,7 +139,8 @@ fn paths_of_one_channel_carry_the_same() {
         assert!(chi_squared_p(&counts, &expected(&wrong)) < 1e-6, "channel {channel}: bands half blind go unnoticed");
     }
     // Over all offsets they carry what white light has.
-    let mean = over_hues(|u| Rgb::from_array([0, 1, 2].map(|c| Hue::new(u).wavelength_of(c, 0.5).weight.x)));
+    let mean =
+        over_hues(|u| Rgb::from_array([0, 1, 2].map(|c| WavelengthSample::new(u).wavelength_of(c, 0.5).weight.x)));
     assert!(mean.iter().all(|m| (m - 1.0).abs() < 1e-4), "{mean:?}");
 }
 
@@ -148,7 +151,8 @@ fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wav
     let passes = 512;
     for pass in 1..=passes {
         let comb = Comb::new(1, pass);
-        let taken = |band: u8| comb.nearest(Hue::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength();
+        let taken =
+            |band: u8| comb.nearest(WavelengthSample::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength();
         let all: Vec<Wavelength> = (0..BANDS).map(taken).filter(|wavelength| carried(wavelength.nm)).collect();
         for (eye, light) in all.iter().flat_map(|eye| all.iter().map(move |light| (eye, light))) {
             let value = eye.weight * light.weight * weight(eye, light);
@@ -178,7 +182,7 @@ fn two_paths_put_together_have_one_wavelength() {
     };
     assert!(off(put_together(carried, twice)) > 0.2, "a colour counted twice goes unnoticed");
     // White light meets all.
-    let eye = Hue::new(0.3).wavelength();
+    let eye = WavelengthSample::new(0.3).wavelength();
     assert_eq!(eye.meets(Band::WHITE), Some(Rgb::ONE));
     assert_eq!(Band::of(None), Band::WHITE);
 }
@@ -250,7 +254,7 @@ impl<'a> Visitor<'a> for Straight {
 }
 
 /// Angle at which a ray of some hue leaves the prism.
-fn deviated(scene: &Scene, hue: Hue, arriving: f64) -> f64 {
+fn deviated(scene: &Scene, hue: WavelengthSample, arriving: f64) -> f64 {
     let direction = DVec3::new(arriving.cos(), arriving.sin(), 0.0).as_vec3();
     // Into the middle of the left face.
     let start = PathStart {
@@ -258,7 +262,7 @@ fn deviated(scene: &Scene, hue: Hue, arriving: f64) -> f64 {
         direction,
         throughput: Rgb::ONE,
         interior: Interior::default(),
-        first: caustique::transport::Known::Unknown,
+        first: caustique::transport::PrecomputedHit::Unknown,
         far: false,
         channel: None,
         hue,
@@ -282,7 +286,7 @@ fn a_prism_bends_each_wavelength_by_its_index() {
     let plain = prism_scene(glass(IOR));
     let mut wrong: f64 = 0.0;
     for k in 0..40 {
-        let hue = Hue::new((f32::from(k as u8) + 0.5) / 40.0);
+        let hue = WavelengthSample::new((f32::from(k as u8) + 0.5) / 40.0);
         let nm = f64::from(hue.wavelength().nm);
         let index = cauchy(f64::from(IOR), f64::from(ABBE), nm);
         // Symmetric: inside it flies along the base.

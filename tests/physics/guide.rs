@@ -12,7 +12,7 @@ use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
 use caustique::plan::{ClassSet, Effect, PathClass, switch};
 use caustique::random::Domain;
-use caustique::render::auto::{Choice, Way, Weight, choose};
+use caustique::render::auto::{Choice, Strategy, Weight, choose};
 use caustique::render::output::Present;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
@@ -300,7 +300,7 @@ fn weight(weights: &[Weight], effect: Effect) -> Option<Weight> {
 }
 
 /// What is chosen among the ways that are allowed.
-fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Way) -> bool + Sync) -> Choice {
+fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Strategy) -> bool + Sync) -> Choice {
     let camera = scene.camera(&square(24)).expect("a camera");
     let settings = |way| Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(way) };
     let make = |way| allowed(way).then(|| settings(way));
@@ -322,7 +322,7 @@ fn the_choice_does_not_depend_on_threads() {
     }
     let chosen = one.trial().expect("a trial");
     let best = one.trials.iter().all(|trial| trial.squared_error >= chosen.squared_error);
-    assert!(best || chosen.way == Way::USUAL, "{}", chosen.way.name());
+    assert!(best || chosen.way == Strategy::USUAL, "{}", chosen.way.name());
     let bits = |choice: &Choice| -> Vec<_> {
         choice.weights.iter().map(|w| (w.effect, w.energy.map(f64::to_bits), w.saved.map(f64::to_bits))).collect()
     };
@@ -363,7 +363,7 @@ fn what_is_left_out_is_weighed_too() {
         let camera = scene.camera(&square(24)).expect("a camera");
         let make = |way| {
             let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
-            (way == Way::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
+            (way == Strategy::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
         };
         choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").weights
     };
@@ -473,18 +473,18 @@ fn caustics_are_left_to_guided_light_paths() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.5), DVec3::new(0.0, 0.05, 0.0), 50.0));
     let scene = build(description);
     let choice = auto(&scene, 2, 20_000);
-    assert!(choice.trials.is_empty() && choice.way == Way::FOCUSED, "{}", choice.way.name());
+    assert!(choice.trials.is_empty() && choice.way == Strategy::FOCUSED, "{}", choice.way.name());
     let camera = scene.camera(&square(24)).expect("a camera");
     let light = |way| {
         let settings = Settings { iterations: Some(16), ..Settings::of(way) };
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         rendered.pixels.iter().map(|pixel| pixel.parts.caustic.element_sum()).sum::<f64>()
     };
-    let (guided, unguided) = (light(Way::FOCUSED), light(Way::USUAL));
+    let (guided, unguided) = (light(Strategy::FOCUSED), light(Strategy::USUAL));
     println!("{guided:.3e} of caustics by guided light paths, {unguided:.3e} by others");
     assert!(guided > 0.0 && unguided < 0.2 * guided);
     let unguided = auto_among(&scene, 2, 20_000, |way| !way.guided);
-    assert_eq!(unguided.way, Way::USUAL);
+    assert_eq!(unguided.way, Strategy::USUAL);
 }
 
 /// What a scene does not call for is not tried, and a short render tries nothing.
@@ -506,5 +506,5 @@ fn only_what_is_called_for_is_tried() {
     assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);
     assert!(saved(Effect::Direct) > Some(0.0) && saved(Effect::Direct) < whole, "{:?}", choice.weights);
     let short = auto(&glass_room(), 2, 2);
-    assert!(short.trials.is_empty() && short.way == Way::FOCUSED);
+    assert!(short.trials.is_empty() && short.way == Strategy::FOCUSED);
 }

@@ -21,8 +21,8 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
-    Bidirectional, Eye, EyeMeasure, Indirect, Left, LightPass, LightVertices, MediumVertex, Meets, MergeLevels, Next,
-    PathStart, Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
+    Bidirectional, Deposits, Eye, EyeMeasure, Indirect, LightPass, LightVertices, MediumVertex, Meets, MergeLevels,
+    Next, PathStart, Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -474,7 +474,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         let pixel = (index % SIZE, index / SIZE);
         let arena = Bump::new();
         let mut vertices = LightVertices::new_in(&arena);
-        let (mut left, mut by_light, mut by_eye) = (Left::default(), Said::default(), Said::default());
+        let (mut left, mut by_light, mut by_eye) = (Deposits::default(), Said::default(), Said::default());
         shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
         let meets = Meets { vertices: &vertices, photons: Some(&map), levels: &levels };

@@ -8,9 +8,9 @@ use caustique::estimator::InitialBandwidth;
 use caustique::estimator::bandwidth::SCREEN_CAP;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
-use caustique::finish::{Choice, Denoiser, Finish};
+use caustique::finish::{Denoiser, DenoiserChoice, Finish};
 use caustique::pipeline::sized;
-use caustique::render::auto::Way;
+use caustique::render::auto::Strategy;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
@@ -372,9 +372,9 @@ impl Job {
     }
 
     /// The way to render that the options ask for; with auto that which needs no trial.
-    pub fn way(&self) -> Way {
-        let indirect = self.indirect.map_or(Way::GATHERING.indirect, Into::into);
-        Way { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
+    pub fn way(&self) -> Strategy {
+        let indirect = self.indirect.map_or(Strategy::GATHERING.indirect, Into::into);
+        Strategy { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 
     /// What auto's pilots are finished with: as the render, but for a network, and on one of several machines by our own denoiser, whose pictures are the same on all.
@@ -383,15 +383,15 @@ impl Job {
     /// A library that was asked for by name is missing.
     pub fn pilot_finish(&self) -> Result<Finish> {
         let choice = match self.finish.denoise.into() {
-            _ if self.no_combine => Choice::None,
-            Choice::Auto | Choice::Oidn if self.shard.is_some() => Choice::Own,
+            _ if self.no_combine => DenoiserChoice::None,
+            DenoiserChoice::Auto | DenoiserChoice::Oidn if self.shard.is_some() => DenoiserChoice::Own,
             asked => asked,
         };
         Ok(Finish::new(Denoiser::open(choice)?.0, None))
     }
 
     /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out.
-    pub fn allowed(&self, way: Way, size: (u32, u32)) -> Option<Settings> {
+    pub fn allowed(&self, way: Strategy, size: (u32, u32)) -> Option<Settings> {
         let guide = match self.guide {
             None => true,
             Some(Switch::On) => way.guided || !way.method.guides(),
@@ -405,7 +405,7 @@ impl Job {
         allowed.map(|settings| sized(settings, self.photons, size))
     }
 
-    fn settings_of(&self, way: Way) -> Result<Settings> {
+    fn settings_of(&self, way: Strategy) -> Result<Settings> {
         let method = way.method;
         let radius_rule = match (self.radius_rule, method) {
             (Some(RadiusRule::Local), _) | (None, render::Method::Ppm) => render::RadiusRule::Local,

@@ -13,7 +13,7 @@ enum First {
 
 /// A path so far, from the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sight {
+pub struct EyeSuffix {
     first: First,
     /// Anything has happened.
     begun: bool,
@@ -33,9 +33,9 @@ pub struct Sight {
     glint: bool,
 }
 
-impl Sight {
+impl EyeSuffix {
     /// Nothing has happened yet.
-    pub const START: Sight = Sight {
+    pub const START: EyeSuffix = EyeSuffix {
         first: First::Nothing,
         begun: false,
         alone: false,
@@ -50,7 +50,7 @@ impl Sight {
     /// It goes on.
     #[must_use]
     #[inline]
-    pub fn then(self, event: Event) -> Sight {
+    pub fn then(self, event: Event) -> EyeSuffix {
         let clear = self.first == First::Nothing;
         let narrow = event.is_narrow();
         let first = match (self.first, event) {
@@ -62,7 +62,7 @@ impl Sight {
         };
         let sharp = event == Event::Sharp;
         let marks = self.spreads == 0 && (sharp || !narrow);
-        Sight {
+        EyeSuffix {
             first,
             begun: true,
             alone: clear && first != First::Nothing,
@@ -102,10 +102,10 @@ impl Sight {
 
     /// The class if the rest is a path from a light.
     #[inline]
-    pub fn receives(self, beam: Beam) -> PathClass {
+    pub fn receives(self, beam: LightPrefix) -> PathClass {
         let mut sight = self;
         for _ in 0..beam.spreads() {
-            sight = sight.then(if beam.0 & Beam::MEDIUM != 0 { Event::Medium } else { Event::Broad });
+            sight = sight.then(if beam.0 & LightPrefix::MEDIUM != 0 { Event::Medium } else { Event::Broad });
         }
         match beam.tail() {
             Tail::None => sight.lit(false),
@@ -155,30 +155,30 @@ enum Tail {
 /// A path so far, from a light. A byte, for photons: two bits of what is next to the light (`Tail`), two that count broad lobes and media up to two,
 /// one set where there is one and it is a medium, one of the light without size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Beam(u8);
+pub struct LightPrefix(u8);
 
-impl Beam {
+impl LightPrefix {
     const MEDIUM: u8 = 1 << 4;
     const SIZELESS: u8 = 1 << 5;
 
     /// How many there can be.
     pub const COUNT: usize = 1 << 6;
 
-    /// Below [`Beam::COUNT`].
+    /// Below [`LightPrefix::COUNT`].
     #[inline]
     pub fn index(self) -> usize {
-        usize::from(self.0) % Beam::COUNT
+        usize::from(self.0) % LightPrefix::COUNT
     }
 
     /// From a light that has a size, by narrow lobes alone.
-    pub const FOCUSED: Beam = Beam(Tail::Narrow as u8);
+    pub const FOCUSED: LightPrefix = LightPrefix(Tail::Narrow as u8);
     /// The same, and then by a broad lobe.
-    pub const SCATTERED: Beam = Beam(Tail::Narrow as u8 | 1 << 2);
+    pub const SCATTERED: LightPrefix = LightPrefix(Tail::Narrow as u8 | 1 << 2);
 
     /// Straight from a light.
     #[inline]
-    pub fn start(sizeless: bool) -> Beam {
-        Beam(if sizeless { Beam::SIZELESS } else { 0 })
+    pub fn start(sizeless: bool) -> LightPrefix {
+        LightPrefix(if sizeless { LightPrefix::SIZELESS } else { 0 })
     }
 
     #[inline]
@@ -199,11 +199,11 @@ impl Beam {
     /// It goes on.
     #[must_use]
     #[inline]
-    pub fn then(self, event: Event) -> Beam {
-        let (tail, sizeless) = (self.tail(), self.0 & Beam::SIZELESS);
+    pub fn then(self, event: Event) -> LightPrefix {
+        let (tail, sizeless) = (self.tail(), self.0 & LightPrefix::SIZELESS);
         if !event.is_narrow() {
-            let medium = if self.spreads() == 0 && event == Event::Medium { Beam::MEDIUM } else { 0 };
-            return Beam(tail as u8 | (self.spreads() + 1).min(2) << 2 | medium | sizeless);
+            let medium = if self.spreads() == 0 && event == Event::Medium { LightPrefix::MEDIUM } else { 0 };
+            return LightPrefix(tail as u8 | (self.spreads() + 1).min(2) << 2 | medium | sizeless);
         }
         if self.spreads() > 0 {
             return self;
@@ -215,6 +215,6 @@ impl Beam {
             (Tail::Delta, Event::Sharp) => Tail::Glint,
             (tail, _) => tail,
         };
-        Beam(tail as u8 | sizeless)
+        LightPrefix(tail as u8 | sizeless)
     }
 }

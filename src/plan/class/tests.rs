@@ -78,8 +78,9 @@ fn halves_tell_the_class_of_the_whole() {
             let whole = PathClass::of(path.iter().copied(), sizeless);
             // Where they meet is a vertex with a lobe that is not delta.
             for (at, _) in path.iter().enumerate().filter(|(_, event)| !matches!(event, Event::Clear | Event::Mirror)) {
-                let sight = path[..=at].iter().fold(Sight::START, |sight, event| sight.then(*event));
-                let beam = path[at + 1..].iter().rev().fold(Beam::start(sizeless), |beam, event| beam.then(*event));
+                let sight = path[..=at].iter().fold(EyeSuffix::START, |sight, event| sight.then(*event));
+                let beam =
+                    path[at + 1..].iter().rev().fold(LightPrefix::start(sizeless), |beam, event| beam.then(*event));
                 assert_eq!(sight.receives(beam), whole, "{} {sizeless} at {at}", letters(&path));
             }
         }
@@ -91,7 +92,7 @@ fn nothing_is_ahead_that_was_not_told() {
     for path in paths(6) {
         for sizeless in [false, true] {
             let class = PathClass::of(path.iter().copied(), sizeless);
-            let mut sight = Sight::START;
+            let mut sight = EyeSuffix::START;
             for event in &path {
                 assert!(sight.ahead().has(class), "{}", letters(&path));
                 sight = sight.then(*event);
@@ -99,7 +100,7 @@ fn nothing_is_ahead_that_was_not_told() {
             assert!(sight.ahead().has(class), "{}", letters(&path));
         }
     }
-    let caustic = Sight::START.then(Event::Broad).then(Event::Clear);
+    let caustic = EyeSuffix::START.then(Event::Broad).then(Event::Clear);
     assert!(!caustic.ahead().has(PathClass::Sds) && !caustic.ahead().has(PathClass::Reflection));
 }
 

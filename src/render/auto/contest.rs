@@ -5,7 +5,7 @@
 //! candidates, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
-use super::Way;
+use super::Strategy;
 use super::trial::WORST;
 use crate::finish::told::{self, Judged};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
@@ -28,7 +28,7 @@ const TOLD: f64 = 2.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
     /// The candidate.
-    pub way: Way,
+    pub way: Strategy,
     /// relMSE without the worst pixels that the finished picture is expected to have; infinite where nothing was seen.
     pub squared_error: f64,
     /// Counted core-seconds of an iteration of the whole picture.
@@ -41,7 +41,7 @@ pub struct Trial {
 
 /// A candidate being tried.
 pub(super) struct Candidate<'a> {
-    way: Way,
+    way: Strategy,
     session: Session<'a>,
     cost: Cost,
     /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what comes before iterations.
@@ -71,7 +71,11 @@ impl Trial {
 impl<'a> Candidate<'a> {
     /// Nothing done yet but what comes before iterations. `count` counts work with the guide that is learnt here, if any, and says what an
     /// iteration costs in the small picture and the whole one.
-    pub fn new(stage: &'a Stage<'a>, way: Way, count: impl Fn(Option<&Guide>) -> (Cost, f64, f64)) -> Candidate<'a> {
+    pub fn new(
+        stage: &'a Stage<'a>,
+        way: Strategy,
+        count: impl Fn(Option<&Guide>) -> (Cost, f64, f64),
+    ) -> Candidate<'a> {
         let session = Session::new(stage);
         let (cost, once, whole) = count(session.guide());
         Candidate { way, session, cost, once, whole, spent: 0.0 }
@@ -137,18 +141,18 @@ fn judges(shown: &[Option<Shown>]) -> Option<([Vec<[f32; 3]>; 2], &Shown)> {
 }
 
 /// What a candidate is expected to leave, by pixel; `None` where nothing was seen.
-struct Left(Option<Vec<Judged>>);
+struct Expected(Option<Vec<Judged>>);
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
     values.sum::<f64>() / count
 }
 
-impl Left {
+impl Expected {
     /// Carries what was told of a candidate's half, and of either quarter of it, on to `more` times the half's iterations, as the power of
     /// their number that the mean errors show. It is linear in both, so that the power's own noise, which grows with the logarithm of
     /// `more`, is in what it is told to be worth.
-    fn carried(half: &[Judged], quarters: [&[Judged]; 2], more: f64) -> Left {
+    fn carried(half: &[Judged], quarters: [&[Judged]; 2], more: f64) -> Expected {
         let of = |pixels: &[Judged]| mean(pixels.iter().map(|pixel| pixel.error));
         let (h, q) = (of(half), 0.5 * (of(quarters[0]) + of(quarters[1])));
         let more = more.max(1.0);
@@ -168,7 +172,7 @@ impl Left {
                 pulls: std::array::from_fn(|c| carried(half.pulls[c], a.pulls[c], b.pulls[c])),
             }
         };
-        Left(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
+        Expected(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
     }
 
     fn squared_error(&self) -> f64 {
@@ -177,7 +181,7 @@ impl Left {
     }
 
     /// How much more it leaves than another, and the standard error that the judges' noise gives that: both were judged by the same.
-    fn more_than(&self, other: &Left) -> (f64, f64) {
+    fn more_than(&self, other: &Expected) -> (f64, f64) {
         let (Some(pixels), Some(others)) = (&self.0, &other.0) else {
             return (if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY }, 0.0);
         };
@@ -188,13 +192,13 @@ impl Left {
     }
 
     /// It may still turn out no worse than the best.
-    fn is_open(&self, best: &Left) -> bool {
+    fn is_open(&self, best: &Expected) -> bool {
         let (more, noise) = self.more_than(best);
         more < ((UNCLEAR - 1.0) * best.squared_error()).max(TOLD * noise)
     }
 
     /// By the judges' noise, and not by a few pixels alone, in which chance has put a splotch.
-    fn is_clearly_worse(&self, than: &Left) -> bool {
+    fn is_clearly_worse(&self, than: &Expected) -> bool {
         let (Some(pixels), Some(others)) = (&self.0, &than.0) else { return self.0.is_none() };
         let (more, noise) = self.more_than(than);
         let square = |(a, b): (&Judged, &Judged)| (a.error - b.error).powi(2);
@@ -212,7 +216,7 @@ pub(super) fn hold(
     stop: &dyn Fn() -> bool,
 ) -> Vec<Trial> {
     let all = candidates.len();
-    let least = |left: &[Left], open: &[bool]| {
+    let least = |left: &[Expected], open: &[bool]| {
         let open = (0..all).filter(|&k| open[k]);
         open.min_by(|&a, &b| left[a].squared_error().total_cmp(&left[b].squared_error())).unwrap_or(0)
     };
@@ -234,10 +238,10 @@ pub(super) fn hold(
         left = both.map(|((first, second), open)| if *open { second } else { first }).collect();
     }
     let best = least(&left, &open);
-    let usual = candidates.iter().position(|candidate| candidate.way == Way::USUAL);
+    let usual = candidates.iter().position(|candidate| candidate.way == Strategy::USUAL);
     let usual = usual.filter(|&usual| open[usual] && !left[usual].is_clearly_worse(&left[best]));
     let chosen = usual.unwrap_or(best);
-    let trial = |(index, (candidate, left)): (usize, (&Candidate<'_>, &Left))| {
+    let trial = |(index, (candidate, left)): (usize, (&Candidate<'_>, &Expected))| {
         let Candidate { way, cost, whole, .. } = *candidate;
         let squared_error = left.squared_error();
         Trial { way, squared_error, seconds_per_iteration: whole, chosen: index == chosen, cost }
@@ -246,16 +250,16 @@ pub(super) fn hold(
 }
 
 /// What all are expected to leave after `budget` core-seconds.
-fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, budget: f64) -> Vec<Left> {
+fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, budget: f64) -> Vec<Expected> {
     let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
     let judged = judges(&shown);
-    let left = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Left> {
+    let left = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Expected> {
         let (shown, ([a, b], worth)) = (shown.as_ref()?, judged.as_ref()?);
         let of = |picture: &[[f32; 3]]| told::judge(picture, [a, b], &worth.finished);
         let earlier = shown.earlier.each_ref().map(|picture| of(picture));
         // In the render's iterations over those of the half; the least number of iterations may have cost more than the share.
         let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);
-        Some(Left::carried(&of(&shown.finished), [&earlier[0], &earlier[1]], more))
+        Some(Expected::carried(&of(&shown.finished), [&earlier[0], &earlier[1]], more))
     };
-    candidates.iter().zip(&shown).map(|(c, shown)| left(c, shown).unwrap_or(Left(None))).collect()
+    candidates.iter().zip(&shown).map(|(c, shown)| left(c, shown).unwrap_or(Expected(None))).collect()
 }

@@ -28,7 +28,7 @@ use weights::Weighed;
 
 /// A way to render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Way {
+pub struct Strategy {
     /// How light is found.
     pub method: Method,
     /// What photons bring, where they are gathered.
@@ -37,19 +37,19 @@ pub struct Way {
     pub guided: bool,
 }
 
-impl Way {
+impl Strategy {
     /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is left to a
     /// technique that finds it badly.
-    pub const USUAL: Way = Way::plain(Method::Vcm);
+    pub const USUAL: Strategy = Strategy::plain(Method::Vcm);
     /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where others would have found the
     /// glass, and without which it is hardly found where it is small.
-    pub const FOCUSED: Way = Way { guided: true, ..Way::USUAL };
+    pub const FOCUSED: Strategy = Strategy { guided: true, ..Strategy::USUAL };
     /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
-    pub const GATHERING: Way = Way::plain(Method::Sppm);
+    pub const GATHERING: Strategy = Strategy::plain(Method::Sppm);
 
     /// A method with light paths as they come.
-    pub const fn plain(method: Method) -> Way {
-        Way { method, indirect: Indirect::Photons, guided: false }
+    pub const fn plain(method: Method) -> Strategy {
+        Strategy { method, indirect: Indirect::Photons, guided: false }
     }
 
     /// A way in words.
@@ -67,7 +67,7 @@ pub struct Choice {
     /// Settings of the render.
     pub settings: Settings,
     /// The way.
-    pub way: Way,
+    pub way: Strategy,
     /// All that were tried; none where the render is too short.
     pub trials: Vec<Trial>,
     /// What effects of light mean to the picture; none where the render is too short.
@@ -90,18 +90,18 @@ impl Choice {
 pub fn choose(
     (scene, camera): (&Scene, &Camera),
     finish: &mut Finish,
-    make: impl Fn(Way) -> Option<Settings>,
+    make: impl Fn(Strategy) -> Option<Settings>,
     stop: impl Fn() -> bool,
 ) -> Option<Choice> {
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let gathering = make(Way::GATHERING)?;
+    let gathering = make(Strategy::GATHERING)?;
     let pilot = Pilot::new(scene, camera, &gathering);
     let (weighed, weighing) = pilot.weigh();
     let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
     let chosen = trials.iter().find(|trial| trial.chosen);
     let untried = || {
-        let focused = pilot::focuses(scene).then_some(Way::FOCUSED);
-        focused.into_iter().chain([Way::USUAL]).find(|way| make(*way).is_some()).unwrap_or(Way::GATHERING)
+        let focused = pilot::focuses(scene).then_some(Strategy::FOCUSED);
+        focused.into_iter().chain([Strategy::USUAL]).find(|way| make(*way).is_some()).unwrap_or(Strategy::GATHERING)
     };
     let way = chosen.map_or_else(untried, |chosen| chosen.way);
     let mut settings = make(way)?;
@@ -114,7 +114,7 @@ pub fn choose(
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.
-pub fn counted_cost(scene: &Scene, camera: &Camera, way: Way, settings: &Settings) -> f64 {
+pub fn counted_cost(scene: &Scene, camera: &Camera, way: Strategy, settings: &Settings) -> f64 {
     let (width, height) = camera.size();
     let stage = Stage::new(scene, camera, settings);
     let session = Session::new(&stage);

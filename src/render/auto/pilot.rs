@@ -1,6 +1,6 @@
 //! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
 
-use super::Way;
+use super::Strategy;
 use super::contest::{self, Candidate, Trial};
 use super::trial;
 use super::weights::{self, Weighed};
@@ -38,19 +38,22 @@ pub(super) fn focuses(scene: &Scene) -> bool {
 
 /// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors focus light it is one: what connections and
 /// photons leave out there a pilot is too short to miss, and would praise them for it.
-fn ways(scene: &Scene, make: &impl Fn(Way) -> Option<Settings>) -> Vec<(Way, Settings)> {
-    let with_settings = |way: &Way| make(*way).map(|settings| (*way, settings));
+fn ways(scene: &Scene, make: &impl Fn(Strategy) -> Option<Settings>) -> Vec<(Strategy, Settings)> {
+    let with_settings = |way: &Strategy| make(*way).map(|settings| (*way, settings));
     if focuses(scene) {
-        return [Way::FOCUSED, Way::USUAL].iter().find_map(with_settings).into_iter().collect();
+        return [Strategy::FOCUSED, Strategy::USUAL].iter().find_map(with_settings).into_iter().collect();
     }
-    [Way::USUAL, Way::plain(Method::Path), Way::plain(Method::Bdpt)].iter().filter_map(with_settings).collect()
+    [Strategy::USUAL, Strategy::plain(Method::Path), Strategy::plain(Method::Bdpt)]
+        .iter()
+        .filter_map(with_settings)
+        .collect()
 }
 
 /// What a pilot is of.
 pub(super) struct Pilot<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
-    /// Settings of [`Way::GATHERING`].
+    /// Settings of [`Strategy::GATHERING`].
     gathering: &'a Settings,
     pub cost: Cost,
     /// Pixels of the whole picture.
@@ -66,7 +69,7 @@ impl<'a> Pilot<'a> {
         let cost = Cost::count(scene, camera, gathering, None);
         let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let work = n as f64 * cost.of(Way::GATHERING, gathering, pixels);
+                let work = n as f64 * cost.of(Strategy::GATHERING, gathering, pixels);
                 time.map_or(work, |seconds| work.min(seconds * CORES))
             }
             (None, Some(seconds)) => seconds * CORES,
@@ -83,7 +86,7 @@ impl<'a> Pilot<'a> {
     /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is too short, only those of light are weighed, or none.
     pub fn weigh(&self) -> (Vec<Weighed>, f64) {
         let settings = weights::settings(self.gathering, trial::PHOTONS);
-        let once = self.cost.of(Way::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
+        let once = self.cost.of(Strategy::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
         let most = WEIGHING * SHARE * self.budget;
         let mut taken = weights::PICTURES as f64 * once;
         if taken > most {
@@ -107,7 +110,7 @@ impl<'a> Pilot<'a> {
         &self,
         weighing: f64,
         finish: &mut Finish,
-        make: &impl Fn(Way) -> Option<Settings>,
+        make: &impl Fn(Strategy) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
         let Pilot { scene, camera, gathering, cost, pixels, budget } = *self;
@@ -146,8 +149,8 @@ impl<'a> Pilot<'a> {
 
     /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too little for the smallest picture; `None` where even that takes
     /// more than `most`.
-    fn size(&self, ways: &[(Way, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
-        let once = |way: &Way, settings: &Settings, pixels: f64| {
+    fn size(&self, ways: &[(Strategy, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
+        let once = |way: &Strategy, settings: &Settings, pixels: f64| {
             self.cost.of(*way, &trial::settings(settings, pixels / self.pixels), pixels)
         };
         let dearest = |pixels: f64| ways.iter().map(|(way, settings)| once(way, settings, pixels)).fold(0.0, f64::max);

@@ -4,7 +4,7 @@
 //! narrow lobes show, and caustics seen in mirrors and glass. What is a property of the scene is told by a picture of the scene without it. Squares are products of two
 //! halves of the iterations, whose noise is not the same: what they have in common is the light.
 
-use super::Way;
+use super::Strategy;
 use super::trial::{self, WORST, mean, scale, values};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
@@ -205,11 +205,11 @@ pub(super) fn weigh(
 
 impl Weighed {
     /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is of the render with its guide, `usual` without.
-    pub fn saving(self, [cost, usual]: [&Cost; 2], way: Way, settings: &Settings, pixels: f64) -> Weight {
+    pub fn saving(self, [cost, usual]: [&Cost; 2], way: Strategy, settings: &Settings, pixels: f64) -> Weight {
         let saved = match self.without {
             // No guide was learnt without the effect: of unguided paths it tells the share.
             Some(without) => {
-                let unguided = Way { guided: false, ..way };
+                let unguided = Strategy { guided: false, ..way };
                 let [with, without] = [usual, &without].map(|cost| cost.of(unguided, settings, pixels));
                 (1.0 - without / with).max(0.0) * cost.of(way, settings, pixels)
             }
@@ -220,7 +220,7 @@ impl Weighed {
 }
 
 /// Core-seconds of an iteration that leaving an effect of light out would save.
-fn saved(cost: &Cost, (way, settings): (Way, &Settings), effect: Effect, pixels: f64) -> f64 {
+fn saved(cost: &Cost, (way, settings): (Strategy, &Settings), effect: Effect, pixels: f64) -> f64 {
     // Of an effect that is left out: what it would cost.
     let of = ClassSet::of(effect);
     let [with, without] = [settings.classes.and(of), settings.classes & of.complement()]

@@ -2,7 +2,7 @@
 
 use super::room;
 use caustique::bsdf::{LobeSet, Transport};
-use caustique::plan::{Beam, Event, Owner, PathClass, Search, Sight};
+use caustique::plan::{Event, EyeSuffix, LightPrefix, Owner, PathClass, Search};
 use caustique::random::{Domain, Stream};
 use caustique::scene::{Scene, gltf};
 use caustique::transport::{
@@ -187,8 +187,8 @@ fn random_paths_have_one_class_and_one_owner() {
         *numbers.entry(class).or_insert(0u32) += 1;
         // From both sides, wherever they meet.
         for (at, _) in path.char_indices().filter(|(_, c)| "SBV".contains(*c)) {
-            let sight = path[..=at].chars().map(event).fold(Sight::START, Sight::then);
-            let beam = path[at + 1..].chars().rev().map(event).fold(Beam::start(*sizeless), Beam::then);
+            let sight = path[..=at].chars().map(event).fold(EyeSuffix::START, EyeSuffix::then);
+            let beam = path[at + 1..].chars().rev().map(event).fold(LightPrefix::start(*sizeless), LightPrefix::then);
             assert_eq!(sight.receives(beam), class, "{path} {sizeless} at {at}");
         }
     }
