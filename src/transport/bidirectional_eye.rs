@@ -1,14 +1,17 @@
 //! Eye paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass before.
 
-use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Technique, Trail};
+use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
-use super::eye::{Eye, EyeMeasure, Features, FirstHit};
+use super::eye::{Eye, EyeMeasure, Features};
+use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
-use super::segment::token;
+use super::segment::{FirstHit, token};
 use super::shares::{connected, shares, wanted};
-use super::site::{MediumVertex, ScatterPoint};
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use super::site::ScatterPoint;
+use super::trail::Trail;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};

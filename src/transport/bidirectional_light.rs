@@ -1,14 +1,16 @@
 //! Light paths of the bidirectional methods: what one leaves behind.
 
-use super::bidirectional::{Bidirectional, LightVertex, MergeLevels, Record, Scatterer, Technique};
+use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::eye::EyeMeasure;
 use super::light::LightPass;
+use super::light_vertex::{LightVertex, Scatterer};
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::segment::token;
 use super::shares::{shares, wanted};
-use super::site::{MediumVertex, ScatterPoint};
-use super::walk::{Next, Scattered, Vertex, Visitor, walk};
+use super::site::ScatterPoint;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::walk::walk;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, is_lit};

@@ -18,13 +18,13 @@ use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
-use super::segment::{PrecomputedHit, token};
+use super::segment::{FirstHit, PrecomputedHit, token};
 use super::shares::leads;
-use super::site::MediumVertex;
 use super::site::ScatterPoint;
 use super::surroundings::Around;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::volume::Volume;
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::light::{EmissionDensity, Receiver};
@@ -47,15 +47,6 @@ pub struct Features {
     pub normal: Vec3,
     /// Distance along the path.
     pub depth: f32,
-}
-
-/// The first hit of an eye path.
-#[derive(Clone, Copy, Debug)]
-pub struct FirstHit {
-    /// World position.
-    pub p: Vec3,
-    /// Index of the instance.
-    pub instance: u32,
 }
 
 /// Everything one eye path measures. Radiance per channel.

@@ -11,8 +11,7 @@
 
 use super::direct::balance;
 use super::segment::{MediumArrival, Passage, Span, Through};
-use super::site::MediumVertex;
-use super::walk::{Scattered, Visitor};
+use super::vertex::{MediumVertex, Scattered, Visitor};
 use crate::math::{Rgb, Vec3};
 use crate::medium::{Collision, Equiangular, Fate, Flight};
 use crate::random::{Draws, Purpose};

@@ -1,7 +1,7 @@
 //! Photons gathered at a vertex, eight at a time.
 
 use super::bandwidths::{Counter, Found, MAX_LEVELS, lane};
-use super::walk::Vertex;
+use super::vertex::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
 use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};

@@ -2,9 +2,9 @@
 
 use super::eye::Eye;
 use super::light::LightPass;
-use super::site::MediumVertex;
 use super::surroundings::Surroundings;
-use super::walk::{Next, Scattered, Vertex, Visitor, walk};
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::walk::walk;
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Guide;
 use crate::math::Vec3;

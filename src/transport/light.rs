@@ -2,9 +2,9 @@
 
 use super::eye::Indirect;
 use super::segment::PrecomputedHit;
-use super::site::MediumVertex;
 use super::surroundings::Surroundings;
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{DVec3, Rgb, Vec2};

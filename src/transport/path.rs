@@ -3,13 +3,15 @@
 //! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
 //! (`direct_light` splits them), so that the two check each other.
 
-use super::bidirectional::{Record, Technique, Trail};
+use super::bidirectional::{Record, Technique};
 use super::bidirectional_eye::{look, look_in_medium};
 use super::eye::{Eye, EyeMeasure};
 use super::segment::token;
 use super::shares::{shares, wanted};
-use super::site::{MediumVertex, ScatterPoint};
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use super::site::ScatterPoint;
+use super::trail::Trail;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec3};

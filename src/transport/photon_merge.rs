@@ -3,7 +3,7 @@
 use super::bidirectional::{MergeLevels, Record, Technique};
 use super::mis::{self, Merges, MisState};
 use super::shares::Merged;
-use super::walk::Vertex;
+use super::vertex::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap, same_surface};

@@ -2,9 +2,11 @@
 
 use super::direct::direct_light;
 use super::eye::Eye;
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
+use crate::photon::NO_NORMAL;
 use crate::random::Stream;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
@@ -78,5 +80,39 @@ impl Eye<'_> {
         let mut find = Find { look, found: None, length: 0.0 };
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
         find.found
+    }
+}
+
+impl Eye<'_> {
+    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind, if there is one.
+    pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
+        let mut find = FindVolumePoint { found: None, length: 0.0 };
+        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
+        find.found
+    }
+}
+
+struct FindVolumePoint {
+    found: Option<GatherPoint>,
+    length: f32,
+}
+
+impl<'a> Visitor<'a> for FindVolumePoint {
+    const SPLITS: bool = true;
+
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
+        self.length += vertex.distance;
+        if let Some(found) = &mut self.found {
+            found.length = self.length;
+            return Next::Stop;
+        }
+        let lobes = vertex.shading.bsdf.lobes();
+        if lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
+    }
+
+    fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {
+        let length = self.length + vertex.met.distance;
+        self.found.get_or_insert(GatherPoint { p: vertex.met.p, ng: NO_NORMAL, length });
+        Next::Stop
     }
 }

@@ -9,7 +9,7 @@
 use super::bandwidths::MAX_LEVELS;
 use super::interior::Interior;
 use super::segment::token;
-use super::site::MediumVertex;
+use super::vertex::MediumVertex;
 use super::volume::Volume;
 use crate::geometry::Surface;
 use crate::math::{Frame, Vec3, warp};

@@ -1,6 +1,5 @@
 //! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
 
-use super::eye::FirstHit;
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
 use crate::material::MediumParameters;
@@ -29,6 +28,15 @@ pub struct Arrival {
     pub transmittance: Rgb,
     /// Length of the way.
     pub distance: f32,
+}
+
+/// The first hit of an eye path.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstHit {
+    /// World position.
+    pub p: Vec3,
+    /// Index of the instance.
+    pub instance: u32,
 }
 
 /// A vertex of a medium on a ray.

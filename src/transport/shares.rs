@@ -6,7 +6,7 @@
 //! A path drawn from all lobes of a vertex at once goes on as if by the lobe that drew it. That shares out light that it runs into in proportion to
 //! densities, not to the lobes' own values, which nearly agree: the sum of the classes is exact.
 
-use super::bidirectional::LightVertex;
+use super::light_vertex::LightVertex;
 use super::site::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};

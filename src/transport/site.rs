@@ -1,63 +1,17 @@
 //! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
 
 use super::interior::Interior;
-use super::segment::{Between, MediumArrival, ShadowRay, Start, shadow_ray};
-use super::walk::Vertex;
+use super::roulette::survival;
+use super::segment::{Between, ShadowRay, Start, shadow_ray};
+use super::vertex::{MediumVertex, Vertex};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::Receiver;
 use crate::math::{Rgb, Vec2, Vec3};
-use crate::medium::{Flight, HenyeyGreenstein};
+use crate::medium::HenyeyGreenstein;
 use crate::random::Draws;
 use crate::scene::Scene;
 use crate::scene::contact::Place;
 use crate::spectrum::Wavelength;
-
-/// A vertex of a path in a medium.
-pub struct MediumVertex {
-    /// What the walk has met.
-    pub met: MediumArrival,
-    /// Unit direction back along the path.
-    pub wo: Vec3,
-    /// Weight of the path up to here, the scattering coefficient included: what is left is to multiply by the phase function.
-    pub throughput: Rgb,
-    /// The same without the scattering coefficient: radiance that arrives, or flux times length for light paths.
-    pub arriving: Rgb,
-    /// Number of segments up to here.
-    pub depth: u32,
-    /// Origin of the last segment.
-    pub from: Vec3,
-    /// Random numbers of this vertex.
-    pub draws: Draws,
-    /// Densities of the last segment's flight.
-    pub flight: Flight,
-    /// Share of the light that the medium takes from rays through all of it; 1 where chance has brought the path here.
-    pub opacity: f32,
-    /// Share of next-event estimation that is this vertex's, where another is drawn for it (`flight.rs`).
-    pub next_event: f32,
-    /// The wavelength the path has taken.
-    pub wavelength: Option<Wavelength>,
-    pub(super) survival_scale: f32,
-}
-
-impl MediumVertex {
-    /// Where it scatters to.
-    #[inline]
-    pub fn phase(&self) -> HenyeyGreenstein {
-        self.met.medium.phase()
-    }
-
-    /// Share of light that is scattered, not absorbed.
-    pub fn albedo(&self) -> Rgb {
-        let sigma_t = self.met.medium.sigma_t();
-        Rgb::select(sigma_t.cmpgt(Rgb::ZERO), self.met.medium.sigma_s / sigma_t, Rgb::ZERO)
-    }
-
-    /// Which medium this is: the index of its material, or `u32::MAX` for the one that fills the scene.
-    #[inline]
-    pub fn medium_id(&self, scene: &Scene) -> u32 {
-        self.met.interior.material(scene).unwrap_or(u32::MAX)
-    }
-}
 
 /// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is broad.
 pub trait ScatterPoint {
@@ -327,6 +281,6 @@ impl ScatterPoint for MediumVertex {
     #[inline]
     fn survival(&self, set: LobeSet) -> f32 {
         let expected = if set.has(LobeSet::BROAD) { self.throughput.max_element() * self.survival_scale } else { 0.0 };
-        super::walk::survival(expected, self.depth)
+        survival(expected, self.depth)
     }
 }

@@ -5,15 +5,9 @@
 //! participating media using photon maps", (10), with the coefficient taken out of the photon\].
 
 use super::bandwidths::MAX_LEVELS;
-use super::eye::Eye;
-use super::probe::GatherPoint;
-use super::site::MediumVertex;
-use super::walk::{Next, PathStart, Scattered, Vertex, Visitor, walk};
-use crate::bsdf::{LobeSet, Transport};
+use super::vertex::MediumVertex;
 use crate::math::Rgb;
 use crate::photon::{Kernel, NO_NORMAL, Near, PhotonMap, VolumePhoton};
-use crate::random::Stream;
-use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
 /// The photons in media, and the bandwidths of an eye path's levels.
@@ -75,40 +69,6 @@ impl<'a> Volume<'a> {
             *sum *= vertex.throughput * (0.75 * FRAC_1_PI / (radius2 * radius2.sqrt()));
         }
         sums
-    }
-}
-
-impl Eye<'_> {
-    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind, if there is one.
-    pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
-        let mut find = FindVolumePoint { found: None, length: 0.0 };
-        walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);
-        find.found
-    }
-}
-
-struct FindVolumePoint {
-    found: Option<GatherPoint>,
-    length: f32,
-}
-
-impl<'a> Visitor<'a> for FindVolumePoint {
-    const SPLITS: bool = true;
-
-    fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
-        self.length += vertex.distance;
-        if let Some(found) = &mut self.found {
-            found.length = self.length;
-            return Next::Stop;
-        }
-        let lobes = vertex.shading.bsdf.lobes();
-        if lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
-    }
-
-    fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {
-        let length = self.length + vertex.met.distance;
-        self.found.get_or_insert(GatherPoint { p: vertex.met.p, ng: NO_NORMAL, length });
-        Next::Stop
     }
 }
 

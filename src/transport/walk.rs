@@ -3,26 +3,18 @@
 
 use super::flight::{Fly, Split};
 use super::interior::Interior;
+use super::roulette::late_survival;
 use super::segment::{Arrival, Attenuate, Clear, End, PrecomputedHit, Start, next_vertex, token};
-use super::site::{MediumVertex, ScatterPoint};
-use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
-use crate::geometry::Surface;
+use super::site::ScatterPoint;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
-use crate::random::{Draws, Purpose, Stream};
+use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::Place;
-use crate::spectrum::{Wavelength, WavelengthSample};
+use crate::spectrum::WavelengthSample;
 use bumpalo::Bump;
-
-/// After this many bounces even a path that loses nothing may end, so that light trapped between perfect mirrors ends
-/// without a limit on depth.
-const LATE: u32 = 64;
-/// After this many all but such light is gone.
-const TRAPPED: u32 = 1 << 16;
-
-/// Least probability of going on: keeps the weight of what survives bounded.
-const LEAST_SURVIVAL: f32 = 0.02;
 
 /// Where a path starts.
 #[derive(Clone, Copy, Debug)]
@@ -43,134 +35,6 @@ pub struct PathStart {
     pub channel: Option<usize>,
     /// The wavelength it takes if it meets dispersive glass.
     pub hue: WavelengthSample,
-}
-
-/// A vertex of a path on a surface. What it refers to by `'a` outlives the walk.
-pub struct Vertex<'v, 'a> {
-    /// The surface.
-    pub surface: &'v Surface,
-    /// How it scatters, seen along `wo`.
-    pub shading: &'v Shading<'a>,
-    /// Unit direction back along the path.
-    pub wo: Vec3,
-    /// Weight of the path up to here, before this vertex scatters.
-    pub throughput: Rgb,
-    /// Number of segments up to here: 1 at the first surface.
-    pub depth: u32,
-    /// Length of the last segment.
-    pub distance: f32,
-    /// Origin of the last segment.
-    pub from: Vec3,
-    /// The solids the path is in on the side of `wo`.
-    pub interior: Interior,
-    /// The solids behind the surface.
-    pub interior_behind: Interior,
-    /// Random numbers of this vertex.
-    pub draws: Draws,
-    /// Densities of the last segment's flight through media.
-    pub flight: Flight,
-    /// The wavelength the path has taken, here at the latest; its weight is in the throughput.
-    pub wavelength: Option<Wavelength>,
-    survival_scale: f32,
-}
-
-/// How the last vertex sent the path here.
-#[derive(Clone, Copy, Debug)]
-pub struct Scattered {
-    /// Class of the lobe.
-    pub lobe: LobeSet,
-    /// Density per solid angle of the direction, times the probability that the path went on and was not scattered by a medium on its way; for a
-    /// delta lobe meaningless.
-    pub pdf_w: f32,
-}
-
-/// What a visitor wants next.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Next {
-    /// End the path.
-    Stop,
-    /// Go on with a direction from these lobes.
-    Continue(LobeSet),
-    /// Go on with a direction from these lobes, which were chosen from several sets with this probability.
-    Choose(LobeSet, f32),
-}
-
-/// Receives the vertices of a walk.
-pub trait Visitor<'a> {
-    /// Share of its first weight down to which a path is spared roulette (but for what is trapped); below it goes on
-    /// with the probability of what it has left of that share.
-    const SPARED: f32 = 1.0;
-    /// The walk takes media by splitting (`flight.rs`) and does not scatter at their vertices.
-    const SPLITS: bool = false;
-    /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
-    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
-    /// As [`Visitor::surface`], in a medium that scatters. A walk that splits goes on whatever the answer.
-    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        let _ = (vertex, scattered);
-        Next::Stop
-    }
-    /// A second vertex in the same medium, of a walk that splits, at which nothing but its share of next-event estimation is to be measured.
-    #[inline]
-    fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
-        let _ = (vertex, scattered);
-    }
-    /// `sample` is drawn at `vertex`, and the path goes on.
-    #[inline]
-    fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
-        let _ = (vertex, sample);
-    }
-    /// As [`Visitor::scatter`], in a medium.
-    #[inline]
-    fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
-        let _ = (vertex, sample);
-    }
-    /// The path leaves the scene along `direction` with weight `throughput`; `flight`: densities of its way to infinity.
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {
-        let _ = (direction, throughput, scattered, flight);
-    }
-}
-
-impl Vertex<'_, '_> {
-    /// Probability that the walk goes on from here if the visitor asks for the lobes of `set`. PrecomputedHit before a direction
-    /// is drawn, so that MIS weights can use it.
-    #[inline]
-    pub fn survival(&self, set: LobeSet) -> f32 {
-        self.survival_chosen(set, 1.0)
-    }
-
-    /// The same if the visitor chooses these lobes with probability `chance`.
-    #[inline]
-    pub fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
-        let albedo = self.shading.albedo(set);
-        survival((self.throughput * albedo).max_element() * self.survival_scale / chance, self.depth)
-    }
-}
-
-/// Probability of going on where a path of `depth` keeps a share `expected` of its weight.
-#[inline]
-pub(super) fn survival(expected: f32, depth: u32) -> f32 {
-    // Written so that NaN ends the path.
-    let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
-    survival.min(late_survival(depth))
-}
-
-/// Probability of going on at most.
-///
-/// With `1 - c / n` at the `n`-th bounce a path gets there with `P(n) ~ n^-c`, and an estimate that finds `f(n)` on its
-/// way has the second moment `sum_mn f(m) f(n) / P(min(m, n))`. It is finite for whatever loses a share of itself at
-/// every bounce, whatever that share, unlike with a constant survival `s`, which must be above the albedo squared; and
-/// for c = 1/2 it grows as a logarithm only for what comes back out of a half space that absorbs nothing, `f(n) ~
-/// n^-3/2`. A trapped path then has 16 sqrt(n) bounces among the first n on average: with c = 2 from some n on, an end.
-#[inline]
-fn late_survival(depth: u32) -> f32 {
-    let c = if depth <= LATE {
-        return 1.0;
-    } else if depth <= TRAPPED {
-        0.5
-    } else {
-        2.0
-    };
-    1.0 - c / depth as f32
 }
 
 /// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond the scene is
