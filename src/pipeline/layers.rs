@@ -6,8 +6,8 @@ use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use crate::film::{Layer, LayerSet, Naming, Selection, describe, output as film};
 use crate::finish::finished_part;
 use crate::image::exr::Attributes;
-use crate::render::output::{Present, shape};
-use crate::render::{Rendered, Settings};
+use crate::render::output::shape;
+use crate::render::{Present, Rendered, Settings};
 use crate::scene::Scene;
 use rayon::prelude::*;
 

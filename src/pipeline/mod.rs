@@ -18,9 +18,11 @@ use crate::film::{LayerSet, Naming, Selection, output as film};
 use crate::finish::{Account, Finish, finished_part, reads};
 use crate::image::exr::{self, Attributes};
 use crate::plan::{Plan, Switches};
-use crate::render::auto::{self, Choice, Strategy};
-use crate::render::output::{Present, shape};
-use crate::render::{Clock, Control, Progress, Rendered, Settings, TechniquePicture, cpu_seconds, peak_memory};
+use crate::render::auto::{self, Choice};
+use crate::render::output::shape;
+use crate::render::{
+    Clock, Control, Present, Progress, Rendered, Settings, Strategy, TechniquePicture, cpu_seconds, peak_memory,
+};
 use crate::scene::{Scene, View};
 use serde_json::{Map, Value, json};
 

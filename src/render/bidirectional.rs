@@ -8,9 +8,9 @@
 //! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone, the other levels of the
 //! second. They share nothing but the photons, those of both light paths.
 
-use super::control::cpu_seconds;
-use super::drive::{Iterate, Work};
+use super::clock::cpu_seconds;
 use super::guiding::learnt;
+use super::iterate::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
 use super::techniques::{TechniquePicture, TilePictures, Watch, collect};

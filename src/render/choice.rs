@@ -2,7 +2,7 @@
 
 use super::bidirectional::Passes;
 use super::counting::Counting;
-use super::drive::Iterate;
+use super::iterate::Iterate;
 use super::method::Method;
 use super::pm::Pm;
 use super::settings::{KernelChoice, RadiusRule, Settings};

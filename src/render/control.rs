@@ -1,8 +1,7 @@
-//! Progress, stop conditions and history. The only clocks of a render are here and decide nothing but when to stop.
+//! Progress, stop conditions and history.
 
-use super::result::ErrorEstimate;
+use super::error_estimate::ErrorEstimate;
 use super::told::Told;
-use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
 /// What an observer wants after an iteration.
@@ -63,38 +62,4 @@ pub struct History {
     pub light_paths: u64,
     /// Estimated squared relative error, when two iterations are done.
     pub estimate: Option<ErrorEstimate>,
-}
-
-/// Wall clock since its making.
-#[derive(Clone, Copy, Debug)]
-pub struct Clock(std::time::Instant);
-
-impl Clock {
-    /// Starts now.
-    #[allow(clippy::disallowed_methods, reason = "progress and stop conditions are what clocks are for")]
-    pub fn start() -> Clock {
-        Clock(std::time::Instant::now())
-    }
-
-    /// Seconds since the start.
-    pub fn seconds(&self) -> f64 {
-        self.0.elapsed().as_secs_f64()
-    }
-}
-
-/// Processor time of the process in seconds.
-pub fn cpu_seconds() -> f64 {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-/// Peak resident memory of the process in bytes, from `/proc`; 0 where there is none.
-pub fn peak_memory() -> u64 {
-    let read = || -> Option<u64> {
-        let status = std::fs::read_to_string("/proc/self/status").ok()?;
-        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-        let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
-        Some(kib * 1024)
-    };
-    read().unwrap_or(0)
 }

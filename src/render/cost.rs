@@ -1,10 +1,10 @@
 //! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh cost`); choices depend
 //! on their ratios.
 
-use super::auto::Strategy;
 use super::method::Method;
-use super::output::Present;
+use super::present::Present;
 use super::settings::Settings;
+use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;

@@ -5,8 +5,8 @@
 //!
 //! An iteration depends on all before it, so shards cannot share them out.
 
-use super::control::cpu_seconds;
-use super::drive::{Iterate, Work};
+use super::clock::cpu_seconds;
+use super::iterate::{Iterate, Work};
 use super::method::Method;
 use super::result::Phases;
 use super::settings::Settings;

@@ -1,6 +1,6 @@
 //! What light paths will leave, told by a few of them before there is any memory for all.
 
-use super::output::Present;
+use super::present::Present;
 use super::settings::Settings;
 use super::sppm::trace_photons;
 use crate::camera::Camera;

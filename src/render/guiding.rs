@@ -6,10 +6,10 @@
 //!
 //! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once learnt, does not leave less, there is none.
 
-use super::auto::Strategy;
+use super::chunks::chunks;
 use super::cost::{Cost, GUIDED_START};
 use super::settings::Settings;
-use super::sppm::chunks;
+use super::strategy::Strategy;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};

@@ -1,11 +1,19 @@
 //! The methods, and what of a render's shape follows from the one chosen.
 
-use super::settings::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS};
 use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
 use crate::transport::Strategies;
 use serde::Serialize;
+
+/// Light paths per iteration: the papers' setting.
+pub const DEFAULT_PHOTONS: u32 = 100_000;
+/// Light paths of [`Method::Pm`], traced once.
+pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
+/// Neighbours whose distance is its bandwidth.
+pub const DEFAULT_MAP_KNN: usize = 100;
+/// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with one.
+pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
 /// How light is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

@@ -3,35 +3,42 @@
 pub mod auto;
 mod bidirectional;
 mod choice;
+mod chunks;
+mod clock;
 mod control;
 mod cost;
 mod counting;
 mod drive;
+mod error_estimate;
 mod forecast;
 mod guiding;
+mod iterate;
 mod method;
 pub mod output;
 mod pm;
+mod present;
 mod region;
 mod result;
 mod session;
 mod settings;
 mod sppm;
+mod strategy;
 mod techniques;
 mod tiles;
 mod told;
 mod volume;
 
-pub use control::{Clock, Control, History, Progress, StopReason, cpu_seconds, peak_memory};
+pub use clock::{Clock, Spent, cpu_seconds, peak_memory};
+pub use control::{Control, History, Progress, StopReason};
 pub use drive::render;
+pub use error_estimate::ErrorEstimate;
 pub use forecast::photons_per_path;
-pub use method::Method;
+pub use method::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
 pub use pm::PHOTON_BYTES;
-pub use result::{ErrorEstimate, Phases, Rendered};
-pub use session::{Session, Spent, Stage};
-pub use settings::{
-    DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS,
-    KernelChoice, Levels, RadiusRule, Settings, Shard,
-};
+pub use present::Present;
+pub use result::{Phases, Rendered};
+pub use session::{Session, Stage};
+pub use settings::{DEFAULT_ITERATIONS, DEFAULT_MAP_MEMORY, KernelChoice, Levels, RadiusRule, Settings, Shard};
+pub use strategy::Strategy;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
 pub use told::Told;

@@ -2,6 +2,7 @@
 
 use super::control::StopReason;
 use super::method::Method;
+use super::present::Present;
 use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
@@ -9,44 +10,7 @@ use crate::estimator::Pixel;
 use crate::estimator::rule::{memoryless::radius2_factor, volume::radius_factor};
 use crate::film::{LayerSet, output};
 use crate::photon::ByKind;
-use crate::plan::{ClassSet, Effect, PathClass};
-use crate::scene::Scene;
 use serde_json::{Map, Value, json};
-
-/// What of a scene decides which layers there are.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Present {
-    /// An environment shines.
-    pub environment: bool,
-    /// Media scatter.
-    pub volume: bool,
-    /// Mirrors, glass or gloss are there.
-    pub narrow_lobes: bool,
-}
-
-impl Present {
-    /// In `scene`.
-    pub fn of(scene: &Scene) -> Present {
-        Present {
-            environment: scene.lights.sky().environment.is_some(),
-            volume: scene.survey.scattering,
-            narrow_lobes: scene.survey.narrow_lobes,
-        }
-    }
-
-    /// Classes of light paths that there can be.
-    pub fn classes(self) -> ClassSet {
-        let mut absent = ClassSet::NONE;
-        if !self.volume {
-            absent = absent.and(ClassSet::of(Effect::Volume));
-        }
-        if !self.narrow_lobes {
-            let narrow = [Effect::Glossy, Effect::Caustic, Effect::Sds].map(ClassSet::of);
-            absent = narrow.into_iter().fold(absent, ClassSet::and).and(ClassSet::one(PathClass::IndirectFocus));
-        }
-        absent.complement()
-    }
-}
 
 /// What the layers of a render with these settings depend on after `iterations` of them.
 pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::Shape {

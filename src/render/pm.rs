@@ -10,9 +10,9 @@
 //! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the number of paths that were
 //! traced.
 
-use super::control::cpu_seconds;
-use super::drive::{Iterate, Work};
-use super::output::Present;
+use super::clock::cpu_seconds;
+use super::iterate::{Iterate, Work};
+use super::present::Present;
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::{keep_first_hit, trace_some};

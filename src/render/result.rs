@@ -1,6 +1,7 @@
 //! What a render leaves behind.
 
 use super::control::{History, StopReason};
+use super::error_estimate::ErrorEstimate;
 use super::method::Method;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
@@ -79,24 +80,6 @@ impl Rendered {
     /// Samples rejected as not finite.
     pub fn rejected(&self) -> u64 {
         self.pixels.iter().map(|p| u64::from(p.rejected)).sum()
-    }
-}
-
-/// The square of [`Rendered::relative_error`], and of what it is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ErrorEstimate {
-    /// Mean relative variance.
-    pub variance: f64,
-    /// Mean relative squared bias, not below zero.
-    pub squared_bias: f64,
-    /// Share of pixels of which nothing is known.
-    pub unknown: f64,
-}
-
-impl ErrorEstimate {
-    /// The relative error: the root of all parts together.
-    pub fn root(&self) -> f64 {
-        (self.variance + self.squared_bias + self.unknown).sqrt()
     }
 }
 

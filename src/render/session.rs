@@ -1,10 +1,13 @@
 //! A render that goes on one iteration at a time, so that several can take turns.
 
 use super::choice::passes;
-use super::control::{Clock, History, Progress, StopReason, cpu_seconds};
-use super::drive::Iterate;
+use super::clock::Spent;
+use super::control::{History, Progress, StopReason};
+use super::error_estimate::ErrorEstimate;
+use super::iterate::Iterate;
 use super::output;
-use super::result::{ErrorEstimate, Phases, Rendered, error_estimate};
+use super::present::Present;
+use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Levels, Settings};
 use crate::camera::Camera;
 use crate::error::Result;
@@ -50,26 +53,6 @@ impl<'a> Stage<'a> {
     /// Width and height of the picture (pixels).
     pub fn size(&self) -> (u32, u32) {
         self.camera.size()
-    }
-}
-
-/// Time that a render has taken: its own, not that of others between its iterations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spent {
-    /// Wall-clock seconds.
-    pub seconds: f64,
-    /// Processor seconds of the whole process.
-    pub cpu_seconds: f64,
-}
-
-impl Spent {
-    /// Does some work and adds the time it takes.
-    pub fn during<T>(&mut self, work: impl FnOnce() -> T) -> T {
-        let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-        let done = work();
-        self.seconds += clock.seconds();
-        self.cpu_seconds += cpu_seconds() - cpu_start;
-        done
     }
 }
 
@@ -223,7 +206,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// None: its pixels are as many as its size says.
     pub fn layers(&mut self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let present = output::Present::of(self.stage.scene);
+        let present = Present::of(self.stage.scene);
         let shape = output::shape(&self.stage.settings, self.done, present);
         output::layers(self.stage.camera.size(), &self.pixels, &self.passes.radii(), &shape, wanted)
     }
@@ -248,6 +231,18 @@ impl<'a> Session<'a> {
             phases: self.phases,
             history: self.history,
             stop,
+        }
+    }
+}
+
+impl Settings {
+    /// Seconds to go, when that can be told: after `done` of `total` iterations and `seconds`, of which the pilot took `pilot`.
+    pub(super) fn remaining(&self, done: u64, total: Option<u64>, seconds: f64, pilot: f64) -> Option<f64> {
+        let by_count = total.map(|n| (n - done) as f64 * (seconds - pilot) / done as f64);
+        let by_time = self.time.map(|t| (t - seconds).max(0.0));
+        match (by_count, by_time) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What a render is asked to do.
 
-use super::auto::Strategy;
-use super::method::Method;
-use super::output::Present;
-use super::session::Spent;
+use super::clock::Spent;
+use super::method::{DEFAULT_KNN, DEFAULT_PHOTONS, Method};
+use super::present::Present;
+use super::strategy::Strategy;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
@@ -16,16 +16,8 @@ use crate::transport::{Indirect, MAX_LEVELS};
 
 /// Iterations when no stop condition is given.
 pub const DEFAULT_ITERATIONS: u64 = 64;
-/// Light paths per iteration: the papers' setting.
-pub const DEFAULT_PHOTONS: u32 = 100_000;
-/// Light paths of [`Method::Pm`], traced once.
-pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
 /// Bytes that their photons may take.
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
-/// Neighbours whose distance is its bandwidth.
-pub const DEFAULT_MAP_KNN: usize = 100;
-/// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with one.
-pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
 /// Which iterations to render: those with `i mod count = index`, i from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,10 +3,11 @@
 //! An iteration traces light paths, builds a photon map, and then two eye paths per pixel that share nothing but
 //! the photons: one measures level 1, the other levels 2 and up, each set of levels with one query per vertex.
 
-use super::control::cpu_seconds;
-use super::drive::{Iterate, Work};
+use super::chunks::chunks;
+use super::clock::cpu_seconds;
 use super::guiding::learnt;
-use super::output::Present;
+use super::iterate::{Iterate, Work};
+use super::present::Present;
 use super::region::region;
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
@@ -27,9 +28,6 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Light paths per unit of work. Constant, so that the photons' order does not depend on threads.
-const CHUNK: u32 = 1024;
-
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
 pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Photons {
     trace_some(scene, surroundings, pass, 0..pass.paths())
@@ -40,11 +38,6 @@ pub(super) fn trace_some(scene: &Scene, surroundings: &Surroundings, pass: &Ligh
     trace_by(paths, |arena, index, photons| {
         light_path(scene, arena, surroundings, pass, index, photons);
     })
-}
-
-/// So many light paths in units of work.
-pub(super) fn chunks(paths: u32) -> impl IndexedParallelIterator<Item = Range<u32>> {
-    (0..paths).into_par_iter().step_by(CHUNK as usize).map(move |first| first..paths.min(first.saturating_add(CHUNK)))
 }
 
 /// Calls `light_path` for some paths; photons are in the order of paths.

@@ -2,7 +2,8 @@
 //!
 //! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the last line is JSON for `scripts/figures`.
 
-use caustique::render::auto::{Strategy, counted_cost};
+use caustique::render::Strategy;
+use caustique::render::auto::counted_cost;
 use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};

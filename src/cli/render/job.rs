@@ -10,7 +10,7 @@ use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use caustique::finish::{Denoiser, DenoiserChoice, Finish};
 use caustique::pipeline::sized;
-use caustique::render::auto::Strategy;
+use caustique::render::Strategy;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };

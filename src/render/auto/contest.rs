@@ -5,13 +5,13 @@
 //! candidates, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
-use super::Strategy;
 use super::trial::WORST;
 use crate::finish::told::{self, Judged};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
 use crate::light::Guide;
 use crate::render::cost::Cost;
 use crate::render::session::{Session, Stage};
+use crate::render::strategy::Strategy;
 use crate::stat::floor;
 use rayon::prelude::*;
 

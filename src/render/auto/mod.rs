@@ -11,56 +11,19 @@ mod pilot;
 mod trial;
 mod weights;
 
+pub use super::clock::{Clock, Spent, cpu_seconds};
 pub use contest::Trial;
 pub use weights::Weight;
 
-use super::control::{Clock, cpu_seconds};
 use super::cost::Cost;
-use super::method::Method;
-use super::session::{Session, Spent, Stage};
+use super::session::{Session, Stage};
 use super::settings::Settings;
+use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::finish::Finish;
 use crate::scene::Scene;
-use crate::transport::Indirect;
 use pilot::Pilot;
 use weights::Weighed;
-
-/// A way to render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Strategy {
-    /// How light is found.
-    pub method: Method,
-    /// What photons bring, where they are gathered.
-    pub indirect: Indirect,
-    /// Light paths are guided.
-    pub guided: bool,
-}
-
-impl Strategy {
-    /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is left to a
-    /// technique that finds it badly.
-    pub const USUAL: Strategy = Strategy::plain(Method::Vcm);
-    /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where others would have found the
-    /// glass, and without which it is hardly found where it is small.
-    pub const FOCUSED: Strategy = Strategy { guided: true, ..Strategy::USUAL };
-    /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
-    pub const GATHERING: Strategy = Strategy::plain(Method::Sppm);
-
-    /// A method with light paths as they come.
-    pub const fn plain(method: Method) -> Strategy {
-        Strategy { method, indirect: Indirect::Photons, guided: false }
-    }
-
-    /// A way in words.
-    pub fn name(self) -> String {
-        let what = match self.indirect {
-            Indirect::Photons => "",
-            Indirect::Paths => " for caustics, path tracing for the rest",
-        };
-        format!("{}{what}{}", self.method.name(), if self.guided { ", guided" } else { "" })
-    }
-}
 
 /// What was chosen.
 pub struct Choice {

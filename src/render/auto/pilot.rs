@@ -1,6 +1,5 @@
 //! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
 
-use super::Strategy;
 use super::contest::{self, Candidate, Trial};
 use super::trial;
 use super::weights::{self, Weighed};
@@ -11,6 +10,7 @@ use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::Stage;
 use crate::render::settings::Settings;
+use crate::render::strategy::Strategy;
 use crate::scene::Scene;
 
 /// Share of the render's cost that the pilot may take.

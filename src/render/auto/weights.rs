@@ -4,7 +4,6 @@
 //! narrow lobes show, and caustics seen in mirrors and glass. What is a property of the scene is told by a picture of the scene without it. Squares are products of two
 //! halves of the iterations, whose noise is not the same: what they have in common is the light.
 
-use super::Strategy;
 use super::trial::{self, WORST, mean, scale, values};
 use crate::camera::Camera;
 use crate::estimator::Pixel;
@@ -13,6 +12,7 @@ use crate::plan::{ClassSet, Effect, Presence, switch};
 use crate::render::cost::Cost;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;
+use crate::render::strategy::Strategy;
 use crate::scene::Scene;
 use crate::stat::floor;
 

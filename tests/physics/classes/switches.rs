@@ -7,7 +7,7 @@ use crate::support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 use caustique::estimator::{InitialBandwidth, Parts};
 use caustique::math::DVec3;
 use caustique::plan::{ClassSet, Effect, EffectSet};
-use caustique::render::output::Present;
+use caustique::render::Present;
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::Scene;
 use caustique::transport::Indirect;

@@ -1,0 +1,57 @@
+//! Clocks and memory of the process. The only clocks of a render are here, and decide nothing but when it stops.
+
+use rustix::time::{ClockId, clock_gettime};
+
+/// Wall clock since its making.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock(std::time::Instant);
+
+impl Clock {
+    /// Starts now.
+    #[allow(clippy::disallowed_methods, reason = "progress and stop conditions are what clocks are for")]
+    pub fn start() -> Clock {
+        Clock(std::time::Instant::now())
+    }
+
+    /// Seconds since the start.
+    pub fn seconds(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+}
+
+/// Processor time of the process in seconds.
+pub fn cpu_seconds() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Peak resident memory of the process in bytes, from `/proc`; 0 where there is none.
+pub fn peak_memory() -> u64 {
+    let read = || -> Option<u64> {
+        let status = std::fs::read_to_string("/proc/self/status").ok()?;
+        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+        let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
+        Some(kib * 1024)
+    };
+    read().unwrap_or(0)
+}
+
+/// Time that a render has taken: its own, not that of others between its iterations.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spent {
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Processor seconds of the whole process.
+    pub cpu_seconds: f64,
+}
+
+impl Spent {
+    /// Does some work and adds the time it takes.
+    pub fn during<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        let (clock, cpu_start) = (Clock::start(), cpu_seconds());
+        let done = work();
+        self.seconds += clock.seconds();
+        self.cpu_seconds += cpu_seconds() - cpu_start;
+        done
+    }
+}

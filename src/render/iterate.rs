@@ -1,0 +1,36 @@
+//! What the passes of a method are to the loop over iterations.
+
+use super::result::Phases;
+use super::techniques::TechniquePicture;
+use crate::estimator::Pixel;
+use crate::light::Guide;
+use crate::photon::ByKind;
+
+/// What an iteration has done.
+pub(super) struct Work {
+    /// Light paths walked.
+    pub light_paths: u64,
+    /// Photons of the map used.
+    pub photons: usize,
+}
+
+/// The passes of a method.
+pub(super) trait Iterate {
+    /// The pixels before the first iteration.
+    fn pixels(&mut self) -> Vec<Pixel>;
+    /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
+    /// Bandwidths by kind of photons of every pixel and level after the last iteration, of methods where they do not follow from the iteration.
+    fn radii(&mut self) -> ByKind<Vec<f32>> {
+        ByKind::default()
+    }
+    /// Where its light paths start, if they are guided.
+    fn guide(&self) -> Option<&Guide> {
+        None
+    }
+    /// Pictures per technique after so many iterations, of methods that have them.
+    fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
+        let _ = iterations;
+        Vec::new()
+    }
+}
