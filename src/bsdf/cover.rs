@@ -6,8 +6,7 @@
 
 use super::energy::{COAT_ETA, EnergyTables};
 use super::fresnel::{dielectric, reflect};
-use super::interface::class_of;
-use super::microfacet::{Ggx, g1, g2_reflection};
+use super::microfacet::{Ggx, class_of, g1, g2_reflection};
 use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
 use crate::math::{Rgb, Vec2, Vec3};

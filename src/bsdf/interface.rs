@@ -3,24 +3,11 @@
 use super::cover::Cover;
 use super::energy::{Covering, EnergyTables, SideTables};
 use super::fresnel::{Smooth, is_matched, normal_incidence};
-use super::microfacet::Ggx;
+use super::microfacet::{Ggx, class_of};
 use super::profile::{Position, Profile};
-use super::{DELTA_ALPHA, LobeSet, Parameters, SHARP_ALPHA};
+use super::{DELTA_ALPHA, LobeSet, Parameters};
 use crate::math::{Rgb, sqr};
 use std::f32::consts::FRAC_1_PI;
-
-/// Class of a GGX lobe.
-#[inline]
-pub(super) fn class_of(alpha_x: f32, alpha_y: f32) -> LobeSet {
-    let widest = alpha_x.max(alpha_y);
-    if widest < DELTA_ALPHA {
-        LobeSet::DELTA
-    } else if (alpha_x * alpha_y).sqrt() < SHARP_ALPHA {
-        LobeSet::SHARP
-    } else {
-        LobeSet::BROAD
-    }
-}
 
 /// Reflection of light that facets of reflectance `f` scatter more than once, as a share of what a perfect reflector's lose; `kept` is the
 /// share that those reflect at once \[Kulla and Conty 2017\].

@@ -4,8 +4,22 @@
 //! \[Heitz 2014\]: "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs".
 //! \[Dupuy and Benyoub 2023\]: "Sampling Visible GGX Normals with Spherical Caps".
 
+use super::{DELTA_ALPHA, LobeSet, SHARP_ALPHA};
 use crate::math::{Vec2, Vec3, sqr};
 use std::f32::consts::{FRAC_1_PI, TAU};
+
+/// Class of a GGX lobe.
+#[inline]
+pub(super) fn class_of(alpha_x: f32, alpha_y: f32) -> LobeSet {
+    let widest = alpha_x.max(alpha_y);
+    if widest < DELTA_ALPHA {
+        LobeSet::DELTA
+    } else if (alpha_x * alpha_y).sqrt() < SHARP_ALPHA {
+        LobeSet::SHARP
+    } else {
+        LobeSet::BROAD
+    }
+}
 
 /// GGX of widths `alpha_x` and `alpha_y` along the local axes. Directions given to it lie in the upper hemisphere.
 #[derive(Clone, Copy, Debug)]

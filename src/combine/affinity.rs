@@ -16,9 +16,9 @@ use std::array::from_fn;
 use rayon::prelude::*;
 
 use super::Sums;
-use super::network::Map;
+use super::map::Map;
+use super::rect::Rect;
 use super::stack::LevelStack;
-use super::tile::Rect;
 
 /// Channels per pair besides the feature space: source, centre, falloff.
 pub const SCALARS: usize = 3;

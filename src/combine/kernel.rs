@@ -8,9 +8,9 @@ use std::array::from_fn;
 use rayon::prelude::*;
 
 use super::Sums;
-use super::network::Map;
+use super::map::Map;
+use super::rect::Rect;
 use super::stack::LevelStack;
-use super::tile::Rect;
 
 /// Weights are kept between these, so that they and their sums stay positive and finite whatever the network says.
 const WEIGHT_RANGE: (f32, f32) = (1e-20, 1e20);

@@ -17,11 +17,13 @@
 
 pub mod affinity;
 pub mod kernel;
+pub mod map;
 pub mod model;
 pub mod network;
+mod rect;
 pub mod runtime;
 mod stack;
-pub mod tensor;
+mod tensor;
 pub mod tile;
 
 #[cfg(test)]

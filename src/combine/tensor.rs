@@ -5,8 +5,8 @@
 
 use rayon::prelude::*;
 
+use super::rect::Rect;
 use super::stack::LevelStack;
-use super::tile::Rect;
 
 /// Version of channel order and scaling; a network states the one it was trained with.
 pub const VERSION: u32 = 1;

@@ -6,28 +6,7 @@
 //! image's edge they end where the whole image does, so that zero padding acts in the same place.
 
 use super::model::Facts;
-
-/// Pixels x0 <= x < x1, y0 <= y < y1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub struct Rect {
-    pub x0: usize,
-    pub y0: usize,
-    pub x1: usize,
-    pub y1: usize,
-}
-
-impl Rect {
-    /// x1 - x0.
-    pub fn width(&self) -> usize {
-        self.x1 - self.x0
-    }
-
-    /// y1 - y0.
-    pub fn height(&self) -> usize {
-        self.y1 - self.y0
-    }
-}
+use super::rect::Rect;
 
 /// A part of the image and what the network must see for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,8 @@
 //!
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
-use super::lights::{EmissionSample, Entry, Lights};
+use super::emission::{EmissionSample, Entry};
+use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, spawn};
 use crate::material::Materials;

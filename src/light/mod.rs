@@ -3,20 +3,23 @@
 mod aim;
 mod cdf;
 mod cone;
+mod emission;
 mod emitter;
 mod environment;
 pub mod guide;
 mod lights;
 mod receiver;
 mod region;
+mod sampler;
 mod tree;
 
 pub use aim::Targets;
 pub use cdf::Cdf;
 pub use cone::Cone;
+pub use emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
 pub use emitter::{Emitter, Sky};
 pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;
-pub use lights::{DirectSample, EmissionDensity, EmissionSample, Entry, Lights};
+pub use lights::Lights;
 pub use receiver::Receiver;
 pub use region::Region;

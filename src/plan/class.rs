@@ -30,7 +30,7 @@ mod sight;
 
 pub use sight::{EyeSuffix, LightPrefix};
 
-use super::effect::{Effect, EffectSet};
+use super::effect::{Effect, EffectSet, Switches};
 use crate::bsdf::LobeSet;
 use std::ops::BitAnd;
 
@@ -246,6 +246,13 @@ impl FromIterator<PathClass> for ClassSet {
 /// What narrow lobes show.
 fn glossy() -> ClassSet {
     ClassSet::of(Effect::Glossy)
+}
+
+impl Switches {
+    /// Classes of light paths that are left. The other effects switched off are gone from the scene itself.
+    pub fn classes(self) -> ClassSet {
+        ClassSet::without(self.off.classes())
+    }
 }
 
 #[cfg(test)]

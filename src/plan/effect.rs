@@ -1,6 +1,5 @@
 //! The effects by name, and sets of them.
 
-use super::class::ClassSet;
 use serde::{Serialize, Serializer};
 use std::str::FromStr;
 
@@ -134,13 +133,6 @@ pub struct Switches {
     pub off: EffectSet,
     /// Asked for by name; the plan has everything that the scene calls for, so this only asserts it.
     pub on: EffectSet,
-}
-
-impl Switches {
-    /// Classes of light paths that are left. The other effects switched off are gone from the scene itself.
-    pub fn classes(self) -> ClassSet {
-        ClassSet::without(self.off.classes())
-    }
 }
 
 impl FromStr for Switches {

@@ -1,8 +1,8 @@
 //! Agreement with the training code (`scripts/train/fixture.py` writes the numbers), and what network files may say.
 
+use super::map::Map;
 use super::model::{Contract, Facts};
-use super::network::Map;
-use super::tile::Rect;
+use super::rect::Rect;
 use super::*;
 use std::collections::HashMap;
 

@@ -1,7 +1,7 @@
 //! Equation (6) with arbitrary positive weights.
 
-use super::network::Map;
-use super::tile::Rect;
+use super::map::Map;
+use super::rect::Rect;
 use super::*;
 
 fn whole(width: usize, height: usize) -> Rect {

@@ -1,6 +1,6 @@
 //! The shipped network on whole images: sizes, tiles, threads, units, bad input.
 
-use super::tile::Rect;
+use super::rect::Rect;
 use super::*;
 
 #[test]
