@@ -106,6 +106,94 @@ fn the_order_test_finds_planted_faults() {
     assert_eq!(broken(&order, "math", "use embree_crate::scene;"), [] as [&str; 0]);
 }
 
+/// The modules of a room below `src`, each with its text, but for what is in the room's `mod.rs`; those in folders of their own count as one.
+fn room(root: &Path, name: &str) -> Vec<(String, String)> {
+    let mut modules: HashMap<String, String> = HashMap::new();
+    for file in files(&format!("src/{name}")) {
+        let inside = file.strip_prefix(root.join("src").join(name)).expect("it is below the room");
+        let own = inside.components().next().expect("it has a name").as_os_str().to_string_lossy().replace(".rs", "");
+        if own != "mod" && own != "tests" {
+            *modules.entry(own).or_default() += &shipped(&fs::read_to_string(&file).expect("it can be read"));
+        }
+    }
+    let mut modules: Vec<(String, String)> = modules.into_iter().collect();
+    modules.sort();
+    modules
+}
+
+/// Names that a module gives to others of its room.
+fn given(text: &str) -> Vec<String> {
+    let kinds = ["fn ", "const fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
+    let name = |line: &str| {
+        let line = line.strip_prefix("pub")?;
+        let line = line.strip_prefix("(super)").unwrap_or(line).trim_start();
+        let rest = kinds.iter().rev().find_map(|kind| line.strip_prefix(kind))?;
+        Some(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>())
+    };
+    text.lines().filter_map(name).filter(|name| !name.is_empty()).collect()
+}
+
+/// The modules of a room that use each other in a circle.
+fn circle(room: &str, modules: &[(String, String)]) -> Vec<String> {
+    let mut home: HashMap<String, &str> = HashMap::new();
+    for (own, text) in modules {
+        for name in given(text) {
+            home.entry(name).or_insert(own);
+        }
+        home.insert(own.clone(), own);
+    }
+    let uses = |(own, text): &(String, String)| -> Vec<&str> {
+        // Other rooms may have modules of the same names.
+        let text = text.replace(&format!("crate::{room}::"), "super::").replace("crate::", "other::");
+        let named = used(&text.replace("super::super::", "super::").replace("super::", "crate::"));
+        named.iter().filter_map(|name| home.get(name).copied()).filter(|other| other != own).collect()
+    };
+    let edges: Vec<(&str, Vec<&str>)> = modules.iter().map(|module| (module.0.as_str(), uses(module))).collect();
+    let mut left: Vec<&str> = edges.iter().map(|(own, _)| *own).collect();
+    // What uses nothing that is left is in no circle, and neither is what nothing left uses.
+    loop {
+        let before = left.len();
+        let of = |own: &str| edges.iter().find(|(name, _)| *name == own).map_or(&[][..], |(_, others)| &others[..]);
+        let still: Vec<&str> = left
+            .iter()
+            .copied()
+            .filter(|own| of(own).iter().any(|other| left.contains(other)))
+            .filter(|own| left.iter().any(|other| other != own && of(other).contains(own)))
+            .collect();
+        left = still;
+        if left.len() == before {
+            return left.into_iter().map(str::to_string).collect();
+        }
+    }
+}
+
+#[test]
+fn no_room_is_a_circle() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let lib = fs::read_to_string(root.join("src/lib.rs")).expect("src/lib.rs can be read");
+    let mut faults = Vec::new();
+    for name in order(&lib).keys().filter(|name| root.join("src").join(name).is_dir()) {
+        let found = circle(name, &room(root, name));
+        if !found.is_empty() {
+            faults.push(format!("{name}: {}", found.join(", ")));
+        }
+    }
+    assert!(faults.is_empty(), "files that use each other in a circle:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn the_circle_test_finds_planted_faults() {
+    let modules = |texts: [&str; 3]| -> Vec<(String, String)> {
+        ["a", "b", "c"].into_iter().zip(texts).map(|(name, text)| (name.into(), text.into())).collect()
+    };
+    let right = ["pub struct A;", "use super::a::A;\npub(super) fn b() {}", "use crate::room::{A, b};"];
+    assert_eq!(circle("room", &modules(right)), [] as [&str; 0]);
+    let wrong = ["use super::c;\npub struct A;", right[1], right[2]];
+    assert_eq!(circle("room", &modules(wrong)), ["a", "b", "c"]);
+    let by_item = ["use super::b;\npub struct A;", right[1], ""];
+    assert_eq!(circle("room", &modules(by_item)), ["a", "b"]);
+}
+
 /// The part of a file that ships: what stands before its tests, without comments.
 fn shipped(text: &str) -> String {
     let body = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
