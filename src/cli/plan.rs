@@ -1,7 +1,7 @@
 //! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
 
 use super::number::threads;
-use super::progress::percent;
+use super::progress::{Form, percent};
 use super::render::plan::{Wishes, check_media, plan};
 use super::render::{Job, Method};
 use super::{print, print_json, scene};
@@ -37,13 +37,14 @@ fn report(args: &PlanArgs) -> Result<()> {
     let job = &args.job;
     // Options that contradict each other are errors here, too.
     job.settings()?;
-    let loaded = scene::read(&job.scene, rayon::current_num_threads())?;
+    let loaded = scene::read(&job.scene, Form::beside(args.json), rayon::current_num_threads())?;
     let camera = loaded.scene.camera(&job.view())?;
     check_media(job, &loaded.scene)?;
     let make = |way| job.allowed(way, camera.size());
     let choice = if job.method == Method::Auto {
         let mut finish = job.pilot_finish()?;
-        choose((&loaded.scene, &camera), &mut finish, make, || false)
+        Form::beside(args.json)
+            .during("choosing a method", || choose((&loaded.scene, &camera), &mut finish, make, || false))
     } else {
         None
     };

@@ -1,6 +1,7 @@
 //! From a scene file and the options about it to a scene, with its warnings told.
 
 use super::number::{finite, not_negative, rgb};
+use super::progress::{Form, Waiting};
 use super::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::plan::Switches;
@@ -36,16 +37,17 @@ pub struct SceneArgs {
     /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light, and says so
     #[arg(long, value_enum, default_value_t = Glass::Auto)]
     pub glass: Glass,
-    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: classes of light paths (emission, direct, indirect, glossy,
-    /// caustic, sds), and dispersion, volume (or medium), depth_of_field, environment, alpha (cut-outs), textures. 'caustique plan' lists what a
-    /// scene calls for [default: all that it calls for]
+    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume [default: all that the scene calls for]
+    ///
+    /// There are classes of light paths (emission, direct, indirect, glossy, caustic, sds), and dispersion, volume (or medium), depth_of_field,
+    /// environment, alpha (cut-outs), textures. 'caustique plan' lists what a scene calls for
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
     pub effects: Option<Switches>,
     /// Let the scene name files (buffers, textures, its environment) outside its own folder
-    #[arg(long)]
+    #[arg(long, help_heading = "Running")]
     pub allow_outside: bool,
     /// Take anything in the scene that is ignored or approximated as an error
-    #[arg(long)]
+    #[arg(long, help_heading = "Running")]
     pub strict: bool,
 }
 
@@ -101,7 +103,8 @@ pub struct Loaded {
 }
 
 /// Reads and builds the scene, with the environment that the options ask for, without the effects that they switch off.
-pub fn read(args: &SceneArgs, threads: usize) -> Result<Loaded> {
+pub fn read(args: &SceneArgs, form: Form, threads: usize) -> Result<Loaded> {
+    let _waiting = Waiting::begin(form, &format!("reading {}", args.path.display()));
     let off = args.switches().off;
     let mut description = gltf::read(&args.path, &args.read_options())?;
     environment(&mut description, args)?;

@@ -11,7 +11,7 @@ pub use job::{Job, Method};
 pub use options::RenderArgs;
 
 use super::finish::Ready;
-use super::progress::{Reporter, duration, percent};
+use super::progress::{Reporter, Waiting, duration, percent};
 use super::scene::Loaded;
 use super::signals::Interrupt;
 use super::{output, say, scene};
@@ -47,7 +47,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
 fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Result<()> {
     let threads = rayon::current_num_threads();
-    let Loaded { scene, removed } = scene::read(&args.job.scene, threads)?;
+    let Loaded { scene, removed } = scene::read(&args.job.scene, args.progress, threads)?;
     scene::tell(&args.job.scene, &scene.warnings)?;
     let camera = scene.camera(&args.job.view())?;
     plan::check_media(&args.job, &scene)?;
@@ -96,6 +96,7 @@ fn render(args: &RenderArgs, settings: &Settings, selection: &Selection) -> Resu
     drop(rendered);
     let (mut refusal, mut finished) = (None, None);
     if let Some(ready) = &mut ready {
+        let _waiting = Waiting::begin(args.progress, "finishing the picture");
         match ready.finish().apply(&mut set, |name| selection.wants(name)) {
             Ok(account) => finished = Some(account),
             Err(error) => refusal = Some(error),
@@ -154,6 +155,7 @@ fn auto(
     if args.job.method != Method::Auto {
         return Ok(None);
     }
+    let _waiting = Waiting::begin(args.progress, "choosing a method");
     let layers = |settings: &Settings| selection(args, settings, present).is_ok();
     let make = |way| args.allowed(way, camera.size()).filter(layers);
     Ok(choose((scene, camera), &mut args.job.pilot_finish()?, make, || interrupt.asked()))
