@@ -14,28 +14,10 @@ cd "$ROOT"
 cargo build --release --bin caustique
 PROGRAM=${CARGO_TARGET_DIR:-target}/release/caustique
 
-# given OPTION... -- ARGUMENT...: whether one of the options is among the arguments
-given() {
-    local options=() option argument
-    while [ "$1" != -- ]; do
-        options+=("$1")
-        shift
-    done
-    shift
-    for argument in "$@"; do
-        for option in "${options[@]}"; do
-            case $argument in "$option" | "$option"=*) return 0 ;; esac
-        done
-    done
-    return 1
-}
-
-# A minute or so on two cores; the time limit holds slower machines to two.
-settings=()
-given --width --height -- "$@" || settings+=(--width 640)
-given --iterations --time --target-error -- "$@" || settings+=(--iterations 128 --time 100)
-given -o --output -- "$@" || settings+=(-o out/demo.exr)
-given --png -- "$@" || settings+=(--png out/demo.png)
+# A minute or so on two cores; the time limit holds slower machines to two. Of an option given twice the last holds.
+settings=(-o out/demo.exr --png out/demo.png)
+[[ " $*" =~ ' --height' ]] || settings+=(--width 640)
+[[ " $*" =~ ' --'(iterations|time|target-error) ]] || settings+=(--iterations 128 --time 100)
 
 mkdir -p out
 printf '%s render %s' "$PROGRAM" "$SCENE"

@@ -2,7 +2,7 @@
 
 use super::finish::FinishArgs;
 use super::output::{self, PictureArgs};
-use super::progress::duration;
+use super::progress::{Form, duration};
 use super::say;
 use caustique::error::Result;
 use caustique::film::{self, Layer, LayerSet, Naming, Plane};
@@ -21,14 +21,14 @@ pub struct CombineArgs {
     /// EXR to finish
     input: PathBuf,
     /// EXR to write
-    #[arg(short, long, value_name = "OUT.exr")]
+    #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
     finish: FinishArgs,
     #[command(flatten)]
     picture: PictureArgs,
     /// Threads; 0 takes all cores
-    #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads)]
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads, help_heading = "Running")]
     threads: usize,
 }
 
@@ -68,7 +68,9 @@ pub fn run(args: &CombineArgs) -> Result<()> {
             say(&format!("warning: {input}: layer \"{name}\" cannot be written under this name and is left out"));
         }
         let clock = Clock::start();
-        let account = ready.finish().apply(&mut set, |_| true).map_err(|error| error.within(args.input.display()))?;
+        let finish = || ready.finish().apply(&mut set, |_| true);
+        let account =
+            Form::Auto.during("finishing the picture", finish).map_err(|error| error.within(args.input.display()))?;
         let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
         object["combined"] = ready.facts(&account);
         attributes.insert(exr::ATTRIBUTE, &object)?;

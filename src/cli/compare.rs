@@ -1,5 +1,6 @@
 //! `caustique compare`: the error of an image against a reference.
 
+use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{Layer, LayerSet};
@@ -43,7 +44,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
-    let comparison = compare_above(&image, &reference, floor).map_err(|e| e.within(args.image.display()))?;
+    let compared = Form::beside(args.json).during("comparing", || compare_above(&image, &reference, floor));
+    let comparison = compared.map_err(|e| e.within(args.image.display()))?;
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
         png::write(path, image.width, image.height, colours)?;

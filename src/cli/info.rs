@@ -1,6 +1,6 @@
 //! `caustique info`: what a scene or an EXR holds.
 
-use super::progress::{duration, percent};
+use super::progress::{Form, duration, percent};
 use super::scene::SceneArgs;
 use super::{plot, print, print_json, scene};
 use caustique::error::{Error, Kind, Result};
@@ -38,7 +38,8 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         return if args.json { print_json(&Value::Object(object)) } else { print(&image_text(path, &set, &object)) };
     }
     let asked = SceneArgs::of(path, args.allow_outside);
-    let scene = super::pool(0)?.install(|| scene::read(&asked, rayon::current_num_threads()))?.scene;
+    let scene =
+        super::pool(0)?.install(|| scene::read(&asked, Form::beside(args.json), rayon::current_num_threads()))?.scene;
     let object = scene_object(path, &scene);
     if args.json { print_json(&object) } else { print(&scene_text(path, &object)) }
 }

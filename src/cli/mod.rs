@@ -6,6 +6,7 @@ mod converge;
 mod doctor;
 mod finish;
 mod info;
+mod layout;
 mod number;
 mod output;
 mod plan;
@@ -14,17 +15,19 @@ mod processor;
 mod progress;
 mod render;
 mod scene;
+mod shell;
 mod signals;
 mod usage;
 
 use caustique::error::{Error, Kind, Result};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
+use std::num::NonZero;
 use std::process::ExitCode;
 
 /// Renders caustics, and caustics seen through glass, water and mirrors, with known error.
 #[derive(Parser)]
-#[command(name = "caustique", version, about, disable_help_subcommand = true, max_term_width = 110)]
+#[command(name = "caustique", version, about, args_override_self = true, max_term_width = 110)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -46,6 +49,23 @@ enum Command {
     Info(info::InfoArgs),
     /// Say which Embree, ONNX Runtime and Open Image Denoise are found, and what to install if not
     Doctor(doctor::DoctorArgs),
+    /// Print what completes commands and options in a shell
+    Completions(shell::CompletionsArgs),
+    /// Print a page of the manual
+    Man(shell::ManArgs),
+}
+
+/// The whole command line.
+fn command_line() -> clap::Command {
+    let mut places = 0..;
+    Cli::command().mut_subcommands(|command| {
+        layout::with_help(layout::arrange(command)).display_order(places.next().unwrap_or_default())
+    })
+}
+
+/// The command that the words of the command line begin with.
+fn named(line: &clap::Command) -> Option<&clap::Command> {
+    std::env::args_os().nth(1).and_then(|word| line.find_subcommand(word))
 }
 
 /// Runs the program and returns its exit code.
@@ -53,9 +73,11 @@ pub fn main() -> ExitCode {
     if let Err(error) = processor::check() {
         return fail(&error);
     }
-    let cli = match Cli::try_parse() {
+    let mut line = command_line();
+    let matches = line.try_get_matches_from_mut(std::env::args_os());
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
-        Err(error) => match usage::explain(&error) {
+        Err(error) => match usage::explain(&error, named(&line)) {
             Some(error) => return fail(&error),
             None => {
                 // Help and version were asked for: data, on stdout.
@@ -74,6 +96,8 @@ pub fn main() -> ExitCode {
         Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Completions(args) => shell::complete(&args, command_line()),
+        Command::Man(args) => shell::man(&args, command_line()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -90,15 +114,26 @@ fn fail(error: &Error) -> ExitCode {
     ExitCode::from(error.exit_code())
 }
 
+/// So many threads to a core are a slip.
+const THREADS_PER_CORE: usize = 4;
+
 /// Threads for everything that a command does; 0 takes all cores.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    if threads > THREADS_PER_CORE * cores {
+        say(&format!(
+            "warning: --threads {threads}: there are {cores} cores: more threads take memory, and make nothing faster"
+        ));
+    }
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
     builder.build().map_err(|error| Error::new(Kind::Io, "threads", error).hint("ask for fewer with --threads"))
 }
 
 /// Prints a line to stderr. Nobody may be listening any more (a closed pipe, a terminal that is gone): a render goes on.
 fn say(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
+    progress::beside_the_bar(|| {
+        let _ = writeln!(std::io::stderr().lock(), "{line}");
+    });
 }
 
 /// Prints data to stdout. A reader that has closed the pipe wants no more: that is no error.

@@ -1,6 +1,9 @@
 //! Parsers of option values: numbers in a range, lists of numbers, fractions.
 
+use std::fmt::Display;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
+use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 /// A finite number between two bounds.
 pub fn between(low: Bound<f64>, high: Bound<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
@@ -61,10 +64,25 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     between(Included(0.0), Unbounded)(text)
 }
 
+/// A whole number of a range.
+pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
+where
+    T: FromStr + PartialOrd + Display + Clone + Send + Sync,
+{
+    move |text| {
+        let refusal = || format!("it must be a whole number from {} to {}", range.start(), range.end());
+        text.trim().parse().ok().filter(|n| range.contains(n)).ok_or_else(refusal)
+    }
+}
+
+/// A relative error: above 0 and below 1.
+pub fn relative_error(text: &str) -> Result<f64, String> {
+    between(Excluded(0.0), Excluded(1.0))(text)
+}
+
 /// A number of threads; 0 is all.
 pub fn threads(text: &str) -> Result<usize, String> {
-    let range = "it must be a whole number from 0 to 1024".to_string();
-    text.parse().ok().filter(|t| (0..=1024).contains(t)).ok_or(range)
+    whole(0..=1024)(text)
 }
 
 /// Three finite numbers not below zero, separated by commas; `None` when the text is no list of numbers at all.
@@ -93,6 +111,9 @@ mod tests {
         assert_eq!(finite("1e999"), Err("it is not a finite number".into()));
         assert_eq!(finite("one"), Err("it is not a number".into()));
         assert_eq!(finite("-1.5"), Ok(-1.5));
+        assert_eq!(relative_error("1"), Err("it must be in (0, 1)".into()));
+        assert_eq!(threads("1024"), Ok(1024));
+        assert_eq!(threads("-1"), Err("it must be a whole number from 0 to 1024".into()));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
 
 use super::number::threads;
-use super::progress::percent;
+use super::progress::{Form, percent};
 use super::render::{Job, Method};
 use super::{print, print_json, scene};
 use caustique::error::Result;
@@ -37,12 +37,14 @@ fn report(args: &PlanArgs) -> Result<()> {
     let job = &args.job;
     // Options that contradict each other are errors here, too.
     let settings = job.settings()?;
-    let Loaded { scene, removed } = scene::read(&job.scene, rayon::current_num_threads())?;
+    let Loaded { scene, removed } = scene::read(&job.scene, Form::beside(args.json), rayon::current_num_threads())?;
     let camera = scene.camera(&job.view())?;
     check::media(&job.scene.path, &settings, &scene)?;
     let make = |way| job.allowed(way, camera.size());
     let choice = if job.method == Method::Auto {
-        choose((&scene, &camera), &mut job.pilot_finish()?, make, || false)
+        let mut finish = job.pilot_finish()?;
+        let tried = || choose((&scene, &camera), &mut finish, make, || false);
+        Form::beside(args.json).during("choosing a method", tried)
     } else {
         None
     };

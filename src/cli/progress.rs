@@ -6,6 +6,10 @@ use caustique::render::{Progress, Settings, Told};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::io::IsTerminal;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Form of the progress reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
@@ -28,17 +32,123 @@ impl Form {
     pub fn for_people(self) -> bool {
         matches!(self, Form::Auto | Form::Plain)
     }
+
+    /// The form for commands without `--progress`: where JSON is asked for, nobody looks on.
+    pub fn beside(json: bool) -> Form {
+        if json { Form::None } else { Form::Auto }
+    }
+
+    /// Where `auto` shows no bar, its lines.
+    pub fn settled(self) -> Form {
+        if self == Form::Auto && !std::io::stderr().is_terminal() { Form::Plain } else { self }
+    }
+
+    /// Does something that may take long, and says what it is where it does.
+    pub fn during<T>(self, what: &str, work: impl FnOnce() -> T) -> T {
+        let _waiting = Waiting::begin(self, what);
+        work()
+    }
 }
 
 /// Seconds between plain lines.
-const PLAIN_EVERY: f64 = 5.0;
+pub const PLAIN_EVERY: f64 = 5.0;
 /// Steps of the bar.
 const STEPS: u64 = 1000;
+/// A wait as long as this is explained.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Time between two pictures of a spinner.
+const TICK: Duration = Duration::from_millis(100);
+
+/// The bar or spinner that is on the terminal.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Prints lines to stderr without tearing a bar that is there.
+pub fn beside_the_bar(print: impl FnOnce()) {
+    let shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    match shown {
+        Some(bar) => bar.suspend(print),
+        None => print(),
+    }
+}
+
+/// A bar or spinner on the terminal until it is dropped.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// A bar for [`Form::Auto`] on a terminal.
+    pub fn new() -> Bar {
+        Bar::show("{bar:24} {percent:>3} %  {msg}")
+    }
+
+    fn show(template: &str) -> Bar {
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
+        Bar(bar)
+    }
+
+    /// Shows how much is done, 0 to 1, and a message.
+    pub fn set(&self, fraction: f64, message: String) {
+        self.0.set_position((fraction * STEPS as f64) as u64);
+        self.0.set_message(message);
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        self.0.finish_and_clear();
+    }
+}
+
+/// Something that goes on without a measure of how far it is: a spinner on a terminal, a line elsewhere, once it has taken as long as [`PATIENCE`].
+pub struct Waiting {
+    over: Option<Sender<()>>,
+    teller: Option<JoinHandle<()>>,
+}
+
+impl Waiting {
+    /// Begins to wait for `what`.
+    pub fn begin(form: Form, what: &str) -> Waiting {
+        let (over, end) = channel::<()>();
+        let (form, what) = (form.settled(), what.to_string());
+        let tell = move || {
+            if end.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
+                return;
+            }
+            let spinner = (form == Form::Auto).then(|| Bar::show("{spinner} {msg}, {elapsed}"));
+            match (&spinner, form) {
+                (Some(Bar(spinner)), _) => {
+                    spinner.set_message(what);
+                    spinner.enable_steady_tick(TICK);
+                }
+                (None, Form::Plain) => say(&what),
+                (None, Form::Openjd) => say(&format!("openjd_status: {what}")),
+                (None, _) => {}
+            }
+            // Nothing is ever sent: the wait is over when the sender is gone.
+            let _ = end.recv();
+        };
+        Waiting { over: Some(over), teller: std::thread::Builder::new().spawn(tell).ok() }
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.over = None;
+        if let Some(teller) = self.teller.take() {
+            let _ = teller.join();
+        }
+    }
+}
 
 /// Reports on one render.
 pub struct Reporter {
     form: Form,
-    bar: ProgressBar,
+    bar: Option<Bar>,
+    first: Option<Waiting>,
     time: Option<f64>,
     next_line: f64,
 }
@@ -58,27 +168,18 @@ struct Line {
 impl Reporter {
     /// A reporter for a render with these settings.
     pub fn new(form: Form, settings: &Settings) -> Reporter {
-        let form = match form {
-            Form::Auto if !std::io::stderr().is_terminal() => Form::Plain,
-            form => form,
-        };
-        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden());
-        if form == Form::Auto {
-            bar.set_draw_target(ProgressDrawTarget::stderr());
-            if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
-                bar.set_style(style);
-            }
-            bar.set_message("first iteration");
-        }
-        Reporter { form, bar, time: settings.time, next_line: 0.0 }
+        let first = Some(Waiting::begin(form, "first iteration"));
+        let form = form.settled();
+        Reporter { form, bar: None, first, time: settings.time, next_line: 0.0 }
     }
 
     /// Reports the state after an iteration.
     pub fn report(&mut self, progress: &Progress) {
+        self.first = None;
         match self.form {
             Form::Auto => {
-                self.bar.set_position((self.fraction(progress) * STEPS as f64) as u64);
-                self.bar.set_message(sentence(progress));
+                let fraction = self.fraction(progress);
+                self.bar.get_or_insert_with(Bar::new).set(fraction, sentence(progress));
             }
             Form::Plain => {
                 let last = progress.iterations == Some(progress.iteration);
@@ -103,8 +204,8 @@ impl Reporter {
     }
 
     /// Takes the bar off the terminal.
-    pub fn finish(&self) {
-        self.bar.finish_and_clear();
+    pub fn finish(&mut self) {
+        (self.first, self.bar) = (None, None);
     }
 
     /// How much is done, 0 to 1, by whichever limit is nearer.

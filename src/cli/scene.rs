@@ -1,6 +1,7 @@
 //! From a scene file and the options about it to a scene, with its warnings told.
 
 use super::number::{finite, not_negative, rgb};
+use super::progress::{Form, Waiting};
 use super::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::pipeline::Loaded;
@@ -97,7 +98,8 @@ impl FromStr for EnvironmentChoice {
 ///
 /// # Errors
 /// See [`load`].
-pub fn read(args: &SceneArgs, threads: usize) -> Result<Loaded> {
+pub fn read(args: &SceneArgs, form: Form, threads: usize) -> Result<Loaded> {
+    let _waiting = Waiting::begin(form, &format!("reading {}", args.path.display()));
     load(&args.order(), threads)
 }
 

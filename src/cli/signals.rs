@@ -1,7 +1,10 @@
 //! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end after the current iteration, the second ends the program at once.
+//! Ctrl-C is answered, by a thread of its own: a handler may not print.
 
+use super::say;
 use caustique::error::{Error, Kind, Result};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,13 +16,21 @@ pub struct Interrupt(Arc<AtomicBool>);
 impl Interrupt {
     /// Listens from now on.
     pub fn listen() -> Result<Interrupt> {
+        let failed = |error| Error::new(Kind::Io, "signals", error);
         let asked = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             // In this order: a signal ends the program if one came before it, and only then is noted itself.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&asked))
                 .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&asked)))
-                .map_err(|error| Error::new(Kind::Io, "signals", error))?;
+                .map_err(failed)?;
         }
+        let mut pressed = Signals::new([SIGINT]).map_err(failed)?;
+        let answer = move || {
+            if pressed.forever().next().is_some() {
+                say("finishing the iteration; press again to stop now");
+            }
+        };
+        std::thread::Builder::new().spawn(answer).map_err(failed)?;
         Ok(Interrupt(asked))
     }
 

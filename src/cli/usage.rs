@@ -1,18 +1,108 @@
 //! Errors of the command line in the form of all others: `command line: cause`, `hint: remedy`.
 
 use caustique::error::{Error, Kind};
-use clap::error::ErrorKind;
+use clap::Command;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// What clap has to say; `None` when help or the version was asked for.
-pub fn explain(error: &clap::Error) -> Option<Error> {
+/// Words that people type, the option that is meant, and what to say of it where the command has that option; where it is "", to every command.
+const WORDS: [(&[&str], &str, &str); 16] = [
+    (
+        &["--samples", "--spp", "-s", "--aa-samples", "--num-samples"],
+        "iterations",
+        "--iterations N sends so many eye paths through every pixel; --time SECONDS stops after so long",
+    ),
+    (
+        &["--passes"],
+        "layers",
+        "--layers LIST chooses the layers of the EXR; --iterations N says how often the picture is rendered",
+    ),
+    (&["--aovs", "--aov", "--pass", "--channels"], "layers", "--layers LIST chooses the layers of the EXR"),
+    (
+        &["--size", "--resolution", "--res", "--dimensions"],
+        "width",
+        "--width W and --height H are the picture's size in pixels; one alone keeps the camera's aspect",
+    ),
+    (
+        &["--max-bounces", "--bounces", "--depth", "--max-path-length", "--path-length"],
+        "max-depth",
+        "--max-depth N is the longest light path in segments, one more than it has bounces",
+    ),
+    (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A-A"),
+    (
+        &["--frame", "--frames", "-f"],
+        "camera",
+        "animations are not played: export each frame to a scene file of its own",
+    ),
+    (&["--quiet", "--silent", "-q"], "progress", "--progress none says nothing but warnings and errors"),
+    (&["--denoiser", "--no-denoise"], "denoise", "--denoise auto|oidn|own|none chooses the denoiser"),
+    (
+        &["--jobs", "-j", "--cores", "--num-threads"],
+        "threads",
+        "--threads T is the number of threads; 0 takes all cores",
+    ),
+    (&["--seconds", "--time-limit", "--timeout"], "time", "--time SECONDS stops after so long"),
+    (&["--noise-threshold", "--error"], "target-error", "--target-error E stops at this estimated relative error"),
+    (&["--integrator", "--renderer"], "method", "--method chooses how light is found"),
+    (&["--out", "--outfile", "--output-file"], "output", "--output, or -o, names what is written"),
+    (&["--out", "--output", "-o"], "json", "what is told goes to standard output: '> FILE' writes it to a file"),
+    (&["--version", "-v"], "", "'caustique --version' prints the version"),
+];
+
+/// What clap has to say about the line of a command; `None` when help or the version was asked for.
+pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => None,
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             let error = Error::new(Kind::Usage, "command line", "a command is missing");
             Some(error.hint("'caustique --help' lists the commands"))
         }
-        _ => Some(rephrase(&error.render().to_string())),
+        kind => {
+            let said = rephrase(&error.render().to_string());
+            let hint = match kind {
+                ErrorKind::UnknownArgument => meant(&context(error, ContextKind::InvalidArg), command),
+                ErrorKind::ValueValidation => fraction(error),
+                ErrorKind::InvalidSubcommand if error.get(ContextKind::SuggestedSubcommand).is_none() => {
+                    Some("'caustique --help' lists the commands".into())
+                }
+                _ => None,
+            };
+            Some(match hint {
+                Some(hint) => said.hint(hint),
+                None => said,
+            })
+        }
     }
+}
+
+/// A detail of clap's error; empty where there is none.
+fn context(error: &clap::Error, kind: ContextKind) -> String {
+    match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        _ => String::new(),
+    }
+}
+
+/// The option that is meant by a word that is none, if a command has it.
+fn meant(word: &str, command: Option<&Command>) -> Option<String> {
+    if word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
+        return Some("a value that begins with '-' is joined to its option, as in --option=-1,2".into());
+    }
+    let has = |option: &str| {
+        let options = command.into_iter().flat_map(Command::get_arguments);
+        option.is_empty() || options.filter_map(clap::Arg::get_long).any(|long| long == option)
+    };
+    WORDS.iter().find(|(words, option, _)| words.contains(&word) && has(option)).map(|(.., hint)| (*hint).to_string())
+}
+
+/// The fraction that is meant by a relative error in percent.
+fn fraction(error: &clap::Error) -> Option<String> {
+    if !context(error, ContextKind::InvalidArg).starts_with("--target-error ") {
+        return None;
+    }
+    let value = context(error, ContextKind::InvalidValue);
+    let percent: f64 = value.trim_end_matches('%').trim().parse().ok()?;
+    let fraction = percent / 100.0;
+    (fraction > 0.0 && fraction < 1.0).then(|| format!("did you mean {fraction}, which is {percent} %?"))
 }
 
 /// clap writes paragraphs: the fault, tips, the usage, where help is.

@@ -65,8 +65,21 @@ pub struct Order<'a> {
     pub reproducible: bool,
 }
 
+/// What may take long without telling how far it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wait {
+    /// The scene is read and built.
+    Reading,
+    /// The method is chosen.
+    Choosing,
+    /// The picture is finished.
+    Finishing,
+}
+
 /// Who looks on while a render goes on.
 pub trait Watch {
+    /// Something begins that may take long; `None`: it is over.
+    fn waits(&mut self, wait: Option<Wait>);
     /// The scene is there. An error ends the render.
     ///
     /// # Errors
@@ -111,7 +124,9 @@ pub struct Delivery {
 /// The scene, options that contradict it, memory, or an end that was asked for before the first iteration.
 pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let auto = order.auto.take();
+    watch.waits(Some(Wait::Reading));
     let Loaded { scene, removed } = load::load(&order.scene, rayon::current_num_threads())?;
+    watch.waits(None);
     watch.loaded(&scene)?;
     let camera = scene.camera(&order.view)?;
     let stage = (&scene, &camera);
@@ -130,7 +145,10 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     watch.rendered(&rendered);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
-    deliver(&order, &scene, &plan, rendered, &selection, ready.as_mut())
+    watch.waits(Some(Wait::Finishing));
+    let delivery = deliver(&order, &scene, &plan, rendered, &selection, ready.as_mut());
+    watch.waits(None);
+    delivery
 }
 
 /// The settings for the picture's size, and the layers that are wanted, once both are known to fit the scene.
@@ -170,7 +188,10 @@ fn choose(
                 let settings = (auto.allowed)(way, camera.size()).filter(|of| able && has_layers(of))?;
                 Some(Settings { techniques, ..settings })
             };
-            auto::choose((scene, camera), &mut auto.finish, make, || watch.stops())
+            watch.waits(Some(Wait::Choosing));
+            let chosen = auto::choose((scene, camera), &mut auto.finish, make, || watch.stops());
+            watch.waits(None);
+            chosen
         }
     };
     watch.chosen(chosen.as_ref())?;

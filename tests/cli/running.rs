@@ -42,11 +42,16 @@ fn stop_conditions() {
 /// Reads stderr until a line that begins with `start`.
 fn wait_for_line(child: &mut Child, start: &str) -> BufReader<impl Read + use<>> {
     let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
+    read_to_line(&mut lines, start);
+    lines
+}
+
+fn read_to_line(lines: &mut impl BufRead, start: &str) {
     loop {
         let mut line = String::new();
         assert_ne!(lines.read_line(&mut line).expect("stderr can be read"), 0, "the program ended before {start:?}");
         if line.starts_with(start) {
-            return lines;
+            return;
         }
     }
 }
@@ -107,9 +112,9 @@ fn a_second_signal_ends_at_once() {
     // One iteration of this takes many seconds.
     let arguments = "render scene.glb -o out.exr --width 64 --photons 20000000 --no-combine --progress plain";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
-    let _rest = wait_for_line(&mut child, "method: ");
+    let mut rest = wait_for_line(&mut child, "method: ");
     signal(&child, "-INT");
-    std::thread::sleep(Duration::from_millis(300));
+    read_to_line(&mut rest, "finishing the iteration; press again to stop now\n");
     assert_eq!(child.try_wait().expect("its state is known"), None, "one signal must not end it at once");
     signal(&child, "-INT");
     let mut waited = 0;
@@ -123,6 +128,39 @@ fn a_second_signal_ends_at_once() {
     };
     assert_eq!(status.code(), Some(130));
     assert_eq!(folder.files(), [""; 0]);
+}
+
+/// What takes long says so: the pilot and, of this scene, which comes through a pipe, the reading.
+#[test]
+fn waits_are_explained() {
+    let folder = Folder::new();
+    // Where nothing focuses light a pilot chooses.
+    let matte = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/blocks.glb");
+    std::fs::copy(matte, folder.path("matte.glb")).expect("the scene can be copied");
+    let arguments = "render matte.glb -o out.exr --width 640 --time 3600 --progress plain";
+    let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut rest = wait_for_line(&mut child, "choosing a method\n");
+    signal(&child, "-INT");
+    let mut text = String::new();
+    rest.read_to_string(&mut text).expect("stderr can be read");
+    assert_eq!(child.wait().expect("it ends").code(), Some(130), "{text}");
+    let end = "out.exr: interrupted before the first iteration; nothing is written\n";
+    assert_eq!(text, format!("finishing the iteration; press again to stop now\n{end}"));
+
+    let made = Command::new("mkfifo").arg(folder.path("pipe.glb")).status().expect("mkfifo runs");
+    assert!(made.success());
+    let scene = std::fs::read(folder.path("scene.glb")).expect("it is there");
+    let render = "render pipe.glb -o out.exr --width 16 --iterations 1 --photons 100 --no-combine --progress";
+    for form in ["plain", "none"] {
+        let mut command = folder.command(&format!("{render} {form}"));
+        let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+        std::thread::sleep(Duration::from_millis(1500));
+        std::fs::write(folder.path("pipe.glb"), &scene).expect("the program reads");
+        let mut text = String::new();
+        child.stderr.take().expect("stderr is piped").read_to_string(&mut text).expect("stderr can be read");
+        assert_eq!(child.wait().expect("it ends").code(), Some(0), "{text}");
+        assert_eq!(text.starts_with("reading pipe.glb\n"), form == "plain", "{text}");
+    }
 }
 
 /// A render does not depend on anyone who reads what it says.

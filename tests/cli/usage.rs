@@ -8,7 +8,7 @@ fn errors_word_for_word() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --no-combine";
     let help = "'--help' explains every option";
-    let cases: [(&str, i32, &str, &str); 34] = [
+    let cases: [(&str, i32, &str, &str); 39] = [
         ("", 2, "command line: a command is missing", "'caustique --help' lists the commands"),
         ("rendr", 2, "command line: unrecognized subcommand 'rendr'", "a similar subcommand exists: 'render'"),
         (
@@ -74,13 +74,13 @@ fn errors_word_for_word() {
         (
             &format!("{render} --photons 50000001"),
             2,
-            "command line: invalid value '50000001' for '--photons <N>': 50000001 is not in 1..=50000000",
+            "command line: invalid value '50000001' for '--photons <N>': it must be a whole number from 1 to 50000000",
             help,
         ),
         (
             &format!("{render} --iterations 2000000001"),
             2,
-            "command line: invalid value '2000000001' for '--iterations <N>': 2000000001 is not in 1..=2000000000",
+            "command line: invalid value '2000000001' for '--iterations <N>': it must be a whole number from 1 to 2000000000",
             help,
         ),
         (
@@ -98,7 +98,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --knn 1025"),
             2,
-            "command line: invalid value '1025' for '--knn <K>': 1025 is not in 1..=1024",
+            "command line: invalid value '1025' for '--knn <K>': it must be a whole number from 1 to 1024",
             help,
         ),
         (
@@ -155,6 +155,36 @@ fn errors_word_for_word() {
             "command line: invalid value '1,2' for '--env <FILE|R,G,B>': a colour has three numbers R,G,B, not 2",
             help,
         ),
+        (
+            &format!("{render} --time -3"),
+            2,
+            "command line: invalid value '-3' for '--time <SECONDS>': it must be above 0",
+            help,
+        ),
+        (
+            &format!("{render} --seed -1"),
+            2,
+            "command line: invalid value '-1' for '--seed <S>': it must be a whole number from 0 to 18446744073709551615",
+            help,
+        ),
+        (
+            &format!("{render} --env -1,0,0"),
+            2,
+            "command line: unexpected argument '-1' found",
+            "a value that begins with '-' is joined to its option, as in --option=-1,2",
+        ),
+        (
+            &format!("{render} --target-error 5"),
+            2,
+            "command line: invalid value '5' for '--target-error <E>': it must be in (0, 1)",
+            "did you mean 0.05, which is 5 %?",
+        ),
+        (
+            "help rendering",
+            2,
+            "command line: unrecognized subcommand 'rendering'",
+            "'caustique --help' lists the commands",
+        ),
         (&format!("{render} --layers albeod"), 2, "--layers: no layer \"albeod\"", "did you mean \"albedo\"?"),
         (&format!("{render} --layers Level6"), 2, "--layers: no layer \"Level6\"", "did you mean \"Level1\"?"),
         (
@@ -192,6 +222,80 @@ fn errors_word_for_word() {
     assert_eq!(folder.files(), [""; 0]);
 }
 
+/// Words that other programs have for an option, in commands that have it.
+#[test]
+fn words_of_other_programs() {
+    let folder = Folder::new();
+    let iterations = "--iterations N sends so many eye paths through every pixel; --time SECONDS stops after so long";
+    let size = "--width W and --height H are the picture's size in pixels; one alone keeps the camera's aspect";
+    let depth = "--max-depth N is the longest light path in segments, one more than it has bounces";
+    let layers = "--layers LIST chooses the layers of the EXR";
+    let output = "what is told goes to standard output: '> FILE' writes it to a file";
+    let cases = [
+        ("render", "--samples", iterations),
+        ("render", "--spp", iterations),
+        ("converge", "--spp", iterations),
+        ("render", "--size", size),
+        ("plan", "--resolution", size),
+        ("render", "--max-bounces", depth),
+        ("converge", "--depth", depth),
+        ("render", "--aovs", layers),
+        ("render", "--quiet", "--progress none says nothing but warnings and errors"),
+        ("combine", "--denoiser", "--denoise auto|oidn|own|none chooses the denoiser"),
+        ("combine", "--jobs", "--threads T is the number of threads; 0 takes all cores"),
+        ("render", "--out", "--output, or -o, names what is written"),
+        ("compare", "--output", output),
+        ("info", "--out", output),
+        ("doctor", "--spp", "'--help' explains every option"),
+    ];
+    for (command, word, hint) in cases {
+        let outcome = folder.run(&format!("{command} {word}"));
+        let error = format!("command line: unexpected argument '{word}' found\nhint: {hint}\n");
+        assert_eq!((outcome.code, outcome.stderr), (Some(2), error), "{command}");
+    }
+    for word in ["--frame", "--frames", "--passes"] {
+        let outcome = folder.run(&format!("render scene.glb {word}"));
+        assert!(outcome.code == Some(2) && !outcome.stderr.contains("similar"), "{}", outcome.stderr);
+    }
+    let run = Outcome::of({
+        let mut command = folder.command("converge scene.glb -o out --run");
+        command.arg("few: --spp 4");
+        command
+    });
+    assert_eq!(run.stderr, format!("--run \"few\": unexpected argument '--spp' found\nhint: {iterations}\n"));
+}
+
+/// Scripts put their own options before those of their caller.
+#[test]
+fn of_an_option_given_twice_the_last_holds() {
+    let folder = Folder::new();
+    let outcome = folder.run(
+        "render scene.glb -o first.exr --width 64 --iterations 9 --photons 100 --no-combine --method pm --progress none \
+         -o last.exr --width 32 --iterations 1 --method sppm",
+    );
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
+    assert_eq!(folder.files(), ["last.exr"]);
+    let (set, header) = folder.read("last.exr");
+    assert_eq!((set.width, &header["iterations"], &header["method"]), (32, &1.into(), &"sppm".into()));
+    let mut command = folder.command("converge scene.glb -o out --width 16 --iterations 1 --progress none --run");
+    command.arg("twice: --method path --method bdpt --no-combine");
+    assert_eq!(Outcome::of(command).code, Some(0));
+}
+
+#[test]
+fn more_threads_than_a_machine_can_use() {
+    let folder = Folder::new();
+    let cores = std::thread::available_parallelism().expect("the cores are known").get();
+    let plan = |threads: usize| folder.run(&format!("plan scene.glb --method path --threads {threads}"));
+    let (most, more) = (4 * cores, 4 * cores + 1);
+    assert_eq!(plan(most).stderr, "");
+    let warning = format!(
+        "warning: --threads {more}: there are {cores} cores: more threads take memory, and make nothing faster\n"
+    );
+    let outcome = plan(more);
+    assert_eq!((outcome.code, outcome.stderr), (Some(0), warning));
+}
+
 /// The output is checked before the scene is even read, and an older file there is left alone.
 #[test]
 fn outputs_are_checked_first() {
@@ -227,6 +331,8 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
         assert!(help.stdout.contains(option), "{option}");
     }
     assert!(!help.stdout.contains("--checkpoint"));
+    // No such network comes with the program.
+    assert!(help.stdout.contains("--model <compact|FILE.onnx>"));
     let commands = folder.run("--help").stdout;
     for (command, listed) in
         [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", true), ("merge", false)]
@@ -234,6 +340,69 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
         assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
     }
     assert_eq!(folder.run("--version").stdout, concat!("caustique ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+/// What a person needs comes first; what only researchers turn is last, and not in the short help.
+#[test]
+fn the_order_of_the_help() {
+    let folder = Folder::new();
+    let stop = ["When to stop", "Picture"];
+    let rest = ["Method", "Light and glass", "Effects", "Finish", "Running", "Expert"];
+    let (all, output) = ([&stop[..], &["Output"], &rest].concat(), ["Output"]);
+    for (command, headings) in [("render", &all[..]), ("plan", &[&stop[..], &rest].concat()), ("converge", &output)] {
+        let long = folder.run(&format!("{command} --help")).stdout;
+        let places: Vec<Option<usize>> = headings.iter().map(|heading| long.find(&format!("\n{heading}:\n"))).collect();
+        assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{command}: {places:?}");
+    }
+    let (long, short) = (folder.run("render --help").stdout, folder.run("render -h").stdout);
+    let expert = [
+        "--cppm-grid",
+        "--cppm-k",
+        "--cppm-plus",
+        "--knn",
+        "--alpha",
+        "--initial-bandwidth",
+        "--kernel",
+        "--radius-rule",
+        "--photon-memory",
+        "--levels",
+        "Expert",
+    ];
+    for option in expert {
+        assert!(long.contains(option) && !short.contains(option), "{option}");
+    }
+    for option in ["--time", "--iterations", "--target-error", "--width", "--output", "--png", "--method", "--env"] {
+        assert!(short.contains(option), "{option}");
+    }
+}
+
+#[test]
+fn help_completions_and_manual() {
+    let folder = Folder::new();
+    let data = |arguments: &str| {
+        let outcome = folder.run(arguments);
+        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""), "{arguments}");
+        outcome.stdout
+    };
+    assert_eq!(data("help"), data("--help"));
+    for command in ["render", "converge", "doctor"] {
+        assert_eq!(data(&format!("help {command}")), data(&format!("{command} --help")));
+    }
+    let commands = data("--help");
+    let places: Vec<Option<usize>> =
+        ["render", "plan", "doctor", "help"].map(|command| commands.find(&format!("\n  {command} "))).into();
+    assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{commands}");
+    for shell in ["bash", "zsh", "fish"] {
+        let script = data(&format!("completions {shell}"));
+        assert!(script.contains("caustique") && script.contains("target-error"), "{shell}");
+    }
+    let page = data("man");
+    assert!(page.contains(".TH caustique 1") && page.contains("caustique\\-render(1)"), "{page}");
+    let page = data("man render");
+    assert!(page.contains(".TH caustique-render 1") && page.contains("\\-\\-target\\-error"), "{page}");
+    let outcome = folder.run("man rendering");
+    let error = "command line: there is no command 'rendering'\nhint: 'caustique --help' lists the commands\n";
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(2), error));
 }
 
 /// Libraries that are missing are found before rendering, named, and a way around is offered.

@@ -45,7 +45,7 @@ pub fn run(args: &ConvergeArgs) -> Result<()> {
 
 fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Result<()> {
     let threads = rayon::current_num_threads();
-    let Loaded { scene, removed } = scene::read(&args.scene, threads)?;
+    let Loaded { scene, removed } = scene::read(&args.scene, args.progress, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
     let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
     let camera = scene.camera(&view)?;
@@ -147,7 +147,8 @@ fn choose_all(
             return Ok(None);
         }
         let mut finish = run.args.pilot_finish()?;
-        let Some(chosen) = choose((scene, camera), &mut finish, make, || interrupt.asked()) else { return Ok(None) };
+        let tried = || choose((scene, camera), &mut finish, make, || interrupt.asked());
+        let Some(chosen) = args.progress.during("choosing a method", tried) else { return Ok(None) };
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
         Ok(Some(chosen))

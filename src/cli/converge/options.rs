@@ -1,6 +1,6 @@
 //! Every option of `caustique converge`.
 
-use crate::cli::number::{between, finite, positive, threads};
+use crate::cli::number::{between, finite, positive, threads, whole};
 use crate::cli::output::Tonemap;
 use crate::cli::progress::Form;
 use crate::cli::render::Method;
@@ -8,7 +8,7 @@ use crate::cli::scene::SceneArgs;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::MAX_SIZE;
-use clap::{ValueEnum, value_parser};
+use clap::ValueEnum;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -25,7 +25,7 @@ use std::str::FromStr;
 #[command(next_line_help = true)]
 pub struct ConvergeArgs {
     /// Folder to write to; made if need be
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
 
     /// Methods, each with its defaults and a single image: one bandwidth level, no combiner [default: path,sppm,cppm,vcm, unless
@@ -37,19 +37,19 @@ pub struct ConvergeArgs {
     #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
     pub runs: Vec<String>,
     /// Stop each run after so many seconds of its own [default: 60, without --iterations]
-    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "Runs")]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop each run after so many iterations
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "Runs")]
+    #[arg(long, value_name = "N", value_parser = whole(1_u64..=2_000_000_000), help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Measure at iterations that grow by this factor, in (1, 10]
     #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, value_parser = between(Excluded(1.0), Included(10.0)), help_heading = "Runs")]
     pub moments: f64,
     /// Seed; a reference made here has others
-    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Runs")]
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole(0..=u64::MAX), help_heading = "Runs")]
     pub seed: u64,
     /// Repeat everything with so many seeds: means and standard errors
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=1000), help_heading = "Runs")]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u64..=1000), help_heading = "Runs")]
     pub seeds: u64,
 
     /// Figure of curves, targets and exponents
@@ -74,20 +74,20 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
     pub reference_time: Option<f64>,
     /// Iterations of each of the two halves of a reference made here [default: 16 times --iterations, without --time]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(2..=2_000_000_000), conflicts_with = "reference", help_heading = "Error")]
+    #[arg(long, value_name = "N", value_parser = whole(2_u64..=2_000_000_000), conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
     /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
-    #[arg(long, value_name = "W", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    #[arg(long, value_name = "W", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Height in pixels; without a width the camera's aspect is kept
-    #[arg(long, value_name = "H", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    #[arg(long, value_name = "H", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub height: Option<u32>,
     /// Camera by name [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
     /// Longest light path in segments, camera to light, of all runs [default: no limit]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Picture")]
+    #[arg(long, value_name = "N", value_parser = whole(1_u32..=1_000_000), help_heading = "Picture")]
     pub max_depth: Option<u32>,
 
     #[command(flatten)]

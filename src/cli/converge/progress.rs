@@ -1,23 +1,18 @@
 //! Progress of a comparison on stderr.
 
-use crate::cli::progress::{Form, duration};
+use crate::cli::progress::{Bar, Form, PLAIN_EVERY, Waiting, duration};
 use crate::cli::say;
 use caustique::render::Clock;
 use caustique::report::entry::Entry;
 use caustique::report::number::short;
 use caustique::report::race::Step;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
-use std::io::IsTerminal;
-
-/// Seconds between plain lines.
-const PLAIN_EVERY: f64 = 5.0;
-const STEPS: u64 = 1000;
 
 /// Reports on a reference and a race.
 pub struct Reporter {
     form: Form,
-    bar: ProgressBar,
+    bar: Option<Bar>,
+    first: Option<Waiting>,
     clock: Clock,
     next_line: f64,
 }
@@ -25,18 +20,8 @@ pub struct Reporter {
 impl Reporter {
     /// In a form.
     pub fn new(form: Form) -> Reporter {
-        let form = match form {
-            Form::Auto if !std::io::stderr().is_terminal() => Form::Plain,
-            form => form,
-        };
-        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden());
-        if form == Form::Auto {
-            bar.set_draw_target(ProgressDrawTarget::stderr());
-            if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
-                bar.set_style(style);
-            }
-        }
-        Reporter { form, bar, clock: Clock::start(), next_line: 0.0 }
+        let first = Some(Waiting::begin(form, "first iteration"));
+        Reporter { form: form.settled(), bar: None, first, clock: Clock::start(), next_line: 0.0 }
     }
 
     /// The reference's halves have done so much.
@@ -59,11 +44,9 @@ impl Reporter {
     }
 
     fn tell(&mut self, fraction: f64, sentence: &str, line: &str) {
+        self.first = None;
         match self.form {
-            Form::Auto => {
-                self.bar.set_position((fraction * STEPS as f64) as u64);
-                self.bar.set_message(sentence.to_string());
-            }
+            Form::Auto => self.bar.get_or_insert_with(Bar::new).set(fraction, sentence.to_string()),
             Form::Plain => {
                 let now = self.clock.seconds();
                 if now >= self.next_line {
@@ -81,7 +64,7 @@ impl Reporter {
     }
 
     /// Takes the bar away.
-    pub fn finish(&self) {
-        self.bar.finish_and_clear();
+    pub fn finish(&mut self) {
+        (self.first, self.bar) = (None, None);
     }
 }

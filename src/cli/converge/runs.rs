@@ -1,6 +1,7 @@
 //! Runs from the words of the command line, read with the options of `caustique render`.
 
 use super::options::ConvergeArgs;
+use crate::cli::layout;
 use crate::cli::render::{Job, Method, RenderArgs};
 use crate::cli::usage;
 use caustique::error::{Error, Kind, Result};
@@ -9,8 +10,10 @@ use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 
-/// Options of a render's method that concern the picture itself: all runs have them in common.
-const COMMON: [&str; 2] = ["seed", "max_depth"];
+/// Options beside a render's method that are not a run's: those of the picture itself, which all runs have in common, and files of its own.
+const COMMON: [&str; 3] = ["seed", "max_depth", "debug_techniques"];
+/// Headings of options that may differ from run to run.
+const OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
 
 /// A run, and the options it was read from.
 pub struct Run {
@@ -65,11 +68,14 @@ pub fn by_method(args: &ConvergeArgs, method: Method) -> Result<Run> {
 }
 
 fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> Result<Run> {
-    let command = RenderArgs::augment_args(Command::new("render").no_binary_name(true).disable_help_flag(true));
+    let command = layout::arrange(RenderArgs::augment_args(Command::new("render")));
+    let command = command.no_binary_name(true).disable_help_flag(true).args_override_self(true);
     let mut line: Vec<std::ffi::OsString> = words.into_iter().map(Into::into).collect();
     // What a render needs besides.
     line.extend(["-o".into(), "run.exr".into(), args.scene.path.clone().into()]);
-    let explain = |error: clap::Error| usage::explain(&error).unwrap_or_else(|| Error::new(Kind::Usage, "", error));
+    let explain = |error: clap::Error| {
+        usage::explain(&error, Some(&command)).unwrap_or_else(|| Error::new(Kind::Usage, "", error))
+    };
     let matches = command.clone().try_get_matches_from(line).map_err(explain)?;
     refuse_common(&command, &matches)?;
     let render = RenderArgs::from_arg_matches(&matches).map_err(explain)?;
@@ -90,7 +96,7 @@ fn refuse_common(command: &Command, matches: &ArgMatches) -> Result<()> {
     let given = |arg: &&clap::Arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
     for arg in command.get_arguments().filter(given) {
         let id = arg.get_id().as_str();
-        let of_run = matches!(arg.get_help_heading(), Some("Method" | "Finish")) && !COMMON.contains(&id);
+        let of_run = arg.get_help_heading().is_some_and(|heading| OF_RUN.contains(&heading)) && !COMMON.contains(&id);
         if !of_run && !["output", "path"].contains(&id) {
             let option = arg.get_long().unwrap_or(id);
             let cause = format!("--{option} cannot differ from run to run");

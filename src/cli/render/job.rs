@@ -1,7 +1,7 @@
 //! What is rendered and how: the options that `caustique render` and `caustique plan` have in common.
 
 use crate::cli::finish::FinishArgs;
-use crate::cli::number::{between, positive};
+use crate::cli::number::{between, positive, relative_error, whole};
 use crate::cli::scene::SceneArgs;
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
@@ -16,7 +16,7 @@ use caustique::render::{
 };
 use caustique::scene::{MAX_SIZE, View};
 use caustique::transport::MAX_LEVELS;
-use clap::{ValueEnum, value_parser};
+use clap::ValueEnum;
 use serde::Serialize;
 use std::ops::Bound::{Excluded, Included};
 use std::str::FromStr;
@@ -28,89 +28,91 @@ pub struct Job {
     /// How light is found
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
-    /// Light paths sent from the lights, by ppm, sppm, appm and cppm in each iteration: more give a smoother start, fewer faster iterations; by pm once, for its one
-    /// map. The other methods send one for every eye path, or none [default: 100000; pm: 2000000; guided ones with --indirect paths: one a pixel, at most 100000]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=50_000_000), help_heading = "Method")]
+    /// Light paths sent from the lights in an iteration: more give a smoother start, fewer faster iterations [default: 100000]
+    ///
+    /// By ppm, sppm, appm and cppm in each iteration, by pm once, for its one map, 2000000 unless told otherwise; guided ones with --indirect paths send one
+    /// a pixel, at most 100000. The other methods send one for every eye path, or none
+    #[arg(long, value_name = "N", value_parser = whole(1_u32..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
     /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a warning says
     /// so [default: 1024]
-    #[arg(long, value_name = "MIB", value_parser = value_parser!(u32).range(1..), help_heading = "Method")]
+    #[arg(long, value_name = "MIB", value_parser = whole(1..=u32::MAX), help_heading = "Expert")]
     pub photon_memory: Option<u32>,
     /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
     /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
-    #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Method")]
+    #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Expert")]
     pub levels: Option<usize>,
     /// Eye paths of a pixel in an iteration with several levels: one for all levels, or two, of which one is level 1's own, as the network of
     /// --model was trained with; they take about 1.7 times as long [default: 1, with --model 2]
-    #[arg(long, value_name = "1|2", value_parser = value_parser!(u32).range(1..=2), help_heading = "Method")]
+    #[arg(long, value_name = "1|2", value_parser = whole(1_u32..=2), help_heading = "Expert")]
     pub eye_paths: Option<u32>,
     /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
     /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
-    #[arg(long, value_name = "knn|footprint|R", help_heading = "Method")]
+    #[arg(long, value_name = "knn|footprint|R", help_heading = "Expert")]
     pub initial_bandwidth: Option<BandwidthChoice>,
     /// Photons within the largest bandwidth to begin with, 1 to 1024; with pm within every bandwidth [default: 20, with one level 10; pm: 100]
-    #[arg(long, value_name = "K", value_parser = value_parser!(u32).range(1..=1024), help_heading = "Method")]
+    #[arg(long, value_name = "K", value_parser = whole(1_u32..=1024), help_heading = "Expert")]
     pub knn: Option<u32>,
     /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
     /// shrinks [default: 2/3; bpm and vcm: 0.75]
-    #[arg(long, value_name = "A", value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Method")]
+    #[arg(long, value_name = "A", value_parser = between(Excluded(0.0), Included(1.0)), help_heading = "Expert")]
     pub alpha: Option<f64>,
     /// With cppm the cells in which photons are counted: annuli and sectors of each, at most 64 in all [default: 2,6]
-    #[arg(long, value_name = "NA,NS", help_heading = "Method")]
+    #[arg(long, value_name = "NA,NS", help_heading = "Expert")]
     pub cppm_grid: Option<GridChoice>,
     /// With cppm the factor of the squared bandwidth where nothing within it looks uniform, in (0, 1) [default: 0.8]
-    #[arg(long, value_name = "K", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
+    #[arg(long, value_name = "K", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Expert")]
     pub cppm_k: Option<f64>,
     /// With cppm the growth, with every reduction, of the number of photons it takes for a test: 1 to 1000 [default: 1.2]
-    #[arg(long, value_name = "BETA", value_parser = between(Included(1.0), Included(1000.0)), help_heading = "Method")]
+    #[arg(long, value_name = "BETA", value_parser = between(Included(1.0), Included(1000.0)), help_heading = "Expert")]
     pub cppm_beta: Option<f64>,
     /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
-    #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Method")]
+    #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Expert")]
     pub cppm_significance: Option<f64>,
     /// With cppm red, green and blue apart, with photons of equal flux: finds what differs in colour or brightness but not in the number of photons, such as
     /// the picture of a projector; takes about three times as long
-    #[arg(long, help_heading = "Method")]
+    #[arg(long, help_heading = "Expert")]
     pub cppm_plus: bool,
     /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found [default: memoryless; ppm: local]
-    #[arg(long, value_enum, help_heading = "Method")]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub radius_rule: Option<RadiusRule>,
     /// How sppm and appm weigh photons by their distance: 'box' alike within the bandwidth, 'epanechnikov' and 'gaussian' (cut off at three
     /// standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and the local rule count photons and need box [default: box]
-    #[arg(long, value_enum, help_heading = "Method")]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub kernel: Option<Kernel>,
     /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
     /// the same, its noise another. Not for path, pm and --cppm-plus [default: off; auto tries both]
-    #[arg(long, value_enum, help_heading = "Method")]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub guide: Option<Switch>,
     /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
     /// [default: photons; auto tries both]
-    #[arg(long, value_enum, help_heading = "Method")]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub indirect: Option<Indirect>,
     /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), help_heading = "Method")]
+    #[arg(long, value_name = "N", value_parser = whole(1_u32..=1_000_000), help_heading = "Method")]
     pub max_depth: Option<u32>,
     /// Seed: another number, other noise; the same number and options, the same picture to the last bit
-    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Method")]
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole(0..=u64::MAX), help_heading = "Method")]
     pub seed: u64,
 
-    /// Stop after so many iterations [default: 64, if nothing else says when to stop]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=2_000_000_000), help_heading = "When to stop")]
-    pub iterations: Option<u64>,
     /// Stop after so many seconds of rendering; the running iteration is finished
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
+    /// Stop after so many iterations [default: 64, if nothing else says when to stop]
+    #[arg(long, value_name = "N", value_parser = whole(1_u64..=2_000_000_000), help_heading = "When to stop")]
+    pub iterations: Option<u64>,
     /// Stop when the estimated relative error (the root of relMSE) is this small; 0.05 is 5 %
-    #[arg(long, value_name = "E", value_parser = positive, help_heading = "When to stop")]
+    #[arg(long, value_name = "E", value_parser = relative_error, help_heading = "When to stop")]
     pub target_error: Option<f64>,
     /// Render only the iterations i with i mod N = I, for one of N machines
-    #[arg(long, value_name = "I/N", help_heading = "When to stop")]
+    #[arg(long, value_name = "I/N", help_heading = "Running")]
     pub shard: Option<ShardChoice>,
 
     /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
-    #[arg(long, value_name = "W", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    #[arg(long, value_name = "W", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Height in pixels; without a width the camera's aspect is kept
-    #[arg(long, value_name = "H", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Picture")]
+    #[arg(long, value_name = "H", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub height: Option<u32>,
     /// Camera by name [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]

@@ -9,14 +9,14 @@ pub use job::{Job, Method};
 pub use options::RenderArgs;
 
 use super::finish::tell_missing;
-use super::progress::{Reporter, duration, percent};
+use super::progress::{Reporter, Waiting, duration, percent};
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Result};
 use caustique::film::LayerSet;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::plan::why;
-use caustique::pipeline::{self, Auto, Delivery, Order, Watch, layers};
+use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
 use caustique::render::Present;
 use caustique::render::auto::Choice;
@@ -57,7 +57,7 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         arguments: json!(args),
         reproducible: args.reproducible,
     };
-    let mut told = Telling { args, interrupt: None, reporter: None, why: None, summary: None };
+    let mut told = Telling { args, interrupt: None, waiting: None, reporter: None, why: None, summary: None };
     let delivery = pipeline::render(order, &mut told)?;
     told.deliver(delivery)
 }
@@ -66,6 +66,7 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
 struct Telling<'a> {
     args: &'a RenderArgs,
     interrupt: Option<Interrupt>,
+    waiting: Option<Waiting>,
     reporter: Option<Reporter>,
     /// Why auto has chosen what it has.
     why: Option<String>,
@@ -73,6 +74,15 @@ struct Telling<'a> {
 }
 
 impl Watch for Telling<'_> {
+    fn waits(&mut self, wait: Option<Wait>) {
+        let what = wait.map(|wait| match wait {
+            Wait::Reading => format!("reading {}", self.args.job.scene.path.display()),
+            Wait::Choosing => "choosing a method".into(),
+            Wait::Finishing => "finishing the picture".into(),
+        });
+        self.waiting = what.map(|what| Waiting::begin(self.args.progress, &what));
+    }
+
     fn loaded(&mut self, scene: &Scene) -> Result<()> {
         scene::tell(&self.args.job.scene, &scene.warnings)?;
         self.interrupt = Some(Interrupt::listen()?);
@@ -107,7 +117,7 @@ impl Watch for Telling<'_> {
     }
 
     fn rendered(&mut self, rendered: &Rendered) {
-        if let Some(reporter) = self.reporter.take() {
+        if let Some(mut reporter) = self.reporter.take() {
             reporter.finish();
         }
         self.summary = Some(Summary::of(rendered));

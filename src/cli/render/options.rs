@@ -11,14 +11,16 @@ use std::path::PathBuf;
 
 /// Render a scene to a multichannel EXR, and to a PNG to look at.
 ///
-/// Without options: 64 iterations of the method that suits the scene, at 1280 pixels across, seen through the scene's first camera, and
-/// denoised. Ctrl-C finishes the running iteration and writes what there is.
+/// Without options: 64 iterations at 1280 pixels across, seen through the scene's first camera, by the method that suits the scene, denoised
+/// as far as its own errors allow. Ctrl-C finishes the running iteration and writes what there is; a second one ends at once.
+///
+/// An option given twice: the last one holds. -h shows what a person needs first, --help everything.
 #[derive(clap::Args, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_line_help = true)]
 pub struct RenderArgs {
     /// EXR to write: the picture and every layer that made it
-    #[arg(short, long, value_name = "OUT.exr")]
+    #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     #[serde(skip)]
     pub output: PathBuf,
 
@@ -42,7 +44,7 @@ pub struct RenderArgs {
     pub threads: usize,
     /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG: how path, light, bdpt, bpm or vcm share the light
     /// among their strategies. Weighted pictures sum to the layer Noisy
-    #[arg(long, value_name = "DIR", help_heading = "Running")]
+    #[arg(long, value_name = "DIR", help_heading = "Expert")]
     #[serde(skip)]
     pub debug_techniques: Option<PathBuf>,
     /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files

@@ -1,0 +1,76 @@
+//! How commands are laid out for people: the order of their options in the help, and what all options have in common.
+
+use clap::{Arg, ArgAction, Command};
+
+/// Headings of options in the order of the help; those without one come first.
+const HEADINGS: [&str; 12] = [
+    "When to stop",
+    "Runs",
+    "Error",
+    "Picture",
+    "Output",
+    "Page",
+    "Method",
+    "Light and glass",
+    "Effects",
+    "Finish",
+    RUNNING,
+    EXPERT,
+];
+/// Heading of what has nothing to do with the picture.
+const RUNNING: &str = "Running";
+/// Heading of what only researchers turn: `-h` leaves it out.
+const EXPERT: &str = "Expert";
+
+/// The command with its options in the order of their headings.
+pub fn arrange(command: Command) -> Command {
+    let mut options: Vec<Arg> = command.get_arguments().cloned().map(common).collect();
+    options.sort_by_key(|option| {
+        option.get_help_heading().map(|heading| HEADINGS.iter().position(|known| *known == heading))
+    });
+    let arranged = Command::new(command.get_name().to_string())
+        .next_line_help(command.is_next_line_help_set())
+        .args(options)
+        .groups(command.get_groups().cloned());
+    let arranged = match command.get_about() {
+        Some(about) => arranged.about(about.clone()),
+        None => arranged,
+    };
+    match command.get_long_about() {
+        Some(about) => arranged.long_about(about.clone()),
+        None => arranged,
+    }
+}
+
+/// What every option does: a number below zero is its value, for its parser to judge.
+fn common(option: Arg) -> Arg {
+    let expert = option.get_help_heading() == Some(EXPERT);
+    let option = option.hide_short_help(expert);
+    let has_value = !option.is_positional() && option.get_action().takes_values();
+    if has_value { option.allow_negative_numbers(true) } else { option }
+}
+
+/// The command with an option for its help, the last but for those of experts.
+pub fn with_help(command: Command) -> Command {
+    let long = command.get_arguments().any(|option| option.is_hide_short_help_set());
+    let about = if long { "Print help: -h what a person needs first, --help everything" } else { "Print help" };
+    let help = Arg::new("help").short('h').long("help").action(ArgAction::Help).help(about).display_order(usize::MAX);
+    let runs = command.get_arguments().any(|option| option.get_help_heading() == Some(RUNNING));
+    command.disable_help_flag(true).arg(help.help_heading(runs.then_some(RUNNING)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::command_line;
+
+    #[test]
+    fn all_headings_have_a_place() {
+        command_line().debug_assert();
+        for command in command_line().get_subcommands() {
+            for heading in command.get_arguments().filter_map(Arg::get_help_heading) {
+                assert!(HEADINGS.contains(&heading), "{heading} of {}", command.get_name());
+            }
+        }
+    }
+}

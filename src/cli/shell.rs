@@ -1,0 +1,48 @@
+//! `caustique completions` and `caustique man`: what a shell and the reader of manuals take from the command line itself.
+
+use super::print;
+use caustique::error::{Error, Kind, Result};
+use clap::Command;
+use clap_complete::Shell;
+
+/// Print what completes commands and options in a shell.
+///
+/// For bash: caustique completions bash > ~/.local/share/bash-completion/completions/caustique
+#[derive(clap::Args)]
+pub struct CompletionsArgs {
+    /// Shell
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+/// Print a page of the manual.
+///
+/// To read one: caustique man render | man -l -
+#[derive(clap::Args)]
+pub struct ManArgs {
+    /// Command whose page it is [default: the program's own]
+    command: Option<String>,
+}
+
+/// Prints the completions of the whole command line.
+pub fn complete(args: &CompletionsArgs, mut whole: Command) -> Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut whole, "caustique", &mut script);
+    print(&String::from_utf8_lossy(&script))
+}
+
+/// Prints a page of the manual.
+pub fn man(args: &ManArgs, mut whole: Command) -> Result<()> {
+    whole.build();
+    let page = match &args.command {
+        None => &whole,
+        Some(name) => whole.find_subcommand(name).ok_or_else(|| {
+            let error = Error::new(Kind::Usage, "command line", format!("there is no command '{name}'"));
+            error.hint("'caustique --help' lists the commands")
+        })?,
+    };
+    let mut text = Vec::new();
+    let rendered = clap_mangen::Man::new(page.clone()).render(&mut text);
+    rendered.map_err(|error| Error::new(Kind::Io, "manual", error))?;
+    print(&String::from_utf8_lossy(&text))
+}
