@@ -10,10 +10,13 @@ from unittest import mock
 import support
 
 sys.path.insert(0, str(support.ROOT / "scripts" / "figures"))
+sys.path.insert(0, str(support.ROOT / "scripts"))
 import record  # noqa: E402
+import tables  # noqa: E402
 
 COUNTS = support.ROOT / "scripts" / "test_counts.awk"
 RECORD = support.ROOT / "scripts" / "figures" / "record.py"
+TABLES = support.ROOT / "scripts" / "tables.py"
 
 
 def counts(log):
@@ -86,6 +89,18 @@ class Record(support.Scratch):
     def test_a_value_that_is_not_a_number_is_refused(self):
         done = self.record("rays", "mrays=NaN")
         self.assertEqual(done.returncode, 2)
+
+
+class Tables(unittest.TestCase):
+    def test_the_documents_tables_are_what_is_stored(self):
+        done = subprocess.run([sys.executable, TABLES, "--check"], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_a_changed_table_is_noticed(self):
+        text = tables.DOCUMENT.read_text(encoding="utf-8")
+        changed = text.replace("| bath | ", "| bath | 1e-9 ", 1)
+        self.assertNotEqual(changed, text)
+        self.assertEqual(tables.filled(changed), text)
 
 
 if __name__ == "__main__":
