@@ -31,10 +31,8 @@ def stored(name, of, file=RESULTS):
 def source(row):
     """Where a table comes from."""
     machine = row["machine"]
-    # A program may be older than the commit that it was measured at.
-    commit = str(row["values"].get("program", row["commit"]))[:10]
     return (
-        f"Commit {commit}, {row['date'][:10]}, {machine['cores']} cores of {machine['cpu']},\n"
+        f"Commit {row['commit'][:10]}, {row['date'][:10]}, {machine['cores']} cores of {machine['cpu']},\n"
         f"{machine['memory_gib']:g} GiB, {machine['system']}.\n"
     )
 
