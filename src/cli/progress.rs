@@ -77,11 +77,11 @@ pub struct Bar(ProgressBar);
 impl Bar {
     /// A bar for [`Form::Auto`] on a terminal.
     pub fn new() -> Bar {
-        Bar::show("{bar:24} {percent:>3} %  {msg}")
+        Bar::show("{bar:24} {percent:>3} %  {msg}", Duration::ZERO)
     }
 
-    fn show(template: &str) -> Bar {
-        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+    fn show(template: &str, elapsed: Duration) -> Bar {
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr()).with_elapsed(elapsed);
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
@@ -118,7 +118,7 @@ impl Waiting {
             if end.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
-            let spinner = (form == Form::Auto).then(|| Bar::show("{spinner} {msg}, {elapsed}"));
+            let spinner = (form == Form::Auto).then(|| Bar::show("{spinner} {msg}, {elapsed}", PATIENCE));
             match (&spinner, form) {
                 (Some(Bar(spinner)), _) => {
                     spinner.set_message(what);

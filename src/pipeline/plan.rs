@@ -31,7 +31,7 @@ pub fn plan(asked: &Asked<'_>, method: Method, (scene, camera): (&Scene, &Camera
         if effect.present {
             (effect.energy, effect.error_if_off) = (weight.energy, weight.error_if_off);
             effect.seconds_per_iteration = weight.saved;
-            let whole = choice.and_then(Choice::trial).map(|trial| trial.seconds_per_iteration);
+            let whole = choice.map(|choice| choice.seconds_per_iteration);
             let simulated = effect.simulated;
             effect.time = weight.saved.filter(|_| simulated).zip(whole).map(|(saved, whole)| (saved / whole).min(1.0));
         }

@@ -79,6 +79,7 @@ impl MergePhoton {
 
 /// Merges the photons around `vertex`, of all levels with one query: calls `add(class, level, radiance)`.
 #[inline]
+#[allow(clippy::too_many_arguments, reason = "what a merge needs, by reference")]
 pub(super) fn merge_photons<R: Record>(
     photons: &PhotonMap<MergePhoton>,
     levels: &MergeLevels,

@@ -134,10 +134,10 @@ fn a_second_signal_ends_at_once() {
 #[test]
 fn waits_are_explained() {
     let folder = Folder::new();
-    // Where nothing focuses light a pilot chooses.
-    let matte = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/blocks.glb");
-    std::fs::copy(matte, folder.path("matte.glb")).expect("the scene can be copied");
-    let arguments = "render matte.glb -o out.exr --width 640 --time 3600 --progress plain";
+    // Nothing focuses light in it: several methods are tried.
+    let blocks = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/blocks.glb");
+    std::fs::copy(blocks, folder.path("blocks.glb")).expect("it can be copied");
+    let arguments = "render blocks.glb -o out.exr --width 640 --time 3600 --progress plain";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
     let mut rest = wait_for_line(&mut child, "choosing a method\n");
     signal(&child, "-INT");

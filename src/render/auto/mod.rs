@@ -37,6 +37,8 @@ pub struct Choice {
     pub weights: Vec<Weight>,
     /// Why nothing was tried.
     pub because: Option<&'static str>,
+    /// Counted core-seconds of an iteration.
+    pub seconds_per_iteration: f64,
     /// Time that it took.
     pub spent: Spent,
 }
@@ -71,9 +73,10 @@ pub fn choose(
     let cost = chosen.map_or(pilot.cost, |chosen| chosen.cost);
     let saving = |weighed: Weighed| weighed.saving([&cost, &pilot.cost], way, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
+    let seconds_per_iteration = cost.of(way, &settings, pilot.pixels);
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
-    Some(Choice { settings, way, trials, weights, because, spent })
+    Some(Choice { settings, way, trials, weights, because, seconds_per_iteration, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.

@@ -116,7 +116,7 @@ impl<'a> Pilot<'a> {
         let Pilot { scene, camera, gathering, cost, pixels, budget } = *self;
         let ways = ways(scene, make);
         if ways.len() < 2 {
-            let why = if focuses(scene) {
+            let why = if focuses(scene) && !ways.is_empty() {
                 "light is focused here, which it finds by all techniques"
             } else {
                 "the one way that these options leave"
