@@ -17,13 +17,13 @@
 
 pub mod affinity;
 pub mod kernel;
-pub mod map;
+mod map;
 pub mod model;
 pub mod network;
 mod rect;
 pub mod runtime;
 mod stack;
-mod tensor;
+pub mod tensor;
 pub mod tile;
 
 #[cfg(test)]
