@@ -132,8 +132,13 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let stage = (&scene, &camera);
     let (settings, selection) = checked(&order, stage)?;
     let choice = choose(&order, auto, stage, &settings, watch)?;
-    let settings = choice.as_ref().map_or(settings, |choice| choice.settings.clone());
-    memory::check(stage, &settings, layers::channels(&settings, Present::of(&scene)))?;
+    let settings = match &choice {
+        Some(choice) => {
+            memory::check(stage, &choice.settings, layers::channels(&choice.settings, Present::of(&scene)))?;
+            choice.settings.clone()
+        }
+        None => settings,
+    };
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
     let mut plan = plan::plan(&asked, settings.method, stage, &removed);
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;

@@ -292,14 +292,15 @@ impl Iterate for Passes<'_> {
         let (none, eye) = (PhotonMap::build(Vec::new()), self.eye());
         let all = initial_bandwidths(&eye, initial, widest, seed, [&none; 2]);
         // A footprint is the same number of pixels everywhere; a fixed radius is compared with the median one.
-        let mut ratios: Vec<f32> =
-            initial_bandwidths(&eye, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1])
-                .iter()
-                .zip(&all)
-                .map(|([footprint], [bandwidth, _])| FOOTPRINT_PIXELS * bandwidth / footprint)
-                .collect();
-        let middle = ratios.len() / 2;
-        let pixels = *ratios.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let pixels = match initial {
+            InitialBandwidth::Fixed(radius) => {
+                let footprints = initial_bandwidths(&eye, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
+                let mut footprints = footprints.into_flattened();
+                let middle = footprints.len() / 2;
+                FOOTPRINT_PIXELS * radius / *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
+            }
+            _ => FOOTPRINT_PIXELS.min(widest * width as f32),
+        };
         self.covered = std::f32::consts::PI * pixels * pixels;
         all.into_iter().map(Pixel::new).collect()
     }

@@ -13,7 +13,7 @@ use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::{Indirect, path_radiance};
-use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, quad, sphere, square};
+use support::scenes::{add, build, cuboid, eye, glass, glossy_balls, lit_room, look_at, matte, quad, sphere, square};
 use support::stats::t_critical;
 use support::tiles::{SIZE, TILES, average, tiles};
 
@@ -83,25 +83,10 @@ fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, plante
     assert!(!disagreeing(&wrong, paths, bias).is_empty(), "{what}: a tile brighter by {planted} goes unnoticed");
 }
 
-fn room(walls: Material) -> Description {
-    let mut description = Description::default();
-    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), walls);
-    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
-    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
-    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
-    description
-}
-
 /// Plastic and rough metal in a room: layered lobes that gather and go on, wide and narrow.
 #[test]
 fn glossy_room() {
-    let plastic = Material { base_color: [0.6, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
-    let mut description = room(plastic);
-    let metal =
-        |roughness| Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness, ..Material::default() };
-    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
-    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
-    let scene = build(description);
+    let scene = build(glossy_balls());
     let paths = by_paths(&scene, 64, 10);
     for way in WAYS {
         check(&format!("glossy room, {way:?}"), &by_photons(&scene, way, 20_000, 0.05, 8, 10), &paths, 0.015, 0.15);
@@ -112,7 +97,7 @@ fn glossy_room() {
 #[test]
 fn lamp_behind_glass_in_a_varnished_room() {
     let varnish = Material { base_color: [0.5, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.35, ..Material::default() };
-    let mut description = room(varnish);
+    let mut description = lit_room(varnish);
     add(&mut description, "pane", cuboid(Vec3::new(-0.6, 1.8, -0.6), Vec3::new(0.6, 1.9, 0.6), false), glass(1.5));
     let metal = Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness: 0.3, ..Material::default() };
     add(&mut description, "metal", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
@@ -126,7 +111,7 @@ fn lamp_behind_glass_in_a_varnished_room() {
 /// Smooth and rough glass under a large lamp, which path tracing can run into.
 #[test]
 fn glass_room() {
-    let mut description = room(matte(0.5, 0.0));
+    let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
     let rough = Material { roughness: 0.4, ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);

@@ -14,7 +14,9 @@ use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,
 };
 use caustique::scene::{Description, Scene};
-use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::scenes::{
+    add, build, cuboid, glass, glossy_balls, lit_room, look_at, matte, mirror, point_light, quad, sphere, square,
+};
 use support::stats::{mean_and_error, t_critical};
 use support::tiles::{SIZE, TILES, average};
 
@@ -268,25 +270,10 @@ fn agree_with(
     }
 }
 
-fn room(walls: Material) -> Description {
-    let mut description = Description::default();
-    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), walls);
-    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
-    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
-    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
-    description
-}
-
 /// Plastic and rough metal in a room: layered lobes, wide and narrow.
 #[test]
 fn glossy_room() {
-    let plastic = Material { base_color: [0.6, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
-    let mut description = room(plastic);
-    let metal =
-        |roughness| Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness, ..Material::default() };
-    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
-    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
-    let scene = build(description);
+    let scene = build(glossy_balls());
     let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm, Method::Cppm];
     let mut methods = methods.map(|m| (m, 48)).to_vec();
     methods.push((Method::Pm, 16));
@@ -296,7 +283,7 @@ fn glossy_room() {
 /// Smooth and rough glass, with a lens in front of the camera. Light tracing sees nothing behind smooth glass, so it stays out.
 #[test]
 fn glass_room() {
-    let mut description = room(matte(0.5, 0.0));
+    let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
     let rough = Material { roughness: 0.4, ..glass(1.4) };
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
@@ -345,7 +332,7 @@ fn under_the_sky() {
 /// Parallel projection, which no light path can be connected to, and paths of four segments at most.
 #[test]
 fn short_paths_seen_in_parallel() {
-    let mut description = room(matte(0.6, 0.0));
+    let mut description = lit_room(matte(0.6, 0.0));
     add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 64), mirror());
     description.cameras[0].projection = Projection::Orthographic { xmag: 0.9, ymag: 0.9 };
     let scene = build(description);
@@ -420,7 +407,7 @@ fn one_large_photon_map() {
 // ---------------------------------------------------------------- levels, shards, threads
 
 fn small_room() -> Scene {
-    let mut description = room(matte(0.6, 0.0));
+    let mut description = lit_room(matte(0.6, 0.0));
     add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 64), glass(1.5));
     build(description)
 }
@@ -444,7 +431,7 @@ fn levels_agree() {
 /// A picture per technique: the weighted ones sum to the method's own image, on a room with a lamp that can be hit.
 #[test]
 fn techniques_share_the_picture() {
-    let mut description = room(matte(0.6, 0.0));
+    let mut description = lit_room(matte(0.6, 0.0));
     add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 64), mirror());
     let scene = build(description);
     let cases = [

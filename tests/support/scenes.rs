@@ -146,3 +146,24 @@ pub fn build(description: Description) -> Scene {
 pub fn square(size: u32) -> View {
     View { camera: None, width: Some(size), height: Some(size) }
 }
+
+/// A room with a lamp below the ceiling.
+pub fn lit_room(walls: Material) -> Description {
+    let mut description = Description::default();
+    add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), walls);
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 2.8), DVec3::new(0.0, 0.9, 0.0), 50.0));
+    description
+}
+
+/// Balls of rough metal in a room of plastic: layered lobes, wide and narrow.
+pub fn glossy_balls() -> Description {
+    let plastic = Material { base_color: [0.6, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.3, ..Material::default() };
+    let mut description = lit_room(plastic);
+    let metal =
+        |roughness| Material { base_color: [0.9, 0.7, 0.4, 1.0], metallic: 1.0, roughness, ..Material::default() };
+    add(&mut description, "narrow", sphere(Vec3::new(-0.45, 0.4, 0.0), 0.4, 64), metal(0.35));
+    add(&mut description, "wide", sphere(Vec3::new(0.45, 0.4, 0.3), 0.4, 64), metal(0.7));
+    description
+}

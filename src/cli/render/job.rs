@@ -81,11 +81,11 @@ pub struct Job {
     #[arg(long, value_enum, help_heading = "Expert")]
     pub kernel: Option<Kernel>,
     /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
-    /// the same, its noise another. Not for path, pm and --cppm-plus [default: off; auto tries both]
+    /// the same, its noise another. Not for path, pm and --cppm-plus [default: off; auto: on where light is focused]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub guide: Option<Switch>,
     /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
-    /// [default: photons; auto tries both]
+    /// [default: photons]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub indirect: Option<Indirect>,
     /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
@@ -134,7 +134,7 @@ pub struct Job {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Whichever a short pilot expects to be best; sppm where the render is too short for one
+    /// vcm, guided where light is focused; elsewhere path or bdpt where a short pilot shows them to be clearly better
     Auto,
     /// Path tracing
     Path,

@@ -8,8 +8,6 @@
 use super::trial::WORST;
 use crate::finish::told::{self, Judged};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
-use crate::light::Guide;
-use crate::render::cost::Cost;
 use crate::render::session::{Session, Stage};
 use crate::render::strategy::Strategy;
 use crate::stat::floor;
@@ -35,15 +33,12 @@ pub struct Trial {
     pub seconds_per_iteration: f64,
     /// It is the one to take.
     pub chosen: bool,
-    /// The counts behind it.
-    pub(super) cost: Cost,
 }
 
 /// A candidate being tried.
 pub(super) struct Candidate<'a> {
     way: Strategy,
     session: Session<'a>,
-    cost: Cost,
     /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what comes before iterations.
     once: f64,
     whole: f64,
@@ -69,16 +64,9 @@ impl Trial {
 }
 
 impl<'a> Candidate<'a> {
-    /// Nothing done yet but what comes before iterations. `count` counts work with the guide that is learnt here, if any, and says what an
-    /// iteration costs in the small picture and the whole one.
-    pub fn new(
-        stage: &'a Stage<'a>,
-        way: Strategy,
-        count: impl Fn(Option<&Guide>) -> (Cost, f64, f64),
-    ) -> Candidate<'a> {
-        let session = Session::new(stage);
-        let (cost, once, whole) = count(session.guide());
-        Candidate { way, session, cost, once, whole, spent: 0.0 }
+    /// Nothing done yet but what comes before iterations, of which one costs so much in the small picture and the whole one.
+    pub fn new(stage: &'a Stage<'a>, way: Strategy, [once, whole]: [f64; 2]) -> Candidate<'a> {
+        Candidate { way, session: Session::new(stage), once, whole, spent: 0.0 }
     }
 
     /// Goes on until so many core-seconds are spent; no further than the least number of iterations once `stop` holds.
@@ -242,9 +230,9 @@ pub(super) fn hold(
     let usual = usual.filter(|&usual| open[usual] && !left[usual].is_clearly_worse(&left[best]));
     let chosen = usual.unwrap_or(best);
     let trial = |(index, (candidate, left)): (usize, (&Candidate<'_>, &Expected))| {
-        let Candidate { way, cost, whole, .. } = *candidate;
+        let Candidate { way, whole, .. } = *candidate;
         let squared_error = left.squared_error();
-        Trial { way, squared_error, seconds_per_iteration: whole, chosen: index == chosen, cost }
+        Trial { way, squared_error, seconds_per_iteration: whole, chosen: index == chosen }
     };
     candidates.iter().zip(&left).enumerate().map(trial).collect()
 }

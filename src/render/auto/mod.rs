@@ -70,10 +70,9 @@ pub fn choose(
     };
     let way = chosen.map_or_else(untried, |chosen| chosen.way);
     let mut settings = make(way)?;
-    let cost = chosen.map_or(pilot.cost, |chosen| chosen.cost);
-    let saving = |weighed: Weighed| weighed.saving([&cost, &pilot.cost], way, &settings, pilot.pixels);
+    let saving = |weighed: Weighed| weighed.saving(&pilot.cost, way, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
-    let seconds_per_iteration = cost.of(way, &settings, pilot.pixels);
+    let seconds_per_iteration = pilot.cost.of(way, &settings, pilot.pixels);
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     settings.decided = spent;
     Some(Choice { settings, way, trials, weights, because, seconds_per_iteration, spent })

@@ -113,7 +113,7 @@ impl<'a> Pilot<'a> {
         make: &impl Fn(Strategy) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
-        let Pilot { scene, camera, gathering, cost, pixels, budget } = *self;
+        let Pilot { scene, cost, pixels, budget, .. } = *self;
         let ways = ways(scene, make);
         if ways.len() < 2 {
             let why = if focuses(scene) && !ways.is_empty() {
@@ -138,10 +138,8 @@ impl<'a> Pilot<'a> {
             .iter()
             .zip(&ways)
             .map(|(stage, (way, settings))| {
-                Candidate::new(stage, *way, |guide| {
-                    let cost = guide.map_or(cost, |guide| Cost::count(scene, camera, gathering, Some(guide)));
-                    (cost, cost.of(*way, stage.settings(), few), cost.of(*way, settings, pixels))
-                })
+                let costs = [cost.of(*way, stage.settings(), few), cost.of(*way, settings, pixels)];
+                Candidate::new(stage, *way, costs)
             })
             .collect();
         (contest::hold(&mut candidates, finish, (allowed, budget), stop), None)

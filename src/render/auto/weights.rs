@@ -204,13 +204,14 @@ pub(super) fn weigh(
 }
 
 impl Weighed {
-    /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is of the render with its guide, `usual` without.
-    pub fn saving(self, [cost, usual]: [&Cost; 2], way: Strategy, settings: &Settings, pixels: f64) -> Weight {
+    /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is counted
+    /// without a guide.
+    pub fn saving(self, cost: &Cost, way: Strategy, settings: &Settings, pixels: f64) -> Weight {
         let saved = match self.without {
-            // No guide was learnt without the effect: of unguided paths it tells the share.
+            // Of unguided paths it tells the share.
             Some(without) => {
                 let unguided = Strategy { guided: false, ..way };
-                let [with, without] = [usual, &without].map(|cost| cost.of(unguided, settings, pixels));
+                let [with, without] = [cost, &without].map(|cost| cost.of(unguided, settings, pixels));
                 (1.0 - without / with).max(0.0) * cost.of(way, settings, pixels)
             }
             None => saved(cost, (way, settings), self.weight.effect, pixels),
