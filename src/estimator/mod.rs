@@ -6,9 +6,11 @@ mod error;
 mod pixel;
 mod quarters;
 pub mod rule;
+mod state;
 
 pub use bandwidth::InitialBandwidth;
 pub use coverage::{Coverage, RANKS};
 pub use error::SquaredError;
 pub use pixel::{Parts, Pixel, QUARTERS, Quarter};
 pub use quarters::variance_ratio;
+pub use state::{BandwidthState, Schedule, level_factor2};

@@ -12,8 +12,7 @@
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
-use crate::estimator::rule::volume::level_factor;
-use crate::estimator::{Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
+use crate::estimator::{BandwidthState, Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
 use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Part};
@@ -35,20 +34,28 @@ pub struct Shape {
     pub own: usize,
     /// Kinds of photons that have bandwidths, merged light paths counted as the first.
     pub kinds: ByKind<bool>,
-    /// Squared bandwidth of the last iteration over that of the first.
-    pub radius2_factor: f64,
     /// Whether an environment light can be seen.
     pub environment: bool,
     /// Classes of light paths that are looked for: a part of the picture without any has no layer.
     pub classes: ClassSet,
     /// Whether media scatter.
     pub volume: bool,
-    /// Where photons are gathered in media: bandwidth there of the last iteration over that of the first.
-    pub volume_radius_factor: Option<f64>,
+    /// Whether photons are gathered in media.
+    pub volume_photons: bool,
 }
 
-/// Values of one layer at one pixel, as many as it has components, given the ratio by which variances of Welford's statistics are too large.
-type Get = Box<dyn Fn(&Pixel, f64) -> [f32; 4] + Sync>;
+/// A pixel as the layers see it.
+struct At<'a> {
+    pixel: &'a Pixel,
+    /// Of the pixel, row by row from the top.
+    index: usize,
+    bandwidths: &'a BandwidthState,
+    /// By which variances of Welford's statistics are too large.
+    ratio: f64,
+}
+
+/// Values of one layer at one pixel, as many as it has components.
+type Get = Box<dyn Fn(&At<'_>) -> [f32; 4] + Sync>;
 
 /// One of the additive parts.
 type OfParts = fn(&Parts) -> DVec3;
@@ -62,22 +69,22 @@ struct Column {
 
 impl Column {
     fn rgb(name: impl Into<String>, get: impl Fn(&Pixel) -> DVec3 + Sync + 'static) -> Column {
-        Column { name: name.into(), components: "RGB", get: Box::new(move |p, _| three(get(p).as_vec3())) }
+        Column { name: name.into(), components: "RGB", get: Box::new(move |at| three(get(at.pixel).as_vec3())) }
     }
 
-    fn noise(name: impl Into<String>, get: impl Fn(&Pixel, f64) -> DVec3 + Sync + 'static) -> Column {
+    fn noise(name: impl Into<String>, get: impl Fn(&At<'_>) -> DVec3 + Sync + 'static) -> Column {
         // Squares of 10^20 and more are no f32: what is known to be large is not to look as if nothing were known.
         let most = DVec3::splat(f64::from(f32::MAX));
-        let get = Box::new(move |p: &Pixel, ratio: f64| three(get(p, ratio).min(most).as_vec3()));
+        let get = Box::new(move |at: &At<'_>| three(get(at).min(most).as_vec3()));
         Column { name: name.into(), components: "RGB", get }
     }
 
     fn xyz(name: &str, get: impl Fn(&Pixel) -> Vec3 + Sync + 'static) -> Column {
-        Column { name: name.into(), components: "XYZ", get: Box::new(move |p, _| three(get(p))) }
+        Column { name: name.into(), components: "XYZ", get: Box::new(move |at| three(get(at.pixel))) }
     }
 
-    fn one(name: impl Into<String>, components: &'static str, get: impl Fn(&Pixel) -> f32 + Sync + 'static) -> Column {
-        Column { name: name.into(), components, get: Box::new(move |p, _| [get(p), 0.0, 0.0, 0.0]) }
+    fn one(name: impl Into<String>, components: &'static str, get: impl Fn(&At<'_>) -> f32 + Sync + 'static) -> Column {
+        Column { name: name.into(), components, get: Box::new(move |at| [get(at), 0.0, 0.0, 0.0]) }
     }
 }
 
@@ -100,15 +107,14 @@ pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, kinds, radius2_factor, environment, classes, volume, volume_radius_factor } =
-        *shape;
+    let Shape { levels, compared, own, kinds, environment, classes, volume, volume_photons } = *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
             components: "RGBA",
-            get: Box::new(move |p, _| {
-                let alpha = if environment { 1.0 } else { p.coverage.hit_fraction() };
-                p.levels[own].mean.as_vec3().extend(alpha).to_array()
+            get: Box::new(move |at| {
+                let alpha = if environment { 1.0 } else { at.pixel.coverage.hit_fraction() };
+                at.pixel.levels[own].mean.as_vec3().extend(alpha).to_array()
             }),
         },
         Column::rgb("Noisy", move |p| p.levels[own].mean),
@@ -117,19 +123,17 @@ fn columns(shape: &Shape) -> Vec<Column> {
         columns.push(Column::rgb(format!("Level{}", level + 1), move |p| p.levels[level].mean));
     }
     for level in 0..levels {
-        columns.push(Column::noise(format!("Variance{}", level + 1), move |p, ratio| variance(p, level) * ratio));
+        columns.push(Column::noise(format!("Variance{}", level + 1), move |at| variance(at.pixel, level) * at.ratio));
     }
     for (kind, name) in radius_layers(kinds) {
         for level in 0..levels {
-            // Each level's squared bandwidth is half that of the next larger.
-            let factor = (radius2_factor * 0.5f64.powi((levels - 1 - level) as i32)).sqrt() as f32;
-            let bandwidth = move |p: &Pixel| p.bandwidths[kind as usize] * factor;
-            columns.push(Column::one(format!("{name}{}", level + 1), "X", bandwidth));
+            let radius = move |at: &At<'_>| at.bandwidths.radius2(at.index, at.pixel, kind, level).sqrt();
+            columns.push(Column::one(format!("{name}{}", level + 1), "X", radius));
         }
     }
-    for (level, factor) in volume_radius_factor.into_iter().flat_map(|factor| (0..levels).map(move |k| (k, factor))) {
-        let factor = factor as f32 * level_factor(level, levels);
-        columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", move |p| p.volume_bandwidth * factor));
+    for level in (0..levels).filter(|_| volume_photons) {
+        let radius = move |at: &At<'_>| at.bandwidths.volume_radius(at.pixel, level);
+        columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", radius));
     }
     for quarter in 0..QUARTERS {
         columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarters[quarter].mean()));
@@ -148,16 +152,19 @@ fn columns(shape: &Shape) -> Vec<Column> {
         }
     }
     columns.extend([
-        Column::noise("Error", move |p, ratio| match SquaredError::of(p, own, compared) {
-            Some(error) => SquaredError { variance: error.variance * ratio, ..error }.root(),
-            None => p.levels[own].mean.abs(),
+        Column::noise("Error", move |at| match SquaredError::of(at.pixel, own, compared) {
+            Some(error) => SquaredError { variance: error.variance * at.ratio, ..error }.root(),
+            None => at.pixel.levels[own].mean.abs(),
         }),
         Column::rgb("albedo", |p| mean(p.albedo, p.features)),
         Column::xyz("normal", |p| p.normal.normalize_or_zero().as_vec3()),
-        Column::one("depth", "Z", |p| if p.depths == 0 { BACKGROUND } else { (p.depth / f64::from(p.depths)) as f32 }),
-        Column::one("Z", "Z", |p| p.z),
+        Column::one("depth", "Z", |at| match at.pixel.depths {
+            0 => BACKGROUND,
+            depths => (at.pixel.depth / f64::from(depths)) as f32,
+        }),
+        Column::one("Z", "Z", |at| at.pixel.z),
         Column::xyz("P", |p| p.p),
-        Column::one("Rejected", "X", |p| p.rejected as f32),
+        Column::one("Rejected", "X", |at| at.pixel.rejected as f32),
     ]);
     columns
 }
@@ -184,6 +191,7 @@ pub fn names(shape: &Shape) -> Vec<String> {
 pub fn layers(
     (width, height): (u32, u32),
     pixels: &[Pixel],
+    bandwidths: &BandwidthState,
     shape: &Shape,
     wanted: impl Fn(&str) -> bool,
 ) -> Result<LayerSet> {
@@ -202,12 +210,15 @@ pub fn layers(
         }
     }
     blocks.par_iter_mut().zip(pixels.par_chunks(BLOCK)).enumerate().for_each(|(block, (planes, pixels))| {
-        let ratio = |i: usize| ratios.get(block * BLOCK + i).copied().map_or(1.0, f64::from);
+        let at = |(i, pixel)| {
+            let index = block * BLOCK + i;
+            At { pixel, index, bandwidths, ratio: ratios.get(index).copied().map_or(1.0, f64::from) }
+        };
         let mut planes = planes.as_mut_slice();
         for column in &columns {
             let (own, others) = std::mem::take(&mut planes).split_at_mut(column.components.len());
-            for (i, pixel) in pixels.iter().enumerate() {
-                for (plane, value) in own.iter_mut().zip((column.get)(pixel, ratio(i))) {
+            for (i, at) in pixels.iter().enumerate().map(at).enumerate() {
+                for (plane, value) in own.iter_mut().zip((column.get)(&at)) {
                     plane[i] = value;
                 }
             }
@@ -228,6 +239,7 @@ pub fn layers(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::Schedule;
     use crate::math::Rgb;
     use crate::transport::{EyeMeasure, Features, FirstHit};
 
@@ -236,11 +248,10 @@ mod tests {
         compared: 5,
         own: 3,
         kinds: [true; 2],
-        radius2_factor: 0.25,
         environment: false,
         classes: ClassSet::ALL,
         volume: true,
-        volume_radius_factor: Some(0.5),
+        volume_photons: true,
     };
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
@@ -263,6 +274,11 @@ mod tests {
         }
     }
 
+    /// After an iteration whose squared radii on surfaces are a fraction of the first's.
+    fn bandwidths() -> BandwidthState {
+        BandwidthState::memoryless(Schedule::new(9, 5, 0.5, 0.5))
+    }
+
     fn value(set: &LayerSet, layer: &str, component: &str) -> f32 {
         set.get(layer).and_then(|l| l.plane(component)).expect("the layer is there").values[0]
     }
@@ -274,7 +290,7 @@ mod tests {
             let x = 0.1 + 0.37 * i as f32;
             pixel.add(i + 1, &measure(x, true), Some(&measure(1.1 * x, i != 0)), (5, 3));
         }
-        let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), &[pixel], &bandwidths(), &SHAPE, |_| true).expect("one pixel");
         for c in ["R", "G", "B"] {
             let parts = ["Direct", "Indirect", "Caustic", "Emission", "Volume"];
             let sum: f32 = parts.iter().map(|part| value(&set, part, c)).sum();
@@ -282,26 +298,29 @@ mod tests {
             assert_eq!(value(&set, "Noisy", c), value(&set, "Level4", c));
             assert_eq!(value(&set, "Noisy", c), value(&set, "", c));
         }
-        // sqrt(0.25) of the largest bandwidth, then 1/sqrt(2) a level.
-        for (name, expected) in [("Radius5", 1.0), ("Radius4", 0.5f32.sqrt()), ("Radius3", 0.5), ("Radius1", 0.25)] {
-            assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
-        }
-        for (name, expected) in [("CausticRadius5", 2.0), ("CausticRadius1", 0.5)] {
+        // What the products of the memoryless rule are after 8 steps, then 1/sqrt(2) a level, in media 1/cbrt(2).
+        let product: f32 = (1..9).map(|k| (k as f32 + 0.5) / (k as f32 + 1.0)).product();
+        let (surface, volume) = (product.sqrt(), product.cbrt());
+        for (name, expected) in [
+            ("Radius5", 2.0 * surface),
+            ("Radius4", 2.0 * surface * 0.5f32.sqrt()),
+            ("Radius1", 2.0 * surface * 0.25),
+            ("CausticRadius5", 4.0 * surface),
+            ("CausticRadius1", surface),
+            ("VolumeRadius5", 3.0 * volume),
+            ("VolumeRadius4", 3.0 * volume / 2f32.cbrt()),
+            ("VolumeRadius2", 1.5 * volume),
+        ] {
             assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
         }
         let focused = Shape { kinds: [false, true], ..SHAPE };
-        let alone = layers((1, 1), &[pixel], &focused, |_| true).expect("one pixel");
-        assert!((value(&alone, "Radius5", "X") - 2.0).abs() < 1e-6 && alone.get("CausticRadius5").is_none());
-        // Half of the largest, then 1/cbrt(2) a level.
-        for (name, expected) in [("VolumeRadius5", 1.5), ("VolumeRadius4", 1.5 / 2f32.cbrt()), ("VolumeRadius2", 0.75)]
-        {
-            assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
-        }
+        let alone = layers((1, 1), &[pixel], &bandwidths(), &focused, |_| true).expect("one pixel");
+        assert!((value(&alone, "Radius5", "X") - 4.0 * surface).abs() < 1e-6 && alone.get("CausticRadius5").is_none());
         // One of ten eye paths missed: it counts for alpha and albedo, not for depth.
         assert_eq!(value(&set, "", "A"), 0.9);
         assert!((value(&set, "albedo", "R") - 0.45).abs() < 1e-6);
         assert_eq!((value(&set, "depth", "Z"), value(&set, "normal", "Y")), (4.0, 1.0));
-        let clear = Shape { volume: false, volume_radius_factor: None, ..SHAPE };
+        let clear = Shape { volume: false, volume_photons: false, ..SHAPE };
         assert_eq!(names(&clear).len() + 6, names(&SHAPE).len());
         assert_eq!(names(&SHAPE), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
     }
@@ -315,7 +334,7 @@ mod tests {
             let measure = EyeMeasure { direct: light, ..EyeMeasure::default() };
             pixel.add(pass, &measure, Some(&measure), (5, 3));
         }
-        let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), &[pixel], &bandwidths(), &SHAPE, |_| true).expect("one pixel");
         assert_eq!(value(&set, "Variance2", "R"), f32::MAX);
         // (1e20)^2 four times, over 4 and 3, and the root of it.
         assert!((value(&set, "Error", "R") / (1e20 / 3f32.sqrt()) - 1.0).abs() < 1e-3);
@@ -325,14 +344,14 @@ mod tests {
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
         let mut pixel = Pixel::new([1.0; 2]);
         pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)), (5, 3));
-        let set = layers((1, 1), &[pixel], &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), &[pixel], &bandwidths(), &SHAPE, |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");
         assert!((value(&set, "Variance2", "R") / (mean * mean) - 1.0).abs() < 1e-6);
         assert_eq!(value(&set, "Error", "G"), value(&set, "Noisy", "G"));
         assert_eq!((value(&set, "depth", "Z"), value(&set, "Z", "Z")), (BACKGROUND, BACKGROUND));
         assert_eq!(value(&set, "", "A"), 0.0);
         let lit = Shape { environment: true, ..SHAPE };
-        let set = layers((1, 1), &[pixel], &lit, |name| name.is_empty()).expect("one pixel");
+        let set = layers((1, 1), &[pixel], &bandwidths(), &lit, |name| name.is_empty()).expect("one pixel");
         assert_eq!((value(&set, "", "A"), set.layers.len()), (1.0, 1));
     }
 }

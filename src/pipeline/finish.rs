@@ -2,6 +2,7 @@
 
 use crate::combine::{Combiner, Model, Runtime};
 use crate::error::{Error, Kind, Result};
+use crate::film::LayerSet;
 use crate::finish::{Account, Denoiser, DenoiserChoice, Finish, Quality, Size};
 use crate::render::Clock;
 use serde_json::{Value, json};
@@ -100,6 +101,17 @@ impl Ready {
         self.finish.quality = picture.0;
         // The picture, half of it for its error, and its parts.
         Ok((picture.1 + fast * (1.0 + parts as f64)).min(MOST * seconds))
+    }
+
+    /// Finishes a picture that is looked at for some seconds: the quickest way, without its error and its parts.
+    ///
+    /// # Errors
+    /// See [`Finish::apply`].
+    pub fn preview(&mut self, set: &mut LayerSet) -> Result<()> {
+        let quality = std::mem::replace(&mut self.finish.quality, Quality::Fast);
+        let applied = self.finish.apply(set, |_| false);
+        self.finish.quality = quality;
+        applied.map(|_| ())
     }
 
     /// The finish alone.

@@ -7,8 +7,9 @@ use crate::film::{Layer, LayerSet, Naming, Selection, describe, output as film};
 use crate::finish::finished_part;
 use crate::image::exr::Attributes;
 use crate::render::output::shape;
-use crate::render::{Present, Rendered, Settings};
+use crate::render::{Rendered, Settings};
 use crate::scene::Scene;
+use crate::scene::Survey;
 use rayon::prelude::*;
 
 /// Kinds of cryptomattes.
@@ -20,8 +21,8 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
 }
 
 /// Names of the layers that a render with these settings can have, finished or not.
-fn names(settings: &Settings, present: Present, finished: bool) -> Vec<String> {
-    let mut names = film::names(&shape(settings, 1, present));
+fn names(settings: &Settings, survey: &Survey, finished: bool) -> Vec<String> {
+    let mut names = film::names(&shape(settings, survey));
     if finished {
         names.extend(names.iter().filter_map(|name| finished_part(name)).collect::<Vec<_>>());
     }
@@ -30,17 +31,17 @@ fn names(settings: &Settings, present: Present, finished: bool) -> Vec<String> {
 }
 
 /// Channels that a render with these settings can have.
-pub fn channels(settings: &Settings, present: Present) -> usize {
-    names(settings, present, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
+pub fn channels(settings: &Settings, survey: &Survey) -> usize {
+    names(settings, survey, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
 
 /// The layers asked for (`all`, `beauty`, or names separated by commas), checked against what this render will have.
 ///
 /// # Errors
 /// There is no such layer.
-pub fn selection(asked: &str, settings: &Settings, present: Present, finished: bool) -> Result<Selection> {
+pub fn selection(asked: &str, settings: &Settings, survey: &Survey, finished: bool) -> Result<Selection> {
     let selection = Selection::parse(asked)?;
-    let layers = names(settings, present, finished).into_iter().map(|name| Layer { name, planes: vec![] }).collect();
+    let layers = names(settings, survey, finished).into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;
     Ok(selection)
 }

@@ -15,13 +15,14 @@ pub use load::Loaded;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::film::{LayerSet, Naming, Selection, output as film};
-use crate::finish::{Account, Finish, finished_part, reads};
+use crate::finish::{Account, Finish, finished_part, reads, reads_for_picture};
 use crate::image::exr::{self, Attributes};
 use crate::plan::{Plan, Switches};
 use crate::render::auto::{self, Choice};
 use crate::render::output::shape;
 use crate::render::{
-    Clock, Control, Present, Progress, Rendered, Settings, Strategy, TechniquePicture, cpu_seconds, peak_memory,
+    Clock, Control, Progress, Rendered, Session, Settings, Spent, Stage, Strategy, TechniquePicture, cpu_seconds,
+    drive, peak_memory,
 };
 use crate::scene::{Scene, View};
 use serde_json::{Map, Value, json};
@@ -98,6 +99,14 @@ pub trait Watch {
     fn begins(&mut self, plan: &Plan, settings: &Settings);
     /// An iteration is done.
     fn progress(&mut self, progress: &Progress);
+    /// Whether the picture as it is now is to be shown.
+    fn looks(&mut self) -> bool {
+        false
+    }
+    /// The picture as it is: the beauty alone (radiance), or why there is none. The render goes on either way.
+    fn picture(&mut self, picture: Result<LayerSet>) {
+        let _ = picture;
+    }
     /// All are; the pixels are still there.
     fn rendered(&mut self, rendered: &Rendered);
 }
@@ -134,7 +143,7 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let choice = choose(&order, auto, stage, &settings, watch)?;
     let settings = match &choice {
         Some(choice) => {
-            memory::check(stage, &choice.settings, layers::channels(&choice.settings, Present::of(&scene)))?;
+            memory::check(stage, &choice.settings, layers::channels(&choice.settings, &scene.survey))?;
             choice.settings.clone()
         }
         None => settings,
@@ -143,8 +152,11 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let mut plan = plan::plan(&asked, settings.method, stage, &removed);
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     watch.begins(&plan, &settings);
-    let rendered = crate::render::render(&scene, &camera, &settings, |progress, _| {
+    let decided = choice.as_ref().map(|choice| choice.spent).unwrap_or_default();
+    let stage = Stage::new(&scene, &camera, &settings);
+    let rendered = drive(Session::after(&stage, decided), |progress, session| {
         watch.progress(progress);
+        preview(session, ready.as_mut(), watch);
         if watch.stops() { Control::Stop } else { Control::Continue }
     });
     watch.rendered(&rendered);
@@ -156,15 +168,34 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     delivery
 }
 
+/// Shows the picture as it is to those who look, finished as the last one will be, if quicker.
+fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, watch: &mut dyn Watch) {
+    if !watch.looks() {
+        return;
+    }
+    let mut spent = Spent::default();
+    spent.during(|| {
+        let wanted = |name: &str| name.is_empty() || (ready.is_some() && reads_for_picture(name));
+        let picture = session.layers(wanted).and_then(|mut set| {
+            if let Some(ready) = ready {
+                ready.preview(&mut set)?;
+            }
+            set.layers.retain(|layer| layer.name.is_empty());
+            Ok(set)
+        });
+        watch.picture(picture);
+    });
+    session.charge(spent);
+}
+
 /// The settings for the picture's size, and the layers that are wanted, once both are known to fit the scene.
 fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Settings, Selection)> {
     check::media(&order.scene.path, &order.settings, scene)?;
     check::bandwidth(&order.scene.path, &order.settings, scene)?;
     let settings = sized(order.settings.clone(), order.photons, camera.size());
-    let present = Present::of(scene);
-    let selection = layers::selection(&order.layers, &settings, present, order.finish.is_some())?;
+    let selection = layers::selection(&order.layers, &settings, &scene.survey, order.finish.is_some())?;
     // Before anything is tried, which takes time.
-    memory::check((scene, camera), &settings, layers::channels(&settings, present))?;
+    memory::check((scene, camera), &settings, layers::channels(&settings, &scene.survey))?;
     Ok((settings, selection))
 }
 
@@ -184,9 +215,8 @@ fn choose(
     let chosen = match auto {
         None => None,
         Some(mut auto) => {
-            let present = Present::of(scene);
             let has_layers =
-                |of: &Settings| layers::selection(&order.layers, of, present, order.finish.is_some()).is_ok();
+                |of: &Settings| layers::selection(&order.layers, of, &scene.survey, order.finish.is_some()).is_ok();
             let techniques = settings.techniques;
             let make = |way: Strategy| {
                 let able = !techniques || way.method.has_techniques();
@@ -215,7 +245,7 @@ fn readied(
     let mut ready = finish::open(asked, Some(settings.levels.count))?;
     watch.finishes(ready.missing.as_ref());
     let Some(time) = settings.time else { return Ok((Some(ready), settings)) };
-    let parts = film::names(&shape(&settings, 1, Present::of(scene)));
+    let parts = film::names(&shape(&settings, &scene.survey));
     let wanted = parts.iter().filter_map(|name| finished_part(name)).filter(|part| selection.wants(part)).count();
     let (width, height) = camera.size();
     let left = time - ready.reserve(time, width as usize * height as usize, wanted)?;
@@ -235,7 +265,7 @@ fn deliver(
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let finishes = ready.is_some();
     let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
-    let mut set = rendered.layers(Present::of(scene), wanted)?;
+    let mut set = rendered.layers(&scene.survey, wanted)?;
     let mut attributes = layers::cryptomattes(scene, &rendered, selection, order.naming, &mut set)?;
     let techniques = std::mem::take(&mut rendered.techniques);
     // The pixels are most of the memory, and all that is wanted of them is in the layers now.

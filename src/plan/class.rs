@@ -26,8 +26,10 @@
 //!
 //! [`EyeSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class ([`EyeSuffix::receives`]).
 
+mod present;
 mod sight;
 
+pub use present::classes_in;
 pub use sight::{EyeSuffix, LightPrefix};
 
 use super::effect::{Effect, EffectSet, Switches};

@@ -12,7 +12,7 @@ mod presence;
 mod search;
 pub mod switch;
 
-pub use class::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
+pub use class::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass, classes_in};
 pub use effect::{Effect, EffectSet, Switches};
 pub use presence::Presence;
 pub use search::{Owner, Search};

@@ -17,8 +17,7 @@ use super::techniques::{TechniquePicture, TilePictures, Watch, collect};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
-use crate::estimator::rule::memoryless::radius2_factor;
-use crate::estimator::{InitialBandwidth, Pixel};
+use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
@@ -26,8 +25,8 @@ use crate::scene::Scene;
 use crate::spectrum::Comb;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Deposits, Eye, EyeMeasure, Indirect, LightPass, LightVertices, Meets, MergeLevels, MergePhoton,
-    Splat, Surroundings, path_measure,
+    Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
+    Surroundings, path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -85,14 +84,7 @@ impl<'a> Passes<'a> {
         }
         let (width, height) = camera.size();
         let pixels = (width * height) as f32;
-        let eye = Eye {
-            scene,
-            camera,
-            interior: surroundings.eye,
-            max_depth: settings.max_depth,
-            indirect: Indirect::Photons,
-            classes: settings.classes,
-        };
+        let eye = settings.eye(scene, camera, surroundings);
         let shared = settings.method.strategies(camera).map(|strategies| Bidirectional {
             eye,
             surroundings,
@@ -122,15 +114,7 @@ impl<'a> Passes<'a> {
     }
 
     fn eye(&self) -> Eye<'a> {
-        let Passes { scene, camera, .. } = *self;
-        Eye {
-            scene,
-            camera,
-            interior: self.surroundings.eye,
-            max_depth: self.settings.max_depth,
-            indirect: Indirect::Photons,
-            classes: self.settings.classes,
-        }
+        self.settings.eye(self.scene, self.camera, self.surroundings)
     }
 
     fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
@@ -175,14 +159,13 @@ impl<'a> Passes<'a> {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
             self.photons = Some((i - 1, self.photons_of(i - 1, &shared)));
         }
-        let factor = radius2_factor(i, self.settings.alpha) as f32;
+        let schedule = self.settings.schedule(i);
         let merged = self.photons.is_some();
-        let count = self.settings.levels.count;
         let expected = self.covered * self.pairs.len() as f32;
         let levels = |bandwidth: f32, pair: &Pair| {
             MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
-                let shrunk = factor * 0.5f32.powi((count - 1 - level) as i32);
-                let radius2 = bandwidth * bandwidth * shrunk;
+                let radius2 = schedule.radius2(bandwidth, level);
+                let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
                 let eta = match (merged, shared.strategies.connect) {
                     (false, _) => Eta::NONE,
                     (true, true) => Eta::new(radius2, shared.merged_paths).sharing(expected * shrunk),

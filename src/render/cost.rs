@@ -2,15 +2,14 @@
 //! on their ratios.
 
 use super::method::Method;
-use super::present::Present;
 use super::settings::Settings;
 use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
-use crate::plan::{ClassSet, Effect, PathClass};
-use crate::scene::Scene;
+use crate::plan::{ClassSet, Effect, PathClass, classes_in};
+use crate::scene::{Scene, Survey};
 use crate::transport::{Eye, Indirect, Lengths, Surroundings};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
@@ -67,7 +66,7 @@ pub(super) struct Cost {
     /// Mean numbers of vertices of paths.
     pub lengths: Lengths,
     /// What there is.
-    pub present: Present,
+    pub survey: Survey,
     /// Times as long as in a scene of [`TRIANGLES`] without dispersion.
     factor: f64,
 }
@@ -76,16 +75,15 @@ impl Cost {
     /// Counts what paths of a view meet; light paths are guided if there is a guide.
     pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
         let surroundings = Surroundings::of(scene, camera);
-        let Settings { max_depth, seed, classes, .. } = *settings;
-        let eye = Eye { scene, camera, interior: surroundings.eye, max_depth, indirect: Indirect::Photons, classes };
+        let eye = Eye { indirect: Indirect::Photons, ..settings.eye(scene, camera, &surroundings) };
         let reach = |length: f32| match settings.initial {
             InitialBandwidth::Fixed(radius) => radius,
             _ => footprint(camera, length),
         };
-        let lengths = Lengths::new(&eye, &surroundings, seed, guide, reach);
+        let lengths = Lengths::new(&eye, &surroundings, settings.seed, guide, reach);
         let triangles = scene.shapes.triangles().max(1) as f64;
         let dispersion = if scene.survey.dispersion { DISPERSION } else { 1.0 };
-        Cost { lengths, present: Present::of(scene), factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
+        Cost { lengths, survey: scene.survey, factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
     }
 
     /// Core-seconds of an iteration of a picture of so many pixels.
@@ -94,9 +92,9 @@ impl Cost {
         let Lengths { eye_media, light_media, on_the_way, eye_open, light_open, .. } = self.lengths;
         let paths = pixels * eye_paths(settings);
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
-        let unwanted = way.method.gathers() && settings.of_photons(self.present).is_empty();
+        let unwanted = way.method.gathers() && settings.of_photons(&self.survey).is_empty();
         let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
-        let wanted = |classes: ClassSet| !(settings.classes & self.present.classes() & classes).is_empty();
+        let wanted = |classes: ClassSet| !(settings.classes & classes_in(&self.survey) & classes).is_empty();
         let (eye_alone, eye_media_alone) = if wanted(SCATTERED) { (eye, eye_media) } else { (eye_to_broad, 0.0) };
         let scattered = wanted(SCATTERED.and(REFLECTED));
         let (light_alone, light_media_alone) = if scattered { (light, light_media) } else { (light_to_broad, 0.0) };

@@ -14,7 +14,7 @@ use super::sppm::{Sppm, keep_first_hit};
 use super::volume::Maps;
 use crate::camera::{band, par_pixels};
 use crate::estimator::rule::CountingRule;
-use crate::estimator::{InitialBandwidth, Pixel};
+use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
 use crate::random::{Domain, Streams};
@@ -274,7 +274,7 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         };
         let begin = |bandwidth: f32, level: usize| {
             // Each level's area is half that of the next larger, and so is the number of photons it begins with.
-            let scale = 0.5f32.powi((levels.count - 1 - level) as i32);
+            let scale = level_factor2(level, levels.count);
             let above = level as i32 - levels.own() as i32;
             self.rule.begin(bandwidth * bandwidth * scale, neighbours * scale, above)
         };
@@ -309,15 +309,16 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         work
     }
 
-    fn radii(&mut self) -> ByKind<Vec<f32>> {
+    fn counted(&self) -> Option<ByKind<Vec<f32>>> {
         // Of three channels the one in the middle.
         let (channels, channel) = if self.channels.is_some() { (3, 1) } else { (1, 0) };
         let count = self.layout.count();
         let of_pixels = self.bandwidths.chunks(channels * count).map(|all| &all[channel * count..][..count]);
         let first = self.layout.of_kind(Kind::Indirect);
-        [0..first, first..count].map(|of_kind| {
+        let by_kind = [0..first, first..count].map(|of_kind| {
             let bandwidths = of_pixels.clone().flat_map(|all| &all[of_kind.clone()]);
-            bandwidths.map(|bandwidth| R::radius2(bandwidth).sqrt()).collect()
-        })
+            bandwidths.map(R::radius2).collect()
+        });
+        Some(by_kind)
     }
 }

@@ -23,19 +23,27 @@ pub fn render(
     settings: &Settings,
     mut observe: impl FnMut(&Progress, &[Pixel]) -> Control,
 ) -> Rendered {
-    let stage = Stage::new(scene, camera, settings);
-    let mut session = Session::new(&stage);
+    drive(Session::new(&Stage::new(scene, camera, settings)), |progress, session| observe(progress, session.pixels()))
+}
+
+/// Iterates until the session's settings, or `observe`, stop it. What `observe` takes of the time is the render's own
+/// where it says so ([`Session::charge`]).
+pub fn drive<'a>(
+    mut session: Session<'a>,
+    mut observe: impl FnMut(&Progress, &mut Session<'a>) -> Control,
+) -> Rendered {
+    let settings = session.settings();
     let stop = loop {
         if session.finished() {
             break StopReason::Iterations;
         }
         let progress = session.step();
-        if observe(&progress, session.pixels()) == Control::Stop {
+        if observe(&progress, &mut session) == Control::Stop {
             break StopReason::Interrupted;
         }
         // Without a light the black picture is right.
-        let error = progress.error.or(scene.lights.is_empty().then_some(0.0));
-        if let Some(reason) = settings.stops(progress.seconds, error.filter(|_| progress.iteration >= LEAST)) {
+        let error = progress.error.or(session.is_dark().then_some(0.0));
+        if let Some(reason) = settings.stops(session.spent().seconds, error.filter(|_| progress.iteration >= LEAST)) {
             break reason;
         }
     };

@@ -1,6 +1,5 @@
 //! What light paths will leave, told by a few of them before there is any memory for all.
 
-use super::present::Present;
 use super::settings::Settings;
 use super::sppm::trace_photons;
 use crate::camera::Camera;
@@ -20,7 +19,7 @@ pub fn photons_per_path(scene: &Scene, camera: &Camera, settings: &Settings) -> 
     let pass = LightPass::new(settings.seed, 0, Domain::PilotLight, SAMPLES, settings.max_depth)
         .with(Comb::new(settings.seed, 0));
     let pass = match settings.method.counts_photons() {
-        true => pass.wanting(settings.of_photons(Present::of(scene)), settings.indirect),
+        true => pass.wanting(settings.of_photons(&scene.survey), settings.indirect),
         false => pass,
     };
     let photons = trace_photons(scene, &surroundings, &pass);

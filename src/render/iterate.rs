@@ -20,9 +20,10 @@ pub(super) trait Iterate {
     fn pixels(&mut self) -> Vec<Pixel>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
-    /// Bandwidths by kind of photons of every pixel and level after the last iteration, of methods where they do not follow from the iteration.
-    fn radii(&mut self) -> ByKind<Vec<f32>> {
-        ByKind::default()
+    /// Squared radii by kind of photons of every pixel and level after the last iteration (square scene units), of
+    /// methods where they do not follow from the iteration.
+    fn counted(&self) -> Option<ByKind<Vec<f32>>> {
+        None
     }
     /// Where its light paths start, if they are guided.
     fn guide(&self) -> Option<&Guide> {

@@ -2,55 +2,25 @@
 
 use super::control::StopReason;
 use super::method::Method;
-use super::present::Present;
 use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::estimator::Pixel;
-use crate::estimator::rule::{memoryless::radius2_factor, volume::radius_factor};
 use crate::film::{LayerSet, output};
-use crate::photon::ByKind;
+use crate::scene::Survey;
 use serde_json::{Map, Value, json};
 
-/// What the layers of a render with these settings depend on after `iterations` of them.
-pub fn shape(settings: &Settings, iterations: u64, present: Present) -> output::Shape {
-    // Iterations count from 1; a shard renders every `count`-th.
-    let last = settings.shard.index + iterations.saturating_sub(1) * settings.shard.count + 1;
+/// Which layers a render with these settings has.
+pub fn shape(settings: &Settings, survey: &Survey) -> output::Shape {
     output::Shape {
         levels: settings.levels.count,
         compared: settings.compared_levels(),
         own: settings.levels.own(),
-        kinds: settings.kinds(present),
-        radius2_factor: radius2_factor(last, settings.alpha),
-        environment: present.environment,
+        kinds: settings.kinds(survey),
+        environment: survey.environment,
         classes: settings.classes,
-        volume: present.volume,
-        volume_radius_factor: (present.volume && settings.method.gathers())
-            .then(|| radius_factor(last, settings.volume_alpha)),
+        volume: survey.scattering,
+        volume_photons: survey.scattering && settings.method.gathers(),
     }
-}
-
-/// Layers of pixels; `radii` by kind of every pixel and level replace those that follow from the iteration, unless there are none.
-pub(super) fn layers(
-    size: (u32, u32),
-    pixels: &[Pixel],
-    radii: &ByKind<Vec<f32>>,
-    shape: &output::Shape,
-    wanted: impl Fn(&str) -> bool,
-) -> Result<LayerSet> {
-    let mut layers = output::layers(size, pixels, shape, wanted)?;
-    for (kind, name) in output::radius_layers(shape.kinds) {
-        let radii = &radii[kind as usize];
-        for level in (0..shape.levels).filter(|_| !radii.is_empty()) {
-            let name = format!("{name}{}", level + 1);
-            let planes =
-                layers.layers.iter_mut().filter(|layer| layer.name == name).flat_map(|layer| &mut layer.planes);
-            for plane in planes {
-                plane.values = radii.iter().skip(level).step_by(shape.levels).copied().collect();
-            }
-        }
-    }
-    Ok(layers)
 }
 
 impl Rendered {
@@ -58,9 +28,9 @@ impl Rendered {
     ///
     /// # Errors
     /// None for a render of ours: its pixels are as many as its size says.
-    pub fn layers(&self, present: Present, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let shape = shape(&self.settings, self.iterations, present);
-        layers((self.width, self.height), &self.pixels, &self.radii, &shape, wanted)
+    pub fn layers(&self, survey: &Survey, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
+        let shape = shape(&self.settings, survey);
+        output::layers((self.width, self.height), &self.pixels, &self.bandwidths, &shape, wanted)
     }
 
     /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know: arguments,

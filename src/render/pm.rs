@@ -12,7 +12,6 @@
 
 use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
-use super::present::Present;
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::{keep_first_hit, trace_some};
@@ -103,14 +102,7 @@ pub(super) struct Pm<'a> {
 impl<'a> Pm<'a> {
     /// Nothing done yet.
     pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &'a Settings, surroundings: &'a Surroundings) -> Pm<'a> {
-        let eye = Eye {
-            scene,
-            camera,
-            interior: surroundings.eye,
-            max_depth: settings.max_depth,
-            indirect: Indirect::Photons,
-            classes: settings.classes,
-        };
+        let eye = settings.eye(scene, camera, surroundings);
         Pm { eye, settings, surroundings, maps: None }
     }
 
@@ -118,7 +110,7 @@ impl<'a> Pm<'a> {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
         let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
-            .wanting(self.settings.of_photons(Present::of(self.eye.scene)), Indirect::Photons);
+            .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
         let (photons, traced) = trace(self.eye.scene, self.surroundings, &pass, most);
         phases.light += cpu_seconds() - start;

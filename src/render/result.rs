@@ -5,9 +5,9 @@ use super::error_estimate::ErrorEstimate;
 use super::method::Method;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
-use crate::estimator::{Pixel, SquaredError};
+use crate::estimator::{BandwidthState, Pixel, SquaredError};
 use crate::math::DVec3;
-use crate::photon::ByKind;
+use crate::photon::Kind;
 use crate::stat::floor;
 use serde::Serialize;
 
@@ -34,8 +34,8 @@ pub struct Rendered {
     pub pixels: Vec<Pixel>,
     /// A picture per technique, if [`Settings::techniques`] and the method has several.
     pub techniques: Vec<TechniquePicture>,
-    /// Bandwidths by kind of photons of every pixel and level after the last iteration; empty where they follow from the iteration ([`Pixel::bandwidths`]).
-    pub radii: ByKind<Vec<f32>>,
+    /// Bandwidths of the last iteration.
+    pub bandwidths: BandwidthState,
     /// The settings it was made with.
     pub settings: Settings,
     /// Iterations done.
@@ -75,6 +75,11 @@ impl Rendered {
     /// large: where such pixels rule the error, the estimate is too small until they have been seen several times.
     pub fn relative_error(&self) -> Option<f64> {
         error_estimate(&self.pixels, &self.settings).map(|error| error.root())
+    }
+
+    /// Squared bandwidth of the last iteration of a level (from 0, the smallest) of the pixel that has this index.
+    pub fn radius2(&self, index: usize, kind: Kind, level: usize) -> f32 {
+        self.bandwidths.radius2(index, &self.pixels[index], kind, level)
     }
 
     /// Samples rejected as not finite.

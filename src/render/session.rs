@@ -6,18 +6,17 @@ use super::control::{History, Progress, StopReason};
 use super::error_estimate::ErrorEstimate;
 use super::iterate::Iterate;
 use super::output;
-use super::present::Present;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Levels, Settings};
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::estimator::Pixel;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
-use crate::film::LayerSet;
+use crate::estimator::{BandwidthState, Pixel};
+use crate::film::{self, LayerSet};
 use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::scene::Scene;
-use crate::transport::{Eye, Surroundings};
+use crate::transport::Surroundings;
 
 /// What a render reads: scene, camera, settings, and what these say together.
 pub struct Stage<'a> {
@@ -44,9 +43,8 @@ impl<'a> Stage<'a> {
 
     /// The largest that bandwidths in media may be, by pixel: what they are without photons.
     pub fn widest_in_media(&self) -> Vec<f32> {
-        let Settings { initial, widest, seed, max_depth, indirect, classes, .. } = self.settings;
-        let (scene, camera, interior) = (self.scene, self.camera, self.surroundings.eye);
-        let eye = Eye { scene, camera, interior, max_depth, indirect, classes };
+        let Settings { initial, widest, seed, .. } = self.settings;
+        let eye = self.settings.eye(self.scene, self.camera, &self.surroundings);
         initial_volume_bandwidths(&eye, initial, widest[1], seed, &PhotonMap::build(Vec::new()))
     }
 
@@ -76,8 +74,12 @@ pub struct Session<'a> {
 impl<'a> Session<'a> {
     /// Runs the pilot, if the method has one.
     pub fn new(stage: &'a Stage<'a>) -> Session<'a> {
+        Session::after(stage, Spent::default())
+    }
+
+    /// The same of a render on which some time has been spent already, by choosing its settings, which counts as its own.
+    pub fn after(stage: &'a Stage<'a>, mut spent: Spent) -> Session<'a> {
         let Stage { scene, camera, settings, surroundings } = stage;
-        let mut spent = settings.decided;
         let (passes, pixels) = spent.during(|| {
             let mut passes = passes(scene, camera, settings, surroundings);
             let pixels = passes.pixels();
@@ -165,6 +167,11 @@ impl<'a> Session<'a> {
         &self.pixels
     }
 
+    /// Whether no light shines, so that the black picture is right.
+    pub fn is_dark(&self) -> bool {
+        self.stage.scene.lights.is_empty()
+    }
+
     /// The settings it was made with.
     pub fn settings(&self) -> &'a Settings {
         &self.stage.settings
@@ -201,14 +208,25 @@ impl<'a> Session<'a> {
         self.pixels.iter().map(|pixel| pixel.levels[own].mean.as_vec3().to_array()).collect()
     }
 
+    /// Counts time that was spent on the render between its iterations as its own.
+    pub fn charge(&mut self, spent: Spent) {
+        self.spent.seconds += spent.seconds;
+        self.spent.cpu_seconds += spent.cpu_seconds;
+    }
+
     /// The layers as they are, see [`Rendered::layers`].
     ///
     /// # Errors
     /// None: its pixels are as many as its size says.
-    pub fn layers(&mut self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let present = Present::of(self.stage.scene);
-        let shape = output::shape(&self.stage.settings, self.done, present);
-        output::layers(self.stage.camera.size(), &self.pixels, &self.passes.radii(), &shape, wanted)
+    pub fn layers(&self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
+        let shape = output::shape(&self.stage.settings, &self.stage.scene.survey);
+        film::output::layers(self.stage.camera.size(), &self.pixels, &self.bandwidths(), &shape, wanted)
+    }
+
+    /// Bandwidths of the last iteration.
+    fn bandwidths(&self) -> BandwidthState {
+        let settings = &self.stage.settings;
+        BandwidthState::new(settings.schedule(settings.last(self.done)), self.passes.counted())
     }
 
     /// Ends it.
@@ -221,7 +239,7 @@ impl<'a> Session<'a> {
             width,
             height,
             techniques: self.passes.techniques(self.done),
-            radii: self.passes.radii(),
+            bandwidths: self.bandwidths(),
             pixels: self.pixels,
             settings: self.stage.settings.clone(),
             iterations: self.done,

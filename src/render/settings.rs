@@ -1,18 +1,18 @@
 //! What a render is asked to do.
 
-use super::clock::Spent;
 use super::method::{DEFAULT_KNN, DEFAULT_PHOTONS, Method};
-use super::present::Present;
 use super::strategy::Strategy;
-use crate::estimator::InitialBandwidth;
+use crate::camera::Camera;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
+use crate::estimator::{InitialBandwidth, Schedule};
 use crate::photon::ByKind;
 #[cfg(doc)]
 use crate::photon::kernel;
-use crate::plan::{ClassSet, Owner, Search};
-use crate::transport::{Indirect, MAX_LEVELS};
+use crate::plan::{ClassSet, Owner, Search, classes_in};
+use crate::scene::{Scene, Survey};
+use crate::transport::{Eye, Indirect, MAX_LEVELS, Surroundings};
 
 /// Iterations when no stop condition is given.
 pub const DEFAULT_ITERATIONS: u64 = 64;
@@ -123,8 +123,6 @@ pub struct Settings {
     pub target_error: Option<f64>,
     /// Part of the iterations to render.
     pub shard: Shard,
-    /// Time that choosing the settings has taken, which counts as the render's own.
-    pub decided: Spent,
 }
 
 impl Default for Settings {
@@ -151,7 +149,6 @@ impl Default for Settings {
             time: None,
             target_error: None,
             shard: Shard { index: 0, count: 1 },
-            decided: Spent::default(),
         }
     }
 }
@@ -184,6 +181,22 @@ impl Settings {
         if self.guided && self.indirect == Indirect::Paths { usual.min(width.saturating_mul(height)) } else { usual }
     }
 
+    /// The eye of a render with these settings.
+    pub(super) fn eye<'a>(&self, scene: &'a Scene, camera: &'a Camera, surroundings: &Surroundings) -> Eye<'a> {
+        let Settings { max_depth, indirect, classes, .. } = *self;
+        Eye { scene, camera, interior: surroundings.eye, max_depth, indirect, classes }
+    }
+
+    /// The number (from 1) of the last of so many iterations of this shard.
+    pub fn last(&self, done: u64) -> u64 {
+        self.shard.index + done.saturating_sub(1) * self.shard.count + 1
+    }
+
+    /// What the memoryless rules make of bandwidths at iteration `i` (from 1).
+    pub fn schedule(&self, i: u64) -> Schedule {
+        Schedule::new(i, self.levels.count, self.alpha, self.volume_alpha)
+    }
+
     /// How it looks for light.
     pub fn search(&self) -> Search {
         match (self.method, self.indirect) {
@@ -193,14 +206,14 @@ impl Settings {
     }
 
     /// Classes of light that photons are to bring to eye paths that gather them.
-    pub fn of_photons(&self, present: Present) -> ClassSet {
-        self.search().owned_by(Owner::Photons) & self.classes & present.classes()
+    pub fn of_photons(&self, survey: &Survey) -> ClassSet {
+        self.search().owned_by(Owner::Photons) & self.classes & classes_in(survey)
     }
 
     /// Kinds of photons that have bandwidths; where light paths are merged, which tells no kinds apart, the first.
-    pub fn kinds(&self, present: Present) -> ByKind<bool> {
+    pub fn kinds(&self, survey: &Survey) -> ByKind<bool> {
         if self.method.gathers() {
-            self.indirect.kinds(self.of_photons(present))
+            self.indirect.kinds(self.of_photons(survey))
         } else {
             [self.method.has_bandwidths(), false]
         }

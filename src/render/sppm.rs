@@ -7,14 +7,12 @@ use super::chunks::chunks;
 use super::clock::cpu_seconds;
 use super::guiding::learnt;
 use super::iterate::{Iterate, Work};
-use super::present::Present;
 use super::region::region;
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
 use super::volume::{Maps, VolumeMap};
 use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths};
-use crate::estimator::rule::memoryless::radius2_factor;
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::{Guide, Region};
 use crate::photon::{ByKind, Kernel, Kind, Nearest, PhotonMap, kernel, kind};
@@ -73,7 +71,7 @@ fn eye_pass(
     let photons = &maps.surface;
     let size = eye.camera.size();
     let levels = settings.levels;
-    let factor = radius2_factor(i, settings.alpha) as f32;
+    let schedule = settings.schedule(i);
     let [independent, correlated] =
         [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::in_sequence(settings.seed, i, domain));
     par_pixels(pixels.par_chunks_mut(band(size.0)), size, Scratch::default, |scratch, pixels, places| {
@@ -84,12 +82,10 @@ fn eye_pass(
         for (k, place) in places.iter().enumerate() {
             let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
             let pixel = &mut pixels[place.at];
-            // Radius squared of level k (from 0) of m: each halves that of the next larger.
-            let radius2 = |largest2: f32, k: usize| largest2 * 0.5f32.powi((levels.count - 1 - k) as i32);
             let radii = |range: Range<usize>| {
                 pixel.bandwidths.map(|bandwidth| {
-                    let largest2 = bandwidth * bandwidth * factor;
-                    LevelRadii::new(range.clone().map(|k| radius2(largest2, k))).later(later2 * factor)
+                    let radii2 = range.clone().map(|level| schedule.radius2(bandwidth, level));
+                    LevelRadii::new(radii2).later(later2 * schedule.factor2())
                 })
             };
             match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
@@ -139,7 +135,6 @@ pub(super) struct Sppm<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
     surroundings: &'a Surroundings,
-    present: Present,
     guide: Option<Guide>,
     /// Where light from infinity is wanted.
     region: Option<Region>,
@@ -155,19 +150,11 @@ impl<'a> Sppm<'a> {
         settings: &'a Settings,
         surroundings: &'a Surroundings,
     ) -> Sppm<'a> {
-        let eye = Eye {
-            scene,
-            camera,
-            interior: surroundings.eye,
-            max_depth: settings.max_depth,
-            indirect: settings.indirect,
-            classes: settings.classes,
-        };
-        let present = Present::of(scene);
-        let guided = settings.guided && !settings.of_photons(present).is_empty();
+        let eye = settings.eye(scene, camera, surroundings);
+        let guided = settings.guided && !settings.of_photons(&scene.survey).is_empty();
         let region = region(&eye, settings.seed);
         let guide = guided.then(|| learnt(&eye, surroundings, settings, region)).flatten();
-        Sppm { eye, settings, surroundings, present, guide, region, later2: f32::INFINITY }
+        Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY }
     }
 
     /// Eye paths.
@@ -177,7 +164,7 @@ impl<'a> Sppm<'a> {
 
     /// Kinds of photons that there are.
     pub fn kinds(&self) -> ByKind<bool> {
-        self.settings.kinds(self.present)
+        self.settings.kinds(&self.eye.scene.survey)
     }
 
     /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
@@ -189,7 +176,9 @@ impl<'a> Sppm<'a> {
             let start = cpu_seconds();
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
-            let pass = pass.with(Comb::new(seed, i)).wanting(self.settings.of_photons(self.present), Indirect::Photons);
+            let pass = pass
+                .with(Comb::new(seed, i))
+                .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons);
             let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(0..each, |arena, index, photons| {
@@ -240,7 +229,7 @@ impl<'a> Sppm<'a> {
         LightPass::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
             .lighting(self.region)
-            .wanting(self.settings.of_photons(self.present), self.settings.indirect)
+            .wanting(self.settings.of_photons(&self.eye.scene.survey), self.settings.indirect)
             .with(Comb::new(seed, i))
     }
 }

@@ -2,8 +2,7 @@
 
 use super::settings::Settings;
 use crate::camera::GROUP;
-use crate::estimator::Pixel;
-use crate::estimator::rule::volume::{level_factor, radius_factor};
+use crate::estimator::{Pixel, Schedule};
 use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
 use crate::random::Stream;
 use crate::spectrum::Comb;
@@ -38,24 +37,20 @@ impl Maps {
     /// The photons in media for some of the levels of `pixel`.
     #[inline]
     pub fn volume(&self, pixel: &Pixel, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
-        let VolumeMap { map, factor, levels: count } = self.volume.as_ref()?;
-        let radius = |level| pixel.volume_bandwidth * factor * level_factor(level, *count);
-        Some(Volume::new(map, levels.map(radius)))
+        let VolumeMap { map, schedule } = self.volume.as_ref()?;
+        Some(Volume::new(map, levels.map(|level| schedule.volume_radius(pixel.volume_bandwidth, level))))
     }
 }
 
 /// Photons in media, and how far bandwidths have shrunk.
 pub(super) struct VolumeMap {
     map: PhotonMap<VolumePhoton>,
-    /// Radius over the initial one.
-    factor: f32,
-    levels: usize,
+    schedule: Schedule,
 }
 
 impl VolumeMap {
     /// Those of iteration `i`.
     pub fn new(photons: Vec<VolumePhoton>, i: u64, settings: &Settings) -> VolumeMap {
-        let factor = radius_factor(i, settings.volume_alpha) as f32;
-        VolumeMap { map: PhotonMap::build(photons), factor, levels: settings.levels.count }
+        VolumeMap { map: PhotonMap::build(photons), schedule: settings.schedule(i) }
     }
 }

@@ -1,7 +1,7 @@
 //! What is compared, and the figure it is compared by.
 
 use crate::image::Errors;
-use crate::render::Settings;
+use crate::render::{Settings, Spent};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -14,6 +14,8 @@ pub struct Entry {
     pub options: String,
     /// Its settings; seeds are the race's.
     pub settings: Settings,
+    /// Time that choosing the settings took, which counts as a render's own.
+    pub decided: Spent,
     /// What finishes its pictures, if they are finished.
     pub finish: Option<String>,
 }

@@ -184,8 +184,8 @@ pub fn race(
         };
         let stages: Vec<Stage<'_>> = entries.iter().map(of_entry).collect();
         let mut lanes: Vec<Lane<'_>> = Vec::new();
-        for stage in &stages {
-            let session = Session::new(stage);
+        for (stage, entry) in stages.iter().zip(entries) {
+            let session = Session::after(stage, entry.decided);
             let moments = Moments::new(rules.ratio);
             lanes.push(Lane { session, moments, finishings: Vec::new(), measured: 0, open: true });
         }

@@ -27,13 +27,20 @@ pub struct Survey {
     pub delta_lights: bool,
     /// Light comes from infinity.
     pub infinite_lights: bool,
+    /// An environment shines.
+    pub environment: bool,
 }
 
 impl Survey {
     /// Looks through the scene.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());
-        let mut survey = Survey { media: medium.is_some(), scattering: scatters(&medium), ..Survey::default() };
+        let mut survey = Survey {
+            media: medium.is_some(),
+            scattering: scatters(&medium),
+            environment: lights.sky().environment.is_some(),
+            ..Survey::default()
+        };
         let mut worn = vec![0usize; materials.list.len()];
         for instance in &shapes.instances {
             worn[instance.material as usize] += 1;

@@ -1,6 +1,7 @@
 //! Progress, stop conditions and signals.
 
 use crate::{Folder, values};
+use caustique::film::LayerSet;
 use caustique::image::exr;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read};
@@ -232,4 +233,30 @@ fn a_folder_that_is_gone_loses_no_render() {
     let (_, rescued) = text.trim_end().rsplit_once("hint: the render is in ").expect("the hint names a file");
     assert!(rescued.starts_with(&*folder.path("temporary").to_string_lossy()), "{rescued}");
     assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("Level5").is_some()));
+}
+
+/// The preview is there, ends as the picture itself, and changes no bytes; where it cannot be shown the render goes on.
+#[test]
+fn a_preview_shows_the_picture_and_changes_nothing() {
+    let folder = Folder::new();
+    folder.render("-o plain.exr --iterations 4 --reproducible");
+    folder.render("-o a.exr --iterations 4 --reproducible --preview look.exr");
+    let read = |name: &str| std::fs::read(folder.path(name)).expect("the file is there");
+    assert!(read("plain.exr") == read("a.exr"), "the preview has changed the render");
+    let (look, _) = exr::read(&folder.path("look.exr")).expect("the preview can be read");
+    let (picture, _) = folder.read("a.exr");
+    for component in ["R", "G", "B", "A"] {
+        let plane = |set: &LayerSet| set.get("").and_then(|l| l.plane(component)).expect("a plane").values.clone();
+        assert_eq!(plane(&look), plane(&picture));
+    }
+    assert_eq!(look.layers.len(), 1);
+
+    folder.render("-o b.exr --iterations 1 --preview look.png");
+    assert!(read("look.png").starts_with(b"\x89PNG"));
+    let outcome = folder.run("render scene.glb -o b.exr --preview look.jpg");
+    assert_eq!(outcome.code, Some(2));
+    assert!(outcome.stderr.contains("a file that ends in .png or .exr, or 'tev'"), "{}", outcome.stderr);
+    let outcome = folder.run("render scene.glb -o b.exr --preview b.exr");
+    assert_eq!(outcome.code, Some(2));
+    assert!(outcome.stderr.contains("name the same file"), "{}", outcome.stderr);
 }

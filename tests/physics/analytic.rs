@@ -17,41 +17,10 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, P
 use caustique::scene::{Description, Scene};
 use caustique::transport::path_radiance;
 use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, mirror, point_light, quad, sphere, square};
-use support::stats::{mean_and_error, t_critical};
+use support::stats::Check;
 
 /// Checks in this file that share the error rate.
 const TESTS: usize = 40;
-const ERROR_RATE: f64 = 1e-3;
-
-struct Check {
-    expected: f64,
-    /// Relative bias of the closed form or of the kernel that is known to remain.
-    bias: f64,
-    /// Relative shift of the expectation that must be rejected.
-    detects: f64,
-}
-
-impl Check {
-    fn passes(&self, values: &[f64], expected: f64) -> bool {
-        let (mean, error) = mean_and_error(values);
-        let critical = t_critical(ERROR_RATE, TESTS, values.len() as f64 - 1.0);
-        (mean - expected).abs() <= critical * error + self.bias * expected.abs() + 1e-6 * expected.abs()
-    }
-
-    fn run(&self, what: &str, values: &[f64]) {
-        let (mean, error) = mean_and_error(values);
-        println!("{what}: {mean:.6} +- {error:.6}, expected {:.6}", self.expected);
-        assert!(self.passes(values, self.expected), "{what}: {mean} +- {error}, expected {}", self.expected);
-        for sign in [-1.0, 1.0] {
-            let planted = self.expected * (1.0 + sign * self.detects);
-            assert!(
-                !self.passes(values, planted),
-                "{what}: cannot tell {} from {planted} ({mean} +- {error})",
-                self.expected
-            );
-        }
-    }
-}
 
 /// Means over a `size x size` picture, one render a seed; one list per level, the smallest bandwidth first.
 fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec<f64>; 5] {
@@ -135,9 +104,9 @@ fn furnace_box() {
     // The picture stays clear of the edges, where a kernel loses what lies on the other wall.
     let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 1e-3, detects: 0.02 };
     let levels = by_photons(&scene, &settings(4, 20_000, 0.2), 8, 40);
-    check.run("furnace, level 1", &levels[0]);
-    check.run("furnace, level 4", &levels[3]);
-    check.run("furnace, paths", &by_paths(&scene, 8, 64, 40));
+    check.run(TESTS, "furnace, level 1", &levels[0]);
+    check.run(TESTS, "furnace, level 4", &levels[3]);
+    check.run(TESTS, "furnace, paths", &by_paths(&scene, 8, 64, 40));
 }
 
 /// Irradiance under a point light: I cos / d^2, of which a diffuse plane sends back rho / pi.
@@ -152,8 +121,8 @@ fn point_light_over_a_plane() {
     let expected = f64::from(rho) / std::f64::consts::PI * f64::from(intensity) / (height * height);
     // The camera sees 9 mm around the foot: the closed form varies by 2e-5 there.
     let check = Check { expected, bias: 1e-4, detects: 1e-3 };
-    check.run("point light, photons", &by_photons(&scene, &settings(4, 100, 0.05), 4, 4)[0]);
-    check.run("point light, paths", &by_paths(&scene, 4, 4, 4));
+    check.run(TESTS, "point light, photons", &by_photons(&scene, &settings(4, 100, 0.05), 4, 4)[0]);
+    check.run(TESTS, "point light, paths", &by_paths(&scene, 4, 4, 4));
 }
 
 /// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2, for every strategy of direct light.
@@ -168,8 +137,8 @@ fn sphere_light_over_a_plane() {
     let expected = f64::from(rho * radiance * (radius / height).powi(2));
     // 256 segments: the inscribed polyhedron is smaller by 3e-4.
     let check = Check { expected, bias: 1e-3, detects: 0.015 };
-    check.run("sphere light, photons", &by_photons(&scene, &settings(500, 0, 0.05), 8, 40)[0]);
-    check.run("sphere light, paths", &by_paths(&scene, 8, 500, 40));
+    check.run(TESTS, "sphere light, photons", &by_photons(&scene, &settings(500, 0, 0.05), 8, 40)[0]);
+    check.run(TESTS, "sphere light, paths", &by_paths(&scene, 8, 500, 40));
 }
 
 /// A light under a mirror is two lights: a point light beside an infinite mirror, over a plane.
@@ -188,7 +157,7 @@ fn point_light_beside_a_mirror() {
     let irradiance = f64::from(intensity) * (1.0 + 5f64.powf(-1.5));
     let expected = f64::from(rho) / std::f64::consts::PI * irradiance;
     let check = Check { expected, bias: 2e-3, detects: 0.01 };
-    check.run("mirror", &by_photons(&scene, &settings(4, 100_000, 0.1), 4, 24)[4]);
+    check.run(TESTS, "mirror", &by_photons(&scene, &settings(4, 100_000, 0.1), 4, 24)[4]);
 }
 
 /// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab (specular-diffuse-specular).
@@ -213,7 +182,7 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         let expected = f64::from(rho * e) / std::f64::consts::PI * transmitted.powi(slabs) / between.powi(2);
         // A slab forgotten would be 8 %.
         let check = Check { expected, bias: 4e-3, detects: if through { 0.06 } else { 0.03 } };
-        check.run(what, &by_photons(&scene, &settings(4, 100_000, 0.25), 16, 20)[4]);
+        check.run(TESTS, what, &by_photons(&scene, &settings(4, 100_000, 0.25), 16, 20)[4]);
     }
 }
 
@@ -237,8 +206,8 @@ fn lamp_seen_through_absorbing_glass() {
     let a = f64::from(-sigma * depth).exp();
     let expected = f64::from(radiance) * (1.0 - f).powi(2) * a / (1.0 - f * f * a * a);
     let check = Check { expected, bias: 1e-4, detects: 0.015 };
-    check.run("absorbing slab, photons", &by_photons(&scene, &settings(1000, 0, 0.1), 8, 24)[0]);
-    check.run("absorbing slab, paths", &by_paths(&scene, 8, 1000, 24));
+    check.run(TESTS, "absorbing slab, photons", &by_photons(&scene, &settings(1000, 0, 0.1), 8, 24)[0]);
+    check.run(TESTS, "absorbing slab, paths", &by_paths(&scene, 8, 1000, 24));
 }
 
 /// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. Photons cross the
@@ -253,8 +222,8 @@ fn white_sphere_in_glass_under_a_uniform_sky() {
     let scene = build(description);
     // Curvature: the disc's area against the sphere's within the kernel is r^2 / (4 R^2) = 2.5e-3.
     let check = Check { expected: 1.0, bias: 5e-3, detects: 0.03 };
-    check.run("sphere in glass, photons", &by_photons(&scene, &settings(2, 100_000, 0.05), 8, 24)[4]);
-    check.run("sphere in glass, paths", &by_paths(&scene, 8, 64, 24));
+    check.run(TESTS, "sphere in glass, photons", &by_photons(&scene, &settings(2, 100_000, 0.05), 8, 24)[4]);
+    check.run(TESTS, "sphere in glass, paths", &by_paths(&scene, 8, 64, 24));
 }
 
 /// A black sheet of alpha 0.5 halves direct light; an index-matched clear box does nothing to it. Neither is a bounce: all of it
@@ -288,7 +257,7 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
         let expected = f64::from(rho * intensity) / std::f64::consts::PI / 4.0 * factor;
         let check = Check { expected, bias: 1e-4, detects: 0.03 };
         let settings = settings(100, 1000, 0.05);
-        check.run(what, &by_photons(&scene, &settings, 8, 24)[0]);
+        check.run(TESTS, what, &by_photons(&scene, &settings, 8, 24)[0]);
         let camera = scene.camera(&square(4)).expect("a camera");
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         for pixel in &rendered.pixels {

@@ -17,10 +17,9 @@ use caustique::scene::{Description, Scene};
 use support::scenes::{
     add, build, cuboid, glass, glossy_balls, lit_room, look_at, matte, mirror, point_light, quad, sphere, square,
 };
-use support::stats::{mean_and_error, t_critical};
+use support::stats::{Check, ERROR_RATE, t_critical};
 use support::tiles::{SIZE, TILES, average};
 
-const ERROR_RATE: f64 = 1e-3;
 const ALL: [Method; 5] = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm];
 
 fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
@@ -48,40 +47,15 @@ fn value(rendered: &Rendered, level: usize, index: usize) -> f64 {
 
 // ---------------------------------------------------------------- closed forms
 
-struct Check {
-    expected: f64,
-    /// Relative bias of the closed form or of the kernel that is known to remain.
-    bias: f64,
-    /// Relative shift of the expectation that must be rejected.
-    detects: f64,
-}
-
-impl Check {
-    fn passes(&self, values: &[f64], expected: f64) -> bool {
-        let (mean, error) = mean_and_error(values);
-        let critical = t_critical(ERROR_RATE, ALL.len(), values.len() as f64 - 1.0);
-        (mean - expected).abs() <= critical * error + (self.bias + 1e-6) * expected.abs()
-    }
-
-    /// Means over an 8 x 8 picture, 12 seeds.
-    fn run(&self, what: &str, scene: &Scene, methods: &[Method], iterations: u64, radius: f32) {
-        for &method in methods {
-            let mean = |seed| {
-                let rendered = render(scene, method, 8, &settings(iterations, radius, seed));
-                (0..64).map(|i| value(&rendered, 0, i)).sum::<f64>() / 64.0
-            };
-            let values: Vec<f64> = (0..12).map(mean).collect();
-            let (mean, error) = mean_and_error(&values);
-            println!("{what}, {method:?}: {mean:.6} +- {error:.6}, expected {:.6}", self.expected);
-            assert!(self.passes(&values, self.expected), "{what}, {method:?}: {mean} +- {error}, {}", self.expected);
-            for sign in [-1.0, 1.0] {
-                let planted = self.expected * (1.0 + sign * self.detects);
-                assert!(
-                    !self.passes(&values, planted),
-                    "{what}, {method:?}: cannot tell {planted} ({mean} +- {error})"
-                );
-            }
-        }
+/// Means over an 8 x 8 picture by each method, 12 seeds.
+fn hold(check: Check, what: &str, scene: &Scene, methods: &[Method], iterations: u64, radius: f32) {
+    for &method in methods {
+        let mean = |seed| {
+            let rendered = render(scene, method, 8, &settings(iterations, radius, seed));
+            (0..64).map(|i| value(&rendered, 0, i)).sum::<f64>() / 64.0
+        };
+        let values: Vec<f64> = (0..12).map(mean).collect();
+        check.run(ALL.len(), &format!("{what}, {method:?}"), &values);
     }
 }
 
@@ -118,7 +92,7 @@ fn furnace_box() {
     description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
     let scene = build(description);
     let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
-    check.run("furnace", &scene, &ALL, 400, 0.1);
+    hold(check, "furnace", &scene, &ALL, 400, 0.1);
 }
 
 /// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2.
@@ -135,7 +109,7 @@ fn sphere_light_over_a_plane() {
     let expected = mean_over_square(half, |x, z| facing * lambert(x, 1.0, z));
     // 128 segments: the inscribed polyhedron is smaller by 1e-3; kernels average the irradiance's curvature.
     let check = Check { expected, bias: 2.5e-3, detects: 0.1 };
-    check.run("sphere light", &scene, &ALL, 1500, 0.06);
+    hold(check, "sphere light", &scene, &ALL, 1500, 0.06);
 }
 
 /// A point light over a plane, and its mirror image: what a path tracer cannot find.
@@ -153,7 +127,7 @@ fn point_light_beside_a_mirror() {
     let half = 0.5 * 30f64.to_radians().tan();
     let expected = mean_over_square(half, |x, z| scale * (lambert(x, 1.0, z) + lambert(x + 2.0, 1.0, z)));
     let check = Check { expected, bias: 2.5e-3, detects: 0.08 };
-    check.run("mirror", &scene, &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm], 1000, 0.05);
+    hold(check, "mirror", &scene, &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm], 1000, 0.05);
 }
 
 /// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab.
@@ -180,7 +154,7 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         } else {
             &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm]
         };
-        check.run(what, &scene, methods, 2000, 0.1);
+        hold(check, what, &scene, methods, 2000, 0.1);
     }
 }
 
@@ -199,7 +173,8 @@ fn lamp_seen_through_absorbing_glass() {
     let f = ((f64::from(n) - 1.0) / (f64::from(n) + 1.0)).powi(2);
     let a = f64::from(-sigma * depth).exp();
     let expected = f64::from(radiance) * (1.0 - f).powi(2) * a / (1.0 - f * f * a * a);
-    Check { expected, bias: 1e-4, detects: 0.03 }.run("absorbing slab", &scene, &ALL, 400, 0.1);
+    let check = Check { expected, bias: 1e-4, detects: 0.03 };
+    hold(check, "absorbing slab", &scene, &ALL, 400, 0.1);
 }
 
 // ---------------------------------------------------------------- agreement
@@ -216,8 +191,8 @@ fn white_sphere_in_glass_under_a_uniform_sky() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 12.0));
     let scene = build(description);
     let check = Check { expected: 1.0, bias: 5e-3, detects: 0.1 };
-    check.run("path and bdpt, sphere in glass", &scene, &[Method::Path, Method::Bdpt], 64, 0.05);
-    check.run("merging, sphere in glass", &scene, &[Method::Bpm, Method::Vcm], 1536, 0.05);
+    hold(check, "path and bdpt, sphere in glass", &scene, &[Method::Path, Method::Bdpt], 64, 0.05);
+    hold(check, "merging, sphere in glass", &scene, &[Method::Bpm, Method::Vcm], 1536, 0.05);
 }
 
 const SEEDS: u64 = 10;

@@ -20,11 +20,9 @@ use caustique::transport::{
     Interior, LightPass, Next, PathStart, Photons, Scattered, Surroundings, Vertex, Visitor, light_path, walk,
 };
 use glam::DQuat;
-use support::channels::{SIZE, TILES, tiles};
+use support::channels::{self, SIZE, agree, disagreeing};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
-use support::stats::{chi_squared_p, mean_and_error, sidak, t_critical};
-
-const ERROR_RATE: f64 = 1e-3;
+use support::stats::{ERROR_RATE, chi_squared_p, mean_and_error, sidak, t_critical};
 
 /// Glass of this index at 587.6 nm and of this Abbe number.
 fn dispersive(ior: f32, abbe: f32) -> Material {
@@ -424,39 +422,11 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
     rendered
 }
 
-/// Tile means by seed.
-type Images = Vec<Vec<f64>>;
-
 const SEEDS: u64 = 10;
 
-fn seeds(scene: &Scene, method: Method, of: impl Fn(u64) -> Settings) -> Images {
-    let images: Images = (0..SEEDS).map(|seed| tiles(&render(scene, method, SIZE, &of(seed)))).collect();
-    let mean = |at: usize| mean_and_error(&images.iter().map(|image| image[at]).collect::<Vec<_>>());
-    let (means, errors): (Vec<f64>, Vec<f64>) = (0..3 * TILES).map(mean).unzip();
-    let relative: Vec<f64> = errors.iter().zip(&means).map(|(error, mean)| error / mean).collect();
-    println!("{method:?}: {means:.4?} +- {relative:.3?}");
-    images
-}
-
-/// Tiles and channels in which two methods differ by more than chance and `bias` (relative) allow.
-fn differing(a: &Images, b: &Images, bias: f64) -> Vec<String> {
-    let critical = t_critical(ERROR_RATE, 3 * TILES, SEEDS as f64 - 1.0);
-    let fault = |at: usize| {
-        let of = |images: &Images| mean_and_error(&images.iter().map(|image| image[at]).collect::<Vec<_>>());
-        let ((mean_a, error_a), (mean_b, error_b)) = (of(a), of(b));
-        let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
-        ((mean_a - mean_b).abs() > allowed)
-            .then(|| format!("tile {}, channel {}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}", at / 3, at % 3))
-    };
-    (0..3 * TILES).filter_map(fault).collect()
-}
-
-/// `b` is the oracle.
-fn agree(what: &str, a: &Images, b: &Images, bias: f64, planted: f64) {
-    let found = differing(a, b, bias);
-    assert!(found.is_empty(), "{what}: {found:#?}");
-    let wrong = a.iter().map(|image| image.iter().map(|x| x * (1.0 + planted)).collect()).collect();
-    assert!(!differing(&wrong, b, bias).is_empty(), "{what}: a picture brighter by {planted} goes unnoticed");
+/// Pictures by seed.
+fn seeds(scene: &Scene, method: Method, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
+    channels::seeds(method, SEEDS, |seed| render(scene, method, SIZE, &of(seed)))
 }
 
 fn sun(direction: DVec3, angle_deg: f32, irradiance: f32) -> PunctualLight {
@@ -521,7 +491,7 @@ fn a_rainbow_agrees() {
     let scene = rainbow(strong, false);
     let light = seeds(&scene, Method::Light, |seed| settings(200, seed));
     let plain = seeds(&rainbow(glass, false), Method::Light, |seed| settings(50, seed));
-    assert!(!differing(&plain, &light, 0.2).is_empty(), "glass that does not disperse goes unnoticed");
+    assert!(!disagreeing(&plain, &light, 0.2).is_empty(), "glass that does not disperse goes unnoticed");
     let path = seeds(&scene, Method::Path, |seed| settings(600, seed));
     agree("rainbow, path", &path, &light, 2e-3, 0.35);
     let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(100, seed));
@@ -542,7 +512,7 @@ fn a_rainbow_behind_dispersive_glass_agrees() {
     let scene = rainbow(strong, true);
     let path = seeds(&scene, Method::Path, |seed| settings(1000, seed));
     let plain = seeds(&rainbow(glass, true), Method::Sppm, |seed| photons(10_000, 0.06, 12, seed));
-    assert!(!differing(&plain, &path, 0.2).is_empty(), "glass that does not disperse goes unnoticed");
+    assert!(!disagreeing(&plain, &path, 0.2).is_empty(), "glass that does not disperse goes unnoticed");
     let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(150, seed));
     agree("rainbow behind glass, bdpt", &bdpt, &path, 2e-3, 0.5);
     for method in [Method::Vcm, Method::Bpm] {

@@ -116,9 +116,10 @@ fn bandwidths_shrink_on_metal() {
             };
             let camera = scene.camera(&square(SIZE)).expect("a camera");
             let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-            let radii = &rendered.radii[Kind::Caustic as usize];
-            let radius = radii.iter().sum::<f32>() / (radii.len() as f32 * first);
-            let mean = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.x).sum::<f64>() / radii.len() as f64;
+            let count = rendered.pixels.len();
+            let radii = (0..count).map(|index| rendered.radius2(index, Kind::Caustic, 0).sqrt());
+            let radius = radii.sum::<f32>() / (count as f32 * first);
+            let mean = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.x).sum::<f64>() / count as f64;
             println!("{method:?}, {radius_rule:?}, {iterations}: {radius} of the first bandwidth, {mean:.3}");
             assert!(radius < 0.8, "{radius}");
             1.0 - mean

@@ -12,10 +12,10 @@ use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
 use caustique::plan::{ClassSet, Effect, PathClass, switch};
 use caustique::random::Domain;
-use caustique::render::Present;
 use caustique::render::Strategy;
 use caustique::render::auto::{Choice, Weight, choose};
 use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::scene::Survey;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use caustique::stat::floor;
@@ -498,7 +498,7 @@ fn only_what_is_called_for_is_tried() {
     assert!(matte_only.trials.iter().all(|trial| !trial.way.guided));
     // Where nothing has narrow lobes no photons of caustics are sent.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
-    let photons = |narrow_lobes| of_caustics.of_photons(Present { narrow_lobes, ..Present::default() });
+    let photons = |narrow_lobes| of_caustics.of_photons(&Survey { narrow_lobes, ..Survey::default() });
     assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
     // Nothing but indirect light asks for photons; direct light costs its connections.
     let choice = auto_among(&scene, 2, 20_000, |way| way.method != Method::Bdpt);

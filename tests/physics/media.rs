@@ -13,11 +13,9 @@ use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Control, KernelChoice, Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use support::channels::{SIZE, TILES, tiles};
+use support::channels::{self, SIZE, agree};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
-use support::stats::{chi_squared_p, mean_and_error, sidak, t_critical};
-
-const ERROR_RATE: f64 = 1e-3;
+use support::stats::{Check, ERROR_RATE, chi_squared_p, sidak};
 
 // ---------------------------------------------------------------- phase function
 
@@ -173,25 +171,18 @@ fn means(scene: &Scene, method: Method, size: u32, seeds: u64, of: impl Fn(u64) 
     means
 }
 
-struct Check {
+/// A [`Check`] of every channel.
+struct ByChannel {
     expected: [f64; 3],
     bias: f64,
-    /// Relative shift of the expectation that must be rejected.
     detects: f64,
 }
 
-impl Check {
+impl ByChannel {
     fn run(&self, what: &str, values: &[Vec<f64>; 3]) {
+        let ByChannel { expected, bias, detects } = *self;
         for (c, values) in values.iter().enumerate() {
-            let (mean, error) = mean_and_error(values);
-            let critical = t_critical(ERROR_RATE, 12, values.len() as f64 - 1.0);
-            let passes = |expected: f64| (mean - expected).abs() <= critical * error + (self.bias + 1e-5) * expected;
-            let expected = self.expected[c];
-            println!("{what}, channel {c}: {mean:.6} +- {error:.6}, expected {expected:.6}");
-            assert!(passes(expected), "{what}, channel {c}: {mean} +- {error}, expected {expected}");
-            for shift in [1.0 - self.detects, 1.0 + self.detects] {
-                assert!(!passes(expected * shift), "{what}, channel {c}: cannot tell {shift} ({mean} +- {error})");
-            }
+            Check { expected: expected[c], bias, detects }.run(12, &format!("{what}, channel {c}"), values);
         }
     }
 }
@@ -224,13 +215,13 @@ fn beer_lambert() {
         description.cameras.push(look_at(DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, 1.0));
         let scene = build(description);
         let expected = std::array::from_fn(|c| 5.0 * (-f64::from(sigma_a[c] + sigma_s[c]) * length).exp());
-        let check = Check { expected, bias: 1e-4, detects: 0.1 };
+        let check = ByChannel { expected, bias: 1e-4, detects: 0.1 };
         for method in WHOLE_PATHS.into_iter().chain([Method::Light]) {
             let one = |seed| Settings { max_depth: 1, ..settings(300, seed) };
             check.run(&format!("lamp behind fog, {method:?}"), &means(&scene, method, 4, 8, one));
         }
         let one = |seed| Settings { max_depth: 1, ..photons(0, 0.1, 4, seed) };
-        let check = Check { detects: 1e-3, ..check };
+        let check = ByChannel { detects: 1e-3, ..check };
         check.run("lamp behind fog, sppm", &means(&scene, Method::Sppm, 4, 4, one));
     }
 }
@@ -247,7 +238,7 @@ fn furnace() {
         description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 36.0));
         let scene = build(description);
         for method in WHOLE_PATHS {
-            let check = Check { expected: [1.0; 3], bias: 1e-3, detects: 0.05 };
+            let check = ByChannel { expected: [1.0; 3], bias: 1e-3, detects: 0.05 };
             check.run(&format!("furnace, g {g}, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(150, seed)));
         }
     }
@@ -263,12 +254,12 @@ fn furnace_box_full_of_fog() {
     description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 100.0));
     let scene = build(description);
     for method in WHOLE_PATHS {
-        let check = Check { expected: [1.0; 3], bias: 2e-3, detects: 0.08 };
+        let check = ByChannel { expected: [1.0; 3], bias: 2e-3, detects: 0.08 };
         check.run(&format!("foggy furnace, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(100, seed)));
     }
     for method in [Method::Sppm, Method::Cppm] {
         // On walls, kernels lose what they would hold behind an edge.
-        let check = Check { expected: [1.0; 3], bias: 0.015, detects: 0.12 };
+        let check = ByChannel { expected: [1.0; 3], bias: 0.015, detects: 0.12 };
         let means = means(&scene, method, 24, 8, |seed| photons(20_000, 0.06, 8, seed));
         check.run(&format!("foggy furnace, {method:?}"), &means);
     }
@@ -308,7 +299,7 @@ fn kernels_that_reach_behind_borders_lose_nothing() {
         description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 100.0));
         let scene = build(description);
         let expected = sigma.map(|sigma| taken_on_the_way(&scene, 12, sigma, half));
-        let check = Check { expected, bias: 0.02, detects: 0.09 };
+        let check = ByChannel { expected, bias: 0.02, detects: 0.09 };
         for kernel in [KernelChoice::Box, KernelChoice::Gaussian] {
             let mut values: [Vec<f64>; 3] = Default::default();
             for seed in 0..8 {
@@ -365,13 +356,13 @@ fn single_scattering_of_a_point_light() {
     let expected = airlight(&medium, light, 7.0, 10f64.to_radians().tan());
     // Light tracing alone has no bound near the camera.
     for method in WHOLE_PATHS {
-        let check = Check { expected, bias: 2e-3, detects: 0.06 };
+        let check = ByChannel { expected, bias: 2e-3, detects: 0.06 };
         let one = |seed| Settings { max_depth: 2, ..settings(400, seed) };
         check.run(&format!("airlight, {method:?}"), &means(&scene, method, 8, 8, one));
     }
     // Next-event estimation alone: what has scattered once before is the photons'.
     let one = |seed| Settings { max_depth: 2, ..photons(100, 0.1, 400, seed) };
-    let check = Check { expected, bias: 2e-3, detects: 0.06 };
+    let check = ByChannel { expected, bias: 2e-3, detects: 0.06 };
     check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
 }
 
@@ -388,43 +379,15 @@ fn air_close_to_a_point_light() {
     let scene = build(description);
     let expected = airlight(&medium, light, 7.0, 10f64.to_radians().tan());
     let one = |seed| Settings { max_depth: 2, ..photons(100, 0.1, 400, seed) };
-    let check = Check { expected, bias: 2e-3, detects: 0.03 };
+    let check = ByChannel { expected, bias: 2e-3, detects: 0.03 };
     check.run("air close to a light", &means(&scene, Method::Sppm, 8, 8, one));
 }
 
 // ---------------------------------------------------------------- agreement
 
-/// Tiles and channels in which two methods differ by more than chance and `bias` allow.
-fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
-    let critical = t_critical(ERROR_RATE, 3 * TILES, (a.len().min(b.len()) - 1) as f64);
-    (0..3 * TILES)
-        .filter_map(|at| {
-            let (mean_a, error_a) = mean_and_error(&a.iter().map(|s| s[at]).collect::<Vec<_>>());
-            let (mean_b, error_b) = mean_and_error(&b.iter().map(|s| s[at]).collect::<Vec<_>>());
-            let allowed = critical * error_a.hypot(error_b) + bias * mean_b.abs() + 1e-9;
-            ((mean_a - mean_b).abs() > allowed).then(|| {
-                format!("tile {}, channel {}: {mean_a:.5} and {mean_b:.5}, allowed {allowed:.5}", at / 3, at % 3)
-            })
-        })
-        .collect()
-}
-
+/// Pictures by seed.
 fn seeds(scene: &Scene, method: Method, seeds: u64, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
-    let all: Vec<_> = (0..seeds).map(|seed| tiles(&render(scene, method, SIZE, &of(seed)))).collect();
-    let mean = all.iter().flatten().sum::<f64>() / (all.len() * 3 * TILES) as f64;
-    println!("{method:?}: {mean:.5}");
-    all
-}
-
-/// `b` is the oracle.
-fn agree(what: &str, a: &[Vec<f64>], b: &[Vec<f64>], bias: f64, planted: f64) {
-    let found = disagreeing(a, b, bias);
-    assert!(found.is_empty(), "{what}: {found:#?}");
-    let mut wrong = a.to_vec();
-    for seed in &mut wrong {
-        seed.iter_mut().for_each(|x| *x *= 1.0 + planted);
-    }
-    assert!(!disagreeing(&wrong, b, bias).is_empty(), "{what}: a picture brighter by {planted} goes unnoticed");
+    channels::seeds(method, seeds, |seed| render(scene, method, SIZE, &of(seed)))
 }
 
 /// A lamp shines past a board into fog.

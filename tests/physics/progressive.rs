@@ -262,7 +262,7 @@ fn measurement_points_follow_the_talks_curves() {
             ..Settings::default()
         };
         let rendered = picture(&scene, 8, &settings);
-        let radius2 = rendered.radii[Kind::Indirect as usize].iter().map(|r| f64::from(r * r)).sum::<f64>() / 64.0;
+        let radius2 = (0..64).map(|index| f64::from(rendered.radius2(index, Kind::Indirect, 0))).sum::<f64>() / 64.0;
         let error = rendered.pixels.iter().map(|p| (p.levels[0].mean.x - 1.0).powi(2)).sum::<f64>() / 64.0;
         (radius2 / f64::from(radius * radius), error.sqrt())
     };

@@ -25,6 +25,34 @@ pub fn t_critical(alpha: f64, tests: usize, freedom: f64) -> f64 {
     }
 }
 
+/// Family-wise error rate of the tests of a kind.
+pub const ERROR_RATE: f64 = 1e-3;
+
+/// What values must be on average, and what they must be told apart from.
+#[derive(Clone, Copy)]
+pub struct Check {
+    pub expected: f64,
+    /// Relative bias of the closed form or of the kernel that is known to remain.
+    pub bias: f64,
+    /// Relative shift of the expectation that must be rejected.
+    pub detects: f64,
+}
+
+impl Check {
+    /// One of `tests` simultaneous tests, by independent values.
+    pub fn run(&self, tests: usize, what: &str, values: &[f64]) {
+        let Check { expected, bias, detects } = *self;
+        let (mean, error) = mean_and_error(values);
+        let critical = t_critical(ERROR_RATE, tests, values.len() as f64 - 1.0);
+        let passes = |expected: f64| (mean - expected).abs() <= critical * error + (bias + 1e-6) * expected.abs();
+        println!("{what}: {mean:.6} +- {error:.6}, expected {expected:.6}");
+        assert!(passes(expected), "{what}: {mean} +- {error}, expected {expected}");
+        for planted in [1.0 - detects, 1.0 + detects].map(|shift| expected * shift) {
+            assert!(!passes(planted), "{what}: cannot tell {expected} from {planted} ({mean} +- {error})");
+        }
+    }
+}
+
 /// P-value of Pearson's chi-squared test of counts against expectations. Cells are pooled, in order of expectation, until
 /// each pool expects at least [`LEAST_EXPECTED`]; counts where next to nothing is expected make the value zero.
 pub fn chi_squared_p(counts: &[f64], expected: &[f64]) -> f64 {

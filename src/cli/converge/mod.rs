@@ -151,6 +151,7 @@ fn choose_all(
         let Some(chosen) = args.progress.during("choosing a method", tried) else { return Ok(None) };
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
+        run.entry.decided = chosen.spent;
         Ok(Some(chosen))
     };
     let choices = runs.iter_mut().map(choose_one).collect::<Result<_>>()?;

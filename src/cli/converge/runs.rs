@@ -5,7 +5,7 @@ use crate::cli::layout;
 use crate::cli::render::{Job, Method, RenderArgs};
 use crate::cli::usage;
 use caustique::error::{Error, Kind, Result};
-use caustique::render::Settings;
+use caustique::render::{Settings, Spent};
 use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
@@ -87,7 +87,7 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         time: None,
         ..render.settings()?
     };
-    let entry = Entry { name: name.into(), options: options.into(), settings, finish: None };
+    let entry = Entry { name: name.into(), options: options.into(), settings, decided: Spent::default(), finish: None };
     Ok(Run { entry, args: render.job })
 }
 

@@ -475,7 +475,6 @@ impl Job {
             time: self.time,
             target_error: self.target_error,
             shard,
-            decided: render::Spent::default(),
             guided: way.guided,
             indirect: way.indirect,
             classes: self.scene.switches().classes(),

@@ -2,6 +2,7 @@
 
 mod job;
 mod options;
+mod preview;
 mod summary;
 mod techniques;
 
@@ -18,10 +19,10 @@ use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::plan::why;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
-use caustique::render::Present;
 use caustique::render::auto::Choice;
 use caustique::render::{Progress, Rendered, Settings, Told};
-use caustique::scene::Scene;
+use caustique::scene::{Scene, Survey};
+use preview::Preview;
 use serde_json::json;
 use std::path::Path;
 use summary::Summary;
@@ -30,10 +31,11 @@ use summary::Summary;
 pub fn run(args: &RenderArgs) -> Result<()> {
     let settings = args.settings()?;
     // What is in the scene is not known yet.
-    let anything = Present { environment: true, volume: true, narrow_lobes: true };
-    layers::selection(&args.layers, &settings, anything, !args.job.no_combine)?;
+    let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
+    layers::selection(&args.layers, &settings, &anything, !args.job.no_combine)?;
     output::check(&args.output, "exr")?;
     args.picture.check()?;
+    args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     techniques::prepare(args)?;
     super::pool(args.threads)?.install(|| render(args, settings))
 }
@@ -57,7 +59,8 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         arguments: json!(args),
         reproducible: args.reproducible,
     };
-    let mut told = Telling { args, interrupt: None, waiting: None, reporter: None, why: None, summary: None };
+    let mut told =
+        Telling { args, interrupt: None, waiting: None, reporter: None, preview: None, why: None, summary: None };
     let delivery = pipeline::render(order, &mut told)?;
     told.deliver(delivery)
 }
@@ -68,6 +71,7 @@ struct Telling<'a> {
     interrupt: Option<Interrupt>,
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
+    preview: Option<Preview<'a>>,
     /// Why auto has chosen what it has.
     why: Option<String>,
     summary: Option<Summary>,
@@ -107,12 +111,23 @@ impl Watch for Telling<'_> {
             say(&format!("method: {why}"));
         }
         self.reporter = Some(Reporter::new(self.args.progress, settings));
+        self.preview = Preview::of(self.args);
         tell_plan(&self.args.job.scene.path, &plan.warnings);
     }
 
     fn progress(&mut self, progress: &Progress) {
         if let Some(reporter) = &mut self.reporter {
             reporter.report(progress);
+        }
+    }
+
+    fn looks(&mut self) -> bool {
+        self.preview.as_mut().is_some_and(Preview::due)
+    }
+
+    fn picture(&mut self, picture: Result<LayerSet>) {
+        if let Some(preview) = &mut self.preview {
+            preview.show(picture);
         }
     }
 
@@ -127,13 +142,16 @@ impl Watch for Telling<'_> {
 impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
-        let Telling { args, summary, .. } = self;
+        let Telling { args, summary, preview, .. } = self;
         let Delivery { set, attributes, techniques, finished, finishing, refusal } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
         let written = write(args, &set, &attributes);
         let pictured = args.picture.write_png(&set);
         let debugged = techniques::write(args, (set.width, set.height), &techniques);
+        if let Some(mut preview) = preview {
+            preview.show(beauty(&set));
+        }
         if talk {
             summary.tell();
             if let Some((name, account)) = finished {
@@ -160,6 +178,13 @@ impl Telling<'_> {
         }
         summary.interrupted(args)
     }
+}
+
+/// The picture alone.
+fn beauty(set: &LayerSet) -> Result<LayerSet> {
+    let mut alone = LayerSet::new(set.width, set.height);
+    alone.layers.extend(set.get("").cloned());
+    Ok(alone)
 }
 
 /// Prints what a plan warns of.

@@ -1,6 +1,7 @@
 //! Every option of `caustique render`: default, unit, range and help in one place. Those about what is rendered and how are in [`super::job`].
 
 use super::job::{Job, idle};
+use super::preview::Target;
 use crate::cli::number::threads;
 use crate::cli::output::{Naming, PictureArgs};
 use crate::cli::progress::Form;
@@ -38,6 +39,11 @@ pub struct RenderArgs {
     #[serde(flatten)]
     pub picture: PictureArgs,
 
+    /// Show the picture while it renders, denoised: a file that is rewritten every few seconds (.png: under --exposure and --tonemap; .exr:
+    /// linear light and alpha), or 'tev', that viewer on this machine
+    #[arg(long, value_name = "FILE.png|FILE.exr|tev", help_heading = "Running")]
+    #[serde(skip)]
+    pub preview: Option<Target>,
     /// Threads; 0 takes all cores. The picture does not depend on it
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     #[serde(skip)]

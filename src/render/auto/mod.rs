@@ -69,12 +69,11 @@ pub fn choose(
         focused.into_iter().chain([Strategy::USUAL]).find(|way| make(*way).is_some()).unwrap_or(Strategy::GATHERING)
     };
     let way = chosen.map_or_else(untried, |chosen| chosen.way);
-    let mut settings = make(way)?;
+    let settings = make(way)?;
     let saving = |weighed: Weighed| weighed.saving(&pilot.cost, way, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
     let seconds_per_iteration = pilot.cost.of(way, &settings, pilot.pixels);
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
-    settings.decided = spent;
     Some(Choice { settings, way, trials, weights, because, seconds_per_iteration, spent })
 }
 

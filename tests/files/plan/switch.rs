@@ -21,7 +21,7 @@ fn picture(description: Description) -> String {
 fn picture_of(scene: &Scene, camera: &Camera) -> String {
     let settings = Settings { iterations: Some(2), photons: 500, ..Settings::default() };
     let rendered = render(scene, camera, &settings, |_, _| Control::Continue);
-    let layers = rendered.layers(caustique::render::Present::of(scene), |_| true).expect("there are layers");
+    let layers = rendered.layers(&scene.survey, |_| true).expect("there are layers");
     layers
         .layers
         .iter()

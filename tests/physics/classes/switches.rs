@@ -7,7 +7,6 @@ use crate::support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 use caustique::estimator::{InitialBandwidth, Parts};
 use caustique::math::DVec3;
 use caustique::plan::{ClassSet, Effect, EffectSet};
-use caustique::render::Present;
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::Scene;
 use caustique::transport::Indirect;
@@ -108,7 +107,7 @@ fn every_method_leaves_out_what_is_switched_off() {
         let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts).element_sum()).sum::<f64>();
         assert_eq!((sum(|p| p.caustic), sum(|p| p.emission)), (0.0, 0.0), "{method:?}");
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
-        let layers = rendered.layers(Present::of(&scene), |_| true).expect("there are layers");
+        let layers = rendered.layers(&scene.survey, |_| true).expect("there are layers");
         assert!(layers.get("Caustic").is_none() && layers.get("Emission").is_none() && layers.get("Direct").is_some());
         // Nothing is left for photons.
         let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);

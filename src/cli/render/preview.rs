@@ -1,0 +1,159 @@
+//! `--preview`: the picture while it renders, in a file that is rewritten every few seconds, or in a running tev.
+
+use super::options::RenderArgs;
+use crate::cli::{output, say};
+use caustique::error::{Error, Kind, Result};
+use caustique::film::{LayerSet, Naming};
+use caustique::image::exr::{self, Attributes, Compression};
+use caustique::image::png;
+use caustique::render::Clock;
+use serde::Serialize;
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::str::FromStr;
+use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
+
+/// Least seconds between two pictures.
+const EVERY: f64 = 2.0;
+/// Seconds between two pictures over those that one takes: looking takes a tenth of the time at most.
+const RATIO: f64 = 10.0;
+/// Where tev listens.
+const TEV: &str = "127.0.0.1:14158";
+
+/// Where the picture is shown.
+#[derive(Clone, Debug, Serialize)]
+pub enum Target {
+    /// An sRGB picture under the PNG's exposure and tone curve.
+    Png(PathBuf),
+    /// Scene-linear Rec. 709 radiance and alpha.
+    Exr(PathBuf),
+    /// The viewer tev on this machine.
+    Tev,
+}
+
+impl FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Target, String> {
+        let path = PathBuf::from(text);
+        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+        match extension.as_deref().and_then(|extension| extension.to_str()) {
+            Some("png") => Ok(Target::Png(path)),
+            Some("exr") => Ok(Target::Exr(path)),
+            _ if text == "tev" => Ok(Target::Tev),
+            _ => Err("a file that ends in .png or .exr, or 'tev'".into()),
+        }
+    }
+}
+
+impl Target {
+    /// Checks that it can be written.
+    ///
+    /// # Errors
+    /// No such folder, or one that takes no files; it is the output itself.
+    pub fn check(&self, output: &std::path::Path) -> Result<()> {
+        match self {
+            Target::Png(path) => output::check(path, "png"),
+            Target::Exr(path) if path == output => {
+                let error = Error::new(Kind::Usage, path.display(), "--preview and -o name the same file");
+                Err(error.hint("give the preview a name of its own"))
+            }
+            Target::Exr(path) => output::check(path, "exr"),
+            Target::Tev => Ok(()),
+        }
+    }
+}
+
+/// Shows pictures, and paces them.
+pub struct Preview<'a> {
+    args: &'a RenderArgs,
+    target: &'a Target,
+    clock: Clock,
+    /// When the next picture is due, and since when the current one is made (seconds).
+    next: f64,
+    began: f64,
+    tev: Option<TevClient>,
+    /// It has failed, and said so.
+    failed: bool,
+}
+
+impl<'a> Preview<'a> {
+    /// Of a render that asks for one.
+    pub fn of(args: &'a RenderArgs) -> Option<Preview<'a>> {
+        let target = args.preview.as_ref()?;
+        Some(Preview { args, target, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false })
+    }
+
+    /// Whether a picture is due.
+    pub fn due(&mut self) -> bool {
+        self.began = self.clock.seconds();
+        !self.failed && self.began >= self.next
+    }
+
+    /// Shows a picture. A failure is said once, and ends the preview alone.
+    pub fn show(&mut self, picture: Result<LayerSet>) {
+        if let Err(error) = picture.and_then(|set| self.write(&set)) {
+            say(&format!("warning: --preview: {error}; the render goes on without"));
+            self.failed = true;
+        }
+        let now = self.clock.seconds();
+        self.next = now + (RATIO * (now - self.began)).max(EVERY);
+    }
+
+    fn write(&mut self, set: &LayerSet) -> Result<()> {
+        match self.target {
+            Target::Png(path) => {
+                let picture = &self.args.picture;
+                let (exposure, curve) = (picture.exposure as f32, picture.tonemap.into());
+                png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, curve)
+            }
+            Target::Exr(path) => {
+                let options = exr::Options { compression: Compression::None, naming: Naming::Plain };
+                exr::write(path, set, &Attributes::default(), options)
+            }
+            Target::Tev => self.stream(set).map_err(|cause| {
+                Error::new(Kind::Io, format!("tev at {TEV}"), cause).hint("start tev on this machine first")
+            }),
+        }
+    }
+
+    /// Sends the picture to tev, which keeps it under the output's name.
+    fn stream(&mut self, set: &LayerSet) -> std::io::Result<()> {
+        let name = self.args.output.display().to_string();
+        let beauty = set.beauty().map_err(std::io::Error::other)?;
+        let side = |pixels: usize| u32::try_from(pixels).map_err(std::io::Error::other);
+        let (width, height) = (side(set.width)?, side(set.height)?);
+        if self.tev.is_none() {
+            let mut client = TevClient::wrap(TcpStream::connect(TEV)?);
+            let channel_names = &["R", "G", "B"];
+            client.send(PacketCreateImage { image_name: &name, grab_focus: false, width, height, channel_names })?;
+            self.tev = Some(client);
+        }
+        let Some(client) = &mut self.tev else { return Ok(()) };
+        client.send(PacketUpdateImage {
+            image_name: &name,
+            grab_focus: false,
+            channel_names: &["R", "G", "B"],
+            channel_offsets: &[0, 1, 2],
+            channel_strides: &[3, 3, 3],
+            x: 0,
+            y: 0,
+            width,
+            height,
+            data: beauty.as_flattened(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_are_told_by_their_names() {
+        assert!(matches!("a.PNG".parse(), Ok(Target::Png(_))));
+        assert!(matches!("a/b.exr".parse(), Ok(Target::Exr(_))));
+        assert!(matches!("tev".parse(), Ok(Target::Tev)));
+        assert!("a.jpg".parse::<Target>().is_err() && "tev.".parse::<Target>().is_err());
+    }
+}

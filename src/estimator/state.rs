@@ -1,0 +1,122 @@
+//! Where bandwidths stand: the one place that says what the bandwidth of a pixel, kind of photons and level is.
+//!
+//! Levels nest: each kernel's measure (an area on surfaces, a volume in media) is half that of the next larger
+//! \[post-reconstruction 2021, 4.1\].
+
+use super::Pixel;
+use super::rule::{memoryless, volume};
+use crate::photon::{ByKind, Kind};
+
+/// The memoryless rules at one iteration: bandwidths follow from the initial ones and the iteration's number alone,
+/// so they are kept nowhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Schedule {
+    levels: usize,
+    /// Squared radius on surfaces over the initial one.
+    surface2: f32,
+    /// Radius in media over the initial one.
+    volume: f32,
+}
+
+impl Schedule {
+    /// At iteration `i` (from 1) of so many levels, with the reduction rates `alpha` on surfaces and `volume_alpha` in
+    /// media.
+    pub fn new(i: u64, levels: usize, alpha: f64, volume_alpha: f64) -> Schedule {
+        let surface2 = memoryless::radius2_factor(i, alpha) as f32;
+        Schedule { levels, surface2, volume: volume::radius_factor(i, volume_alpha) as f32 }
+    }
+
+    /// Number of levels.
+    pub fn levels(&self) -> usize {
+        self.levels
+    }
+
+    /// Squared radius over the initial one of the largest level.
+    #[inline]
+    pub fn factor2(&self) -> f32 {
+        self.surface2
+    }
+
+    /// Squared radius of a level (from 0, the smallest) whose largest began with the radius `initial` (scene units).
+    #[inline]
+    pub fn radius2(&self, initial: f32, level: usize) -> f32 {
+        initial * initial * self.surface2 * level_factor2(level, self.levels)
+    }
+
+    /// The same in media: a radius (scene units).
+    #[inline]
+    pub fn volume_radius(&self, initial: f32, level: usize) -> f32 {
+        initial * self.volume * volume::level_factor(level, self.levels)
+    }
+}
+
+/// Squared radius on surfaces of level `level` (from 0, the smallest) of `levels` over that of the largest.
+#[inline]
+pub fn level_factor2(level: usize, levels: usize) -> f32 {
+    0.5f32.powi((levels - 1 - level) as i32)
+}
+
+/// The bandwidths of all pixels after an iteration.
+#[derive(Clone, Debug)]
+pub struct BandwidthState {
+    schedule: Schedule,
+    /// Where they follow from the photons found: squared radii on surfaces by kind of every pixel and level (square
+    /// scene units).
+    counted: Option<ByKind<Vec<f32>>>,
+}
+
+impl BandwidthState {
+    /// Those that follow `schedule`.
+    pub fn memoryless(schedule: Schedule) -> BandwidthState {
+        BandwidthState { schedule, counted: None }
+    }
+
+    /// Those that a rule has made of the photons found, if any; in media they follow `schedule`.
+    pub fn new(schedule: Schedule, counted: Option<ByKind<Vec<f32>>>) -> BandwidthState {
+        BandwidthState { schedule, counted }
+    }
+
+    /// Squared radius of a level (from 0, the smallest) of the pixel that has this index (square scene units).
+    #[inline]
+    pub fn radius2(&self, index: usize, pixel: &Pixel, kind: Kind, level: usize) -> f32 {
+        match &self.counted {
+            Some(radii2) => radii2[kind as usize][index * self.schedule.levels + level],
+            None => self.schedule.radius2(pixel.bandwidths[kind as usize], level),
+        }
+    }
+
+    /// Radius in media of a level of a pixel (scene units).
+    #[inline]
+    pub fn volume_radius(&self, pixel: &Pixel, level: usize) -> f32 {
+        self.schedule.volume_radius(pixel.volume_bandwidth, level)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_level_halves_the_measure_of_the_next_larger_and_the_first_iteration_has_the_initial_bandwidth() {
+        let first = Schedule::new(1, 5, 0.5, 0.5);
+        assert_eq!((first.radius2(3.0, 4), first.volume_radius(3.0, 4)), (9.0, 3.0));
+        let later = Schedule::new(100, 5, 0.5, 0.5);
+        for level in 1..5 {
+            assert_eq!(later.radius2(3.0, level - 1), 0.5 * later.radius2(3.0, level));
+            let ratio = later.volume_radius(3.0, level - 1) / later.volume_radius(3.0, level);
+            assert!((ratio.powi(3) - 0.5).abs() < 1e-6);
+        }
+        assert!(later.factor2() < first.factor2());
+    }
+
+    #[test]
+    fn what_a_rule_has_counted_takes_the_place_of_the_schedule_on_surfaces_alone() {
+        let schedule = Schedule::new(1, 2, 0.5, 0.5);
+        let pixel = Pixel { volume_bandwidth: 5.0, ..Pixel::new([1.0, 2.0]) };
+        let plain = BandwidthState::memoryless(schedule);
+        assert_eq!([0, 1].map(|level| plain.radius2(7, &pixel, Kind::Caustic, level)), [2.0, 4.0]);
+        let counted = BandwidthState::new(schedule, Some([vec![], vec![1.0, 2.0, 3.0, 4.0]]));
+        assert_eq!([0, 1].map(|level| counted.radius2(1, &pixel, Kind::Caustic, level)), [3.0, 4.0]);
+        assert_eq!(counted.volume_radius(&pixel, 1), 5.0);
+    }
+}

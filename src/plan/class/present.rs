@@ -1,0 +1,18 @@
+//! Classes of light paths that a scene can have.
+
+use super::{ClassSet, PathClass};
+use crate::plan::Effect;
+use crate::scene::Survey;
+
+/// Classes of light paths that there can be where a scene has what its survey says.
+pub fn classes_in(survey: &Survey) -> ClassSet {
+    let mut absent = ClassSet::NONE;
+    if !survey.scattering {
+        absent = absent.and(ClassSet::of(Effect::Volume));
+    }
+    if !survey.narrow_lobes {
+        let narrow = [Effect::Glossy, Effect::Caustic, Effect::Sds].map(ClassSet::of);
+        absent = narrow.into_iter().fold(absent, ClassSet::and).and(ClassSet::one(PathClass::IndirectFocus));
+    }
+    absent.complement()
+}
