@@ -15,7 +15,7 @@ one() { # SCENE METHOD OPTIONS...
         --seed 7 "$@" 2>"$folder/said"; then
         printf '%s  %s %s %s\n' "$(sha256sum <"$folder/x.exr" | cut -c1-16)" "$scene" "$method" "$*"
     else
-        printf '%-16s  %s %s %s: %s\n' refused "$scene" "$method" "$*" "$(head -n 1 "$folder/said")"
+        printf '%-16s  %s %s %s: %s\n' refused "$scene" "$method" "$*" "$(grep -m 1 -v '^warning\|^reading' "$folder/said")"
     fi
 }
 

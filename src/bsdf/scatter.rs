@@ -1,6 +1,7 @@
 //! Values, densities and directions of the layered model.
 
 use super::fresnel::{reflect, refract};
+use super::interface::Covered;
 use super::layered::{LEAST_COSINE, Layered, Seen, Shares, mean};
 use super::microfacet::{g1, g2_transmission};
 use super::profile::Position;
@@ -218,85 +219,52 @@ impl Layered<'_> {
         u_lobe: f32,
         u: Vec2,
     ) -> Option<BsdfSample> {
-        let Seen { o, side, at, .. } = *seen;
-        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let Seen { o, side, .. } = *seen;
         if o.z < LEAST_COSINE {
             return None;
         }
         let shares = self.shares(seen, set)?;
         let n = self.interface;
+        let sign = if side == 0 { 1.0 } else { -1.0 };
         let back = |w: Vec3| Vec3::new(w.x, w.y, sign * w.z);
-        let delta = |wi: Vec3, weight: Rgb, probability: f32| {
-            let transmitted = wi.z < 0.0;
-            (probability > 0.0).then(|| BsdfSample {
-                wi: back(wi),
-                weight: weight / probability,
-                pdf_w: probability,
-                lobe: LobeSet::DELTA,
-                transmitted,
-            })
-        };
-        // What a covering leaves of delta lobes.
-        let passes = |wi: Vec3| n.cover.as_ref().map_or(1.0, |c| c.cover.passes_both(at, Position::new(wi.z.abs())));
-        let mut u_lobe = u_lobe;
+        let mut rest = u_lobe;
         let mut chosen = |share: f32| {
-            let hit = u_lobe < share;
-            u_lobe = if hit { u_lobe / share } else { u_lobe - share };
-            hit.then_some(u_lobe)
+            let hit = rest < share;
+            rest = if hit { rest / share } else { rest - share };
+            hit.then_some(rest)
         };
-        let (i, lobe) = if let Some(u_facet) = chosen(shares.facets) {
-            let smooth = n.class == LobeSet::DELTA;
-            let h = if smooth { Vec3::Z } else { n.ggx.sample_visible(o, u) };
-            let (r, t, cos_t) = self.fresnel(o.dot(h).clamp(0.0, 1.0), side);
-            let p = Self::reflect_probability(r, t);
-            let mirrored = reflect(o, h);
-            if u_facet < p {
-                if smooth {
-                    return delta(mirrored, r * passes(mirrored), shares.facets * p);
-                }
-                (mirrored.z > 0.0).then_some((mirrored, n.class))?
-            } else {
-                let i = if n.thin {
-                    if mirrored.z <= 0.0 {
-                        return None;
-                    }
-                    Vec3::new(mirrored.x, mirrored.y, -mirrored.z)
-                } else {
-                    refract(o, h, n.smooth[side].eta, cos_t)
-                };
-                if smooth {
-                    let weight = t * (self.radiance_scale(side, transport) * passes(i));
-                    return delta(i, weight, shares.facets * (1.0 - p));
-                }
-                (i.z < 0.0).then_some((i, n.class))?
-            }
+        let drawn = if let Some(u_facet) = chosen(shares.facets) {
+            self.sample_facets(seen, transport, shares.facets, u_facet, u)?
         } else if chosen(shares.diffuse).is_some() {
-            (warp::hemisphere_cosine(u), LobeSet::BROAD)
+            Drawn::Lobe(warp::hemisphere_cosine(u), LobeSet::BROAD)
         } else if chosen(shares.returned).is_some() {
             let profile = self.rough_glass().map_or(&n.loss, |glass| &glass.loss[side]);
-            (profile.sample(u)?, n.class)
+            Drawn::Lobe(profile.sample(u)?, n.class)
         } else if chosen(shares.passed).is_some() {
             let profile = self.rough_glass().map_or(&n.loss, |glass| &glass.loss[1 - side]);
-            (-profile.sample(u)?, n.class)
+            Drawn::Lobe(-profile.sample(u)?, n.class)
         } else if chosen(shares.straight).is_some() {
-            return delta(-o, self.straight * passes(o), shares.straight);
+            Drawn::delta(-o, self.straight * self.passes(seen, -o), shares.straight)
+        } else if chosen(shares.below).is_some() {
+            Drawn::Lobe(warp::hemisphere_cosine(u), n.class)
+        } else if chosen(shares.coat).is_some() {
+            self.sample_coat(seen, shares.coat, u)?
+        } else if chosen(shares.sheen).is_some() {
+            let i = warp::sphere_uniform(u);
+            Drawn::Lobe(Vec3::new(i.x, i.y, i.z.abs()), LobeSet::BROAD)
         } else {
-            // Rounding can lead here without a covering.
-            let c = n.cover.as_ref()?;
-            if chosen(shares.below).is_some() {
-                (warp::hemisphere_cosine(u), n.class)
-            } else if chosen(shares.coat).is_some() {
-                let i = c.cover.sample_coat(o, u);
-                if c.cover.coat_class == LobeSet::DELTA {
-                    return delta(i, c.cover.albedos(o.z, at)[0], shares.coat);
-                }
-                (i.z > 0.0).then_some((i, c.cover.coat_class))?
-            } else if chosen(shares.sheen).is_some() {
-                let mut i = warp::sphere_uniform(u);
-                i.z = i.z.abs();
-                (i, LobeSet::BROAD)
-            } else {
-                return None;
+            return None;
+        };
+        let (i, lobe) = match drawn {
+            Drawn::Lobe(i, lobe) => (i, lobe),
+            Drawn::Delta { i, weight, probability } => {
+                return (probability > 0.0).then(|| BsdfSample {
+                    wi: back(i),
+                    weight: weight / probability,
+                    pdf_w: probability,
+                    lobe: LobeSet::DELTA,
+                    transmitted: i.z < 0.0,
+                });
             }
         };
         let wi = back(i.normalize());
@@ -306,5 +274,70 @@ impl Layered<'_> {
         let (f, pdf_w) = self.evaluate_shares::<true>(seen, wi, transport, set, &shares);
         let sample = BsdfSample { wi, weight: f * (wi.z.abs() / pdf_w), pdf_w, lobe, transmitted: i.z < 0.0 };
         (pdf_w > 0.0).then_some(sample)
+    }
+
+    /// What a covering leaves of a delta lobe along `wi`.
+    #[inline]
+    fn passes(&self, seen: &Seen, wi: Vec3) -> f32 {
+        let passes = |c: &Covered| c.cover.passes_both(seen.at, Position::new(wi.z.abs()));
+        self.interface.cover.as_ref().map_or(1.0, passes)
+    }
+
+    /// A direction by the facets, which are drawn with the probability `share`: reflected or transmitted, as `u_facet`
+    /// says.
+    #[inline]
+    fn sample_facets(&self, seen: &Seen, transport: Transport, share: f32, u_facet: f32, u: Vec2) -> Option<Drawn> {
+        let (n, o, side) = (self.interface, seen.o, seen.side);
+        let smooth = n.class == LobeSet::DELTA;
+        let h = if smooth { Vec3::Z } else { n.ggx.sample_visible(o, u) };
+        let (r, t, cos_t) = self.fresnel(o.dot(h).clamp(0.0, 1.0), side);
+        let p = Self::reflect_probability(r, t);
+        let mirrored = reflect(o, h);
+        if u_facet < p {
+            if smooth {
+                return Some(Drawn::delta(mirrored, r * self.passes(seen, mirrored), share * p));
+            }
+            return (mirrored.z > 0.0).then_some(Drawn::Lobe(mirrored, n.class));
+        }
+        let i = if n.thin {
+            if mirrored.z <= 0.0 {
+                return None;
+            }
+            Vec3::new(mirrored.x, mirrored.y, -mirrored.z)
+        } else {
+            refract(o, h, n.smooth[side].eta, cos_t)
+        };
+        if smooth {
+            let weight = t * (self.radiance_scale(side, transport) * self.passes(seen, i));
+            return Some(Drawn::delta(i, weight, share * (1.0 - p)));
+        }
+        (i.z < 0.0).then_some(Drawn::Lobe(i, n.class))
+    }
+
+    /// A direction by the coat, which is drawn with the probability `share`.
+    #[inline]
+    fn sample_coat(&self, seen: &Seen, share: f32, u: Vec2) -> Option<Drawn> {
+        // Rounding can lead here without a covering.
+        let cover = &self.interface.cover.as_ref()?.cover;
+        let i = cover.sample_coat(seen.o, u);
+        if cover.coat_class == LobeSet::DELTA {
+            return Some(Drawn::delta(i, cover.albedos(seen.o.z, seen.at)[0], share));
+        }
+        (i.z > 0.0).then_some(Drawn::Lobe(i, cover.coat_class))
+    }
+}
+
+/// A direction as drawn, as seen from the side of `wo`.
+enum Drawn {
+    /// By a lobe that has a width.
+    Lobe(Vec3, LobeSet),
+    /// By a delta lobe: flux over that of `wo`, and the probability of drawing it.
+    Delta { i: Vec3, weight: Rgb, probability: f32 },
+}
+
+impl Drawn {
+    #[inline]
+    fn delta(i: Vec3, weight: Rgb, probability: f32) -> Drawn {
+        Drawn::Delta { i, weight, probability }
     }
 }

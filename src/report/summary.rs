@@ -149,6 +149,40 @@ fn kept(points: &[Point], run: usize) -> impl Iterator<Item = &Point> {
     points.iter().filter(move |point| point.run == run && point.picture.is_some())
 }
 
+/// Where runs are beside each other: at about the same time, and at about the same error.
+struct Meeting {
+    time: f64,
+    error: f64,
+    at_time: Vec<Point>,
+    at_error: Vec<Point>,
+}
+
+impl Meeting {
+    fn of(runs: usize, outcome: &Outcome, metric: &Metric) -> Meeting {
+        let raw = |point: &Point| metric.of(&point.errors);
+        // The time that all runs have.
+        let last = |run: usize| kept(&outcome.points, run).last();
+        let ends: Vec<&Point> = (0..runs).filter_map(last).collect();
+        let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
+        // Of the errors that runs end with the one that most runs pass, and of several the smallest.
+        let passes = |error: f64, run: usize| {
+            let errors = || kept(&outcome.points, run).map(raw);
+            errors().any(|e| e >= error) && errors().any(|e| e <= error)
+        };
+        let count = |error: f64| (0..runs).filter(|&run| passes(error, run)).count();
+        let mut finals: Vec<f64> = ends.iter().map(|p| raw(p)).collect();
+        finals.sort_by(f64::total_cmp);
+        let error = finals.iter().rev().copied().max_by_key(|&error| count(error)).unwrap_or(0.0);
+        let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
+            let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
+            (0..runs).filter_map(of_run).collect()
+        };
+        let at_time = nearest(&|p| (p.seconds / time).ln().abs());
+        let at_error = nearest(&|p| (raw(p) / error).ln().abs());
+        Meeting { time, error, at_time, at_error }
+    }
+}
+
 /// The windows, the reference, and the crops.
 fn pictures(
     subject: &Subject,
@@ -158,27 +192,7 @@ fn pictures(
 ) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
     let Subject { entries, metric, reference, .. } = subject;
     let (width, height) = (reference.width, reference.height);
-    let raw = |point: &Point| metric.of(&point.errors);
-    // The time that all runs have.
-    let last = |run: usize| kept(&outcome.points, run).last();
-    let ends: Vec<&Point> = (0..entries.len()).filter_map(last).collect();
-    let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
-    // Of the errors that runs end with the one that most runs pass, and of several the smallest.
-    let passes = |error: f64, run: usize| {
-        let errors = || kept(&outcome.points, run).map(raw);
-        errors().any(|e| e >= error) && errors().any(|e| e <= error)
-    };
-    let count = |error: f64| (0..entries.len()).filter(|&run| passes(error, run)).count();
-    let mut finals: Vec<f64> = ends.iter().map(|p| raw(p)).collect();
-    finals.sort_by(f64::total_cmp);
-    let error = finals.iter().rev().copied().max_by_key(|&error| count(error)).unwrap_or(0.0);
-    let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
-        let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
-        (0..entries.len()).filter_map(of_run).collect()
-    };
-    let at_time = nearest(&|p| (p.seconds / time).ln().abs());
-    let at_error = nearest(&|p| (raw(p) / error).ln().abs());
-
+    let Meeting { time, error, at_time, at_error } = Meeting::of(entries.len(), outcome, metric);
     let mut load = |points: &[Point]| -> Result<Vec<Vec<[f32; 3]>>> {
         points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
     };

@@ -59,28 +59,9 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);
     let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
     let lights = Lights::new(&shapes, &materials, others, sky);
-    for (i, instance) in shapes.instances.iter().enumerate() {
-        if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
-            warnings
-                .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
-        }
-    }
-    if lights.is_empty() {
-        let dark = match description.lights.len() {
-            0 => "the scene has no light",
-            _ => "the intensities of all lights are zero",
-        };
-        warnings
-            .push(format!("{dark}: the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out area lights and the world)"));
-    }
+    warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
-    }
-    let opaque = description.medium.is_some_and(|medium| medium.transmittance(f32::INFINITY) == Rgb::ZERO);
-    if opaque && lights.emitters().iter().any(Emitter::is_infinite) {
-        warnings.push(
-            "the scene's medium has no end: no light of suns and environments gets through it (give a mesh around the scene the medium instead)".into(),
-        );
     }
     let scattering = Scattering::new(&materials.list);
     let contacts = Arc::new(Contacts::new(&shapes, &materials));
@@ -111,6 +92,40 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         nestings: Nestings::default(),
         warnings,
     })
+}
+
+/// Adds what is to be said of lights that give none; `punctual` is the number of lamps that the file has.
+fn warn_of_lights(
+    (shapes, materials): (&Shapes, &Materials),
+    lights: &Lights,
+    punctual: usize,
+    medium: Option<MediumParameters>,
+    warnings: &mut Vec<String>,
+) {
+    for (i, instance) in shapes.instances.iter().enumerate() {
+        if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
+            warnings
+                .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
+        }
+    }
+    if lights.is_empty() {
+        let dark = match punctual {
+            0 => "the scene has no light",
+            _ => "the intensities of all lights are zero",
+        };
+        warnings.push(format!(
+            "{dark}: the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out \
+             area lights and the world)"
+        ));
+    }
+    let opaque = medium.is_some_and(|medium| medium.transmittance(f32::INFINITY) == Rgb::ZERO);
+    if opaque && lights.emitters().iter().any(Emitter::is_infinite) {
+        warnings.push(
+            "the scene's medium has no end: no light of suns and environments gets through it (give a mesh around the \
+             scene the medium instead)"
+                .into(),
+        );
+    }
 }
 
 /// Other materials on the shapes of a scene, another medium and environment around them.

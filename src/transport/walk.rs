@@ -4,7 +4,7 @@
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::roulette::late_survival;
-use super::segment::{Arrival, Attenuate, Clear, End, PrecomputedHit, Start, next_vertex, token};
+use super::segment::{Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, next_vertex, token};
 use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::bsdf::{LobeSet, Transport};
@@ -13,7 +13,7 @@ use crate::medium::Flight;
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::Place;
-use crate::spectrum::WavelengthSample;
+use crate::spectrum::{Wavelength, WavelengthSample};
 use bumpalo::Bump;
 
 /// Where a path starts.
@@ -91,168 +91,256 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { mut origin, mut direction, mut throughput, mut interior, ref first, far, channel, hue } = *start;
-    let weight = channel.map_or(1.0, |channel| throughput[channel]);
-    let mut known = first;
-    let mut survival_scale = 1.0 / (V::SPARED * throughput.max_element());
+    let PathStart { origin, direction, throughput, interior, ref first, far, channel, hue } = *start;
+    let survival_scale = 1.0 / (V::SPARED * throughput.max_element());
     if !survival_scale.is_finite() {
         return;
     }
-    let mut scattered: Option<Scattered> = None;
-    let mut in_medium = false;
-    let mut leaving: Option<Place> = None;
-    let mut wavelength = None;
-    for depth in 1..=max_depth {
-        let last = stream.vertex(depth - 1);
-        let token = token(scene, last, Purpose::Alpha);
-        let met = std::mem::replace(&mut known, &PrecomputedHit::Unknown);
+    let mut path = Path {
+        scene,
+        arena,
+        stream,
+        transport,
+        max_depth,
+        channel: channel.map(|channel| (channel, throughput[channel])),
+        hue,
+        far,
+        depth: 1,
+        origin,
+        direction,
+        throughput,
+        interior,
+        survival_scale,
+        scattered: None,
+        in_medium: false,
+        leaving: None,
+        wavelength: None,
+    };
+    let mut known = first;
+    while path.depth <= max_depth {
+        let (end, flight) = path.travel::<V, BESIDES>(known, visitor);
+        known = &PrecomputedHit::Unknown;
+        let goes_on = match end {
+            End::Surface(arrival) => path.surface::<V, BESIDES>(arrival, flight, visitor),
+            End::Medium(met) => path.medium(met, flight, visitor),
+            End::Escaped(left) => {
+                visitor.escape(path.direction, path.throughput * left, path.scattered, flight);
+                None
+            }
+            End::Lost => None,
+        };
+        if goes_on.is_none() {
+            return;
+        }
+        path.depth += 1;
+    }
+}
+
+/// A path under way.
+struct Path<'a> {
+    scene: &'a Scene,
+    arena: &'a Bump,
+    stream: Stream,
+    transport: Transport,
+    max_depth: u32,
+    /// The one channel that keeps its weight, and that weight.
+    channel: Option<(usize, f32)>,
+    hue: WavelengthSample,
+    far: bool,
+    /// Number of the segment under way, from 1.
+    depth: u32,
+    origin: Vec3,
+    direction: Vec3,
+    throughput: Rgb,
+    interior: Interior,
+    /// See [`Vertex::survival_scale`].
+    survival_scale: f32,
+    /// How the last vertex has scattered it.
+    scattered: Option<Scattered>,
+    /// The last vertex lies in a medium.
+    in_medium: bool,
+    /// Where it leaves a surface.
+    leaving: Option<Place>,
+    wavelength: Option<Wavelength>,
+}
+
+impl<'a> Path<'a> {
+    /// Goes to the next vertex: where the segment ends, and what media on the way mean for the densities of distances.
+    #[inline(always)]
+    fn travel<V: Visitor<'a>, const BESIDES: u8>(&mut self, met: &PrecomputedHit, visitor: &mut V) -> (End, Flight) {
+        let Path { scene, throughput, depth, scattered, wavelength, survival_scale, origin, .. } = *self;
+        let draws = self.stream.vertex(depth - 1);
+        let token = token(scene, draws, Purpose::Alpha);
+        let start = Start { origin, direction: self.direction, interior: self.interior, leaving: self.leaving, token };
+        if BESIDES < ABSORPTION {
+            return (next_vertex(scene, start, met, &mut Clear), Flight::FREE);
+        }
+        if BESIDES < SCATTERING {
+            return (next_vertex(scene, start, met, &mut Attenuate), Flight::FREE);
+        }
         let mut flight = Flight::FREE;
-        let start = Start { origin, direction, interior, leaving, token };
-        let end = if BESIDES < ABSORPTION {
-            next_vertex(scene, start, met, &mut Clear)
-        } else if BESIDES < SCATTERING {
-            next_vertex(scene, start, met, &mut Attenuate)
-        } else if V::SPLITS {
+        let end = if V::SPLITS {
             let from = origin;
-            let draws = last;
             let mut split =
                 Split { scene, visitor, throughput, draws, depth, scattered, from, wavelength, survival_scale };
             next_vertex(scene, start, met, &mut split)
         } else {
-            let (from_medium, from_infinity) = (in_medium, far && depth == 1);
-            let mut fly = Fly { scene, throughput, draws: last, from_medium, from_infinity, flight };
+            let (from_medium, from_infinity) = (self.in_medium, self.far && depth == 1);
+            let mut fly = Fly { scene, throughput, draws, from_medium, from_infinity, flight };
             let end = next_vertex(scene, start, met, &mut fly);
             flight = fly.flight;
             end
         };
-        if BESIDES >= SCATTERING
-            && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut scattered)
-        {
+        if let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered) {
             scattered.pdf_w *= flight.forward;
         }
-        let arrival = match end {
-            End::Surface(arrival) => arrival,
-            End::Medium(met) => {
-                let wo = -direction;
-                let arriving = throughput * met.weight;
-                let sigma_s = met.medium.sigma_s;
-                let draws = stream.vertex(depth);
-                let vertex = MediumVertex {
-                    met,
-                    wo,
-                    throughput: arriving * sigma_s,
-                    arriving,
-                    depth,
-                    from: origin,
-                    draws,
-                    flight,
-                    opacity: 1.0,
-                    next_event: 1.0,
-                    wavelength,
-                    survival_scale,
-                };
-                // Where the channel that has brought it here scatters nothing, it carries nothing.
-                if !is_lit(vertex.throughput) {
-                    return;
-                }
-                let set = match visitor.medium(&vertex, scattered) {
-                    Next::Stop => return,
-                    Next::Continue(set) | Next::Choose(set, _) => set & LobeSet::BROAD,
-                };
-                let survival = vertex.survival(set);
-                if set.is_empty() || depth == max_depth || draws.one(Purpose::Roulette) >= survival {
-                    return;
-                }
-                let Some(sample) = vertex.sample(transport, set, 0.0, draws.two(Purpose::Phase)) else { return };
-                visitor.scatter_medium(&vertex, &sample);
-                throughput = vertex.throughput * sample.weight / survival;
-                scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
-                (origin, direction) = (vertex.met.p, sample.wi);
-                (interior, in_medium, leaving) = (vertex.met.interior, true, None);
-                continue;
-            }
-            End::Escaped(left) => {
-                visitor.escape(direction, throughput * left, scattered, flight);
-                return;
-            }
-            End::Lost => return,
+        (end, flight)
+    }
+
+    /// Scatters it in a medium; `None` ends it.
+    #[inline(always)]
+    fn medium<V: Visitor<'a>>(&mut self, met: MediumArrival, flight: Flight, visitor: &mut V) -> Option<()> {
+        let Path { depth, wavelength, survival_scale, .. } = *self;
+        let arriving = self.throughput * met.weight;
+        let draws = self.stream.vertex(depth);
+        let vertex = MediumVertex {
+            wo: -self.direction,
+            throughput: arriving * met.medium.sigma_s,
+            met,
+            arriving,
+            depth,
+            from: self.origin,
+            draws,
+            flight,
+            opacity: 1.0,
+            next_event: 1.0,
+            wavelength,
+            survival_scale,
         };
-        let Arrival { ref surface, mut eta, ref crossing, interior: here, transmittance, distance } = arrival;
-        throughput *= transmittance;
-        if BESIDES >= DISPERSION
-            && let Some(crossing) = crossing
-            && crossing.disperses(scene)
-        {
-            // Even where light is only reflected: whether it is depends on the wavelength, and all ways to put a path together must agree that it has one.
-            let taken = wavelength.get_or_insert_with(|| {
-                let taken = match channel {
-                    None => hue.wavelength(),
-                    Some(channel) => hue.wavelength_of(channel, stream.vertex(depth).one(Purpose::Wavelength)),
-                };
-                throughput *= taken.weight;
-                taken
-            });
-            eta = crossing.eta(scene, direction.dot(surface.ng) < 0.0, taken);
+        // Where the channel that has brought it here scatters nothing, it carries nothing.
+        if !is_lit(vertex.throughput) {
+            return None;
         }
-        if let Some(channel) = channel {
-            let left = throughput[channel] / weight;
-            // Written so that NaN ends the path.
-            if left > 0.0 && stream.vertex(depth).one(Purpose::Loss) < left {
-                throughput /= left.min(1.0);
-            } else {
-                return;
-            }
+        let set = match visitor.medium(&vertex, self.scattered) {
+            Next::Stop => return None,
+            Next::Continue(set) | Next::Choose(set, _) => set & LobeSet::BROAD,
+        };
+        let survival = vertex.survival(set);
+        if set.is_empty() || depth == self.max_depth || draws.one(Purpose::Roulette) >= survival {
+            return None;
         }
-        let shading = scene.scattering.shading(&scene.materials, surface, eta, -direction, arena);
+        let sample = vertex.sample(self.transport, set, 0.0, draws.two(Purpose::Phase))?;
+        visitor.scatter_medium(&vertex, &sample);
+        self.throughput = vertex.throughput * sample.weight / survival;
+        self.scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
+        (self.origin, self.direction) = (vertex.met.p, sample.wi);
+        (self.interior, self.in_medium, self.leaving) = (vertex.met.interior, true, None);
+        Some(())
+    }
+
+    /// Scatters it at a surface; `None` ends it.
+    #[inline(always)]
+    fn surface<V: Visitor<'a>, const BESIDES: u8>(
+        &mut self,
+        arrival: Arrival,
+        flight: Flight,
+        visitor: &mut V,
+    ) -> Option<()> {
+        let Arrival { ref surface, eta, ref crossing, interior: here, transmittance, distance } = arrival;
+        let Path { scene, depth, transport, .. } = *self;
+        self.throughput *= transmittance;
+        let dispersed = match crossing {
+            Some(crossing) if BESIDES >= DISPERSION && crossing.disperses(scene) => Some(crossing),
+            _ => None,
+        };
+        let eta = dispersed.map_or(eta, |crossing| {
+            let taken = self.take_wavelength();
+            crossing.eta(scene, self.direction.dot(surface.ng) < 0.0, &taken)
+        });
+        self.lose()?;
+        let wo = -self.direction;
+        let shading = scene.scattering.shading(&scene.materials, surface, eta, wo, self.arena);
         let behind = crossing.as_ref().map_or(here, |c| c.interior);
-        let draws = stream.vertex(depth);
+        let draws = self.stream.vertex(depth);
         let vertex = Vertex {
             surface,
             shading: &shading,
-            wo: -direction,
-            throughput,
+            wo,
+            throughput: self.throughput,
             depth,
             distance,
-            from: origin,
+            from: self.origin,
             interior: here,
             interior_behind: behind,
             draws,
             flight,
-            wavelength,
-            survival_scale,
+            wavelength: self.wavelength,
+            survival_scale: self.survival_scale,
         };
-        let (set, chance) = match visitor.surface(&vertex, scattered) {
-            Next::Stop => return,
+        let (set, chance) = match visitor.surface(&vertex, self.scattered) {
+            Next::Stop => return None,
             Next::Continue(set) => (set & shading.bsdf.lobes(), 1.0),
             Next::Choose(set, chance) => (set & shading.bsdf.lobes(), chance),
         };
-        if set.is_empty() || depth == max_depth {
-            return;
+        if set.is_empty() || depth == self.max_depth {
+            return None;
         }
-        let survival = match channel {
+        let survival = match self.channel {
             None => vertex.survival_chosen(set, chance),
             // It has its roulette on arrival; this one ends what is trapped without loss.
             Some(_) => late_survival(depth),
         };
         if draws.one(Purpose::Roulette) >= survival {
-            return;
+            return None;
         }
-        let sample = shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction));
-        let Some(sample) = sample else { return };
+        let sample = shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction))?;
         visitor.scatter(&vertex, &sample);
         let going = survival * chance;
-        throughput *= sample.weight / going;
-        scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * going });
+        self.throughput *= sample.weight / going;
+        self.scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * going });
         if sample.transmitted && crossing.is_some() && transport == Transport::Radiance {
-            // Radiance is denser where the index is higher, by its square; a path that has only come in there has lost nothing, and gets
-            // it back on the way out. Roulette must not take it for absorption.
-            let eta = if direction.dot(surface.ng) < 0.0 { eta } else { 1.0 / eta };
-            survival_scale *= eta * eta;
+            // Radiance is denser where the index is higher, by its square; a path that has only come in there has lost
+            // nothing, and gets it back on the way out. Roulette must not take it for absorption.
+            let eta = if self.direction.dot(surface.ng) < 0.0 { eta } else { 1.0 / eta };
+            self.survival_scale *= eta * eta;
         }
-        direction = sample.wi;
-        origin = surface.spawn(direction);
-        in_medium = false;
-        leaving = Place::touching(surface);
-        interior = if sample.transmitted { behind } else { here };
+        self.direction = sample.wi;
+        self.origin = surface.spawn(sample.wi);
+        (self.in_medium, self.leaving) = (false, Place::touching(surface));
+        self.interior = if sample.transmitted { behind } else { here };
+        Some(())
+    }
+
+    /// The path's wavelength, which it takes where it first meets glass that disperses. Even where light is only
+    /// reflected: whether it is depends on the wavelength, and all ways to put a path together must agree that it has
+    /// one.
+    #[inline(always)]
+    fn take_wavelength(&mut self) -> Wavelength {
+        if let Some(taken) = self.wavelength {
+            return taken;
+        }
+        let taken = match self.channel {
+            None => self.hue.wavelength(),
+            Some((channel, _)) => {
+                self.hue.wavelength_of(channel, self.stream.vertex(self.depth).one(Purpose::Wavelength))
+            }
+        };
+        self.throughput *= taken.weight;
+        self.wavelength = Some(taken);
+        taken
+    }
+
+    /// Ends a path of one channel by the weight that it has lost; `None` if so.
+    #[inline(always)]
+    fn lose(&mut self) -> Option<()> {
+        let Some((channel, weight)) = self.channel else { return Some(()) };
+        let left = self.throughput[channel] / weight;
+        // Written so that NaN ends the path.
+        if left > 0.0 && self.stream.vertex(self.depth).one(Purpose::Loss) < left {
+            self.throughput /= left.min(1.0);
+            Some(())
+        } else {
+            None
+        }
     }
 }

@@ -407,6 +407,36 @@ impl Job {
         allowed.map(|settings| sized(settings, self.photons, size))
     }
 
+    /// Parameters of the chi-squared rule.
+    fn chi_squared(&self) -> ChiSquaredSettings {
+        let usual = ChiSquaredSettings::default();
+        ChiSquaredSettings {
+            annuli: self.cppm_grid.map_or(usual.annuli, |grid| grid.annuli),
+            sectors: self.cppm_grid.map_or(usual.sectors, |grid| grid.sectors),
+            k: self.cppm_k.unwrap_or(usual.k),
+            beta: self.cppm_beta.unwrap_or(usual.beta),
+            significance: self.cppm_significance.unwrap_or(usual.significance),
+            plus: self.cppm_plus,
+        }
+    }
+
+    /// What sets the largest initial bandwidth of a method with so many levels.
+    fn initial(&self, method: render::Method, levels: usize) -> Result<InitialBandwidth> {
+        let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
+        match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
+            (BandwidthChoice::Knn, k) => {
+                Ok(InitialBandwidth::Nearest(k.map_or(method.neighbours(levels), |k| k as usize)))
+            }
+            (_, Some(_)) => {
+                let error =
+                    Error::new(Kind::Usage, "command line", "--knn has no effect with this --initial-bandwidth");
+                Err(error.hint("leave one of the two out"))
+            }
+            (BandwidthChoice::Footprint, None) => Ok(InitialBandwidth::Footprint),
+            (BandwidthChoice::Length(r), None) => Ok(InitialBandwidth::Fixed(r as f32)),
+        }
+    }
+
     fn settings_of(&self, way: Strategy) -> Result<Settings> {
         let method = way.method;
         let radius_rule = match (self.radius_rule, method) {
@@ -419,32 +449,11 @@ impl Job {
             let error = Error::new(Kind::Usage, "command line", "--knn must be 2 or more with --method pm");
             return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
         }
-        let chi_squared = ChiSquaredSettings::default();
-        let chi_squared = ChiSquaredSettings {
-            annuli: self.cppm_grid.map_or(chi_squared.annuli, |grid| grid.annuli),
-            sectors: self.cppm_grid.map_or(chi_squared.sectors, |grid| grid.sectors),
-            k: self.cppm_k.unwrap_or(chi_squared.k),
-            beta: self.cppm_beta.unwrap_or(chi_squared.beta),
-            significance: self.cppm_significance.unwrap_or(chi_squared.significance),
-            plus: self.cppm_plus,
-        };
         let count = self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 });
         // Equation (6) of the 2021 paper combines an independent level with correlated ones.
         let two_paths = self.eye_paths.map_or(self.finish.model.is_some(), |paths| paths == 2);
         let levels = if two_paths { Levels::decorrelated(count) } else { Levels::new(count) };
-        let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
-        let initial = match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
-            (BandwidthChoice::Knn, k) => {
-                InitialBandwidth::Nearest(k.map_or(method.neighbours(levels.count), |k| k as usize))
-            }
-            (_, Some(_)) => {
-                let error =
-                    Error::new(Kind::Usage, "command line", "--knn has no effect with this --initial-bandwidth");
-                return Err(error.hint("leave one of the two out"));
-            }
-            (BandwidthChoice::Footprint, None) => InitialBandwidth::Footprint,
-            (BandwidthChoice::Length(r), None) => InitialBandwidth::Fixed(r as f32),
-        };
+        let initial = self.initial(method, levels.count)?;
         let limited = self.time.is_some() || self.target_error.is_some();
         let iterations = self.iterations.or((!limited).then_some(DEFAULT_ITERATIONS));
         let shard = self.shard.map_or(Shard { index: 0, count: 1 }, |s| Shard { index: s.index, count: s.count });
@@ -469,7 +478,7 @@ impl Job {
                 Some(Kernel::Epanechnikov) => KernelChoice::Epanechnikov,
                 Some(Kernel::Gaussian) => KernelChoice::Gaussian,
             },
-            chi_squared,
+            chi_squared: self.chi_squared(),
             max_depth: self.max_depth.unwrap_or(u32::MAX),
             iterations,
             time: self.time,
