@@ -22,6 +22,7 @@ use caustique::render::Present;
 use caustique::render::auto::Choice;
 use caustique::render::{Progress, Rendered, Settings, Told};
 use caustique::scene::Scene;
+use caustique::scene::description::Picture;
 use serde_json::json;
 use std::path::Path;
 use summary::Summary;
@@ -57,7 +58,15 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         arguments: json!(args),
         reproducible: args.reproducible,
     };
-    let mut told = Telling { args, interrupt: None, waiting: None, reporter: None, why: None, summary: None };
+    let mut told = Telling {
+        args,
+        interrupt: None,
+        waiting: None,
+        reporter: None,
+        why: None,
+        summary: None,
+        made_for: Picture::default(),
+    };
     let delivery = pipeline::render(order, &mut told)?;
     told.deliver(delivery)
 }
@@ -71,6 +80,8 @@ struct Telling<'a> {
     /// Why auto has chosen what it has.
     why: Option<String>,
     summary: Option<Summary>,
+    /// The picture that the scene was made for.
+    made_for: Picture,
 }
 
 impl Watch for Telling<'_> {
@@ -85,6 +96,7 @@ impl Watch for Telling<'_> {
 
     fn loaded(&mut self, scene: &Scene) -> Result<()> {
         scene::tell(&self.args.job.scene, &scene.warnings)?;
+        self.made_for = scene.picture;
         self.interrupt = Some(Interrupt::listen()?);
         Ok(())
     }
@@ -127,13 +139,13 @@ impl Watch for Telling<'_> {
 impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
-        let Telling { args, summary, .. } = self;
+        let Telling { args, summary, made_for, .. } = self;
         let Delivery { set, attributes, techniques, finished, finishing, refusal } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
         let written = write(args, &set, &attributes);
-        let pictured = args.picture.write_png(&set);
-        let debugged = techniques::write(args, (set.width, set.height), &techniques);
+        let pictured = args.picture.write_png(&set, &made_for);
+        let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if talk {
             summary.tell();
             if let Some((name, account)) = finished {
