@@ -5,13 +5,14 @@ use super::aim::Targets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
-use super::emitter::{Emitter, Sky, spot_falloff, spot_solid_angle};
+use super::emitter::{Emitter, Sky, spot_falloff, spot_point, spot_solid_angle};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
+use super::spread::Spread;
 use crate::geometry::{Shapes, Surface, spawn};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
 /// Share of the choices that all lights get alike; the rest goes by power.
@@ -93,6 +94,7 @@ impl Lights {
                     area,
                     two_sided,
                     radiance,
+                    spread: Spread::new(material.spread),
                     plane,
                     corners,
                     plain,
@@ -171,15 +173,16 @@ impl Lights {
     #[inline]
     pub(super) fn onward(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
         match &self.emitters[index] {
-            Emitter::Triangle { two_sided, plane, .. } => {
+            Emitter::Triangle { two_sided, spread, plane, .. } => {
                 let cos = plane.truncate().dot(d);
                 let cos = if *two_sided { cos.abs() } else { cos };
-                (cos >= LEAST_COSINE).then(|| (Self::lambertian(cos, *two_sided), cos))
+                let density = if cos >= LEAST_COSINE { Self::onto(cos, *two_sided, spread) } else { 0.0 };
+                (density > 0.0).then_some((density, cos))
             }
             Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
-            Emitter::Spot { frame, inner, outer, .. } => {
-                let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer);
-                (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer), 1.0))
+            Emitter::Spot { frame, inner, outer, edge, .. } => {
+                let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer, *edge);
+                (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer, *edge), 1.0))
             }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
@@ -212,7 +215,7 @@ impl Lights {
         u: Vec2,
     ) -> Option<DirectSample> {
         match &self.emitters[index] {
-            Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
+            Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
                 // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near the plane rounding
                 // decides.
                 let ng = plane.truncate();
@@ -228,9 +231,14 @@ impl Lights {
                 if cos == 0.0 || (cos < 0.0 && !two_sided) {
                     return None;
                 }
+                let toward = spread.of(cos.abs());
+                if toward == 0.0 {
+                    return None;
+                }
                 let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
+                let radiance = radiance * toward;
                 let pdf_w = probability * distance2 / (area * cos.abs());
-                let arrival_pdf_a = Self::lambertian(cos.abs(), *two_sided) / distance2;
+                let arrival_pdf_a = Self::onto(cos.abs(), *two_sided, spread) / distance2;
                 let target = Some(spawn(at, ng, -wi));
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
@@ -241,18 +249,19 @@ impl Lights {
                 let arrival_pdf_a = 0.5 / TAU / to.length_squared();
                 Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
-            Emitter::Spot { p: at, frame, intensity, inner, outer } => {
-                let to = *at - p;
+            Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge } => {
+                let at = spot_point(*middle, *radius, frame, u);
+                let to = at - p;
                 let wi = to.try_normalize()?;
-                let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer);
+                let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer, *edge);
                 if falloff == 0.0 {
                     return None;
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
-                let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer) * to.length_squared());
-                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
+                let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
+                Some(DirectSample { wi, target: Some(at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
-            Emitter::Sun { frame, irradiance, one_minus_cos } => {
+            Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
                     let arrival_pdf_a = self.entry_pdf_a(p, wi);
@@ -291,7 +300,10 @@ impl Lights {
                 Some((corners[0] + corners[1] * b.x + corners[2] * b.y, None))
             }
             Emitter::Point { p, .. } => Some((*p, None)),
-            Emitter::Spot { p, frame, outer, .. } => Some((*p, Cone::new(*p, frame.n, *outer))),
+            Emitter::Spot { p, radius, frame, outer, .. } => {
+                let at = spot_point(*p, *radius, frame, u);
+                Some((at, Cone::new(at, frame.n, *outer)))
+            }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -308,8 +320,8 @@ impl Lights {
 
     /// Density per solid angle of emission along cosine `cos` from a triangle.
     #[inline]
-    fn lambertian(cos: f32, two_sided: bool) -> f32 {
-        cos * FRAC_1_PI * if two_sided { 0.5 } else { 1.0 }
+    fn onto(cos: f32, two_sided: bool, spread: &Spread) -> f32 {
+        spread.pdf_w(cos) * if two_sided { 0.5 } else { 1.0 }
     }
 
     /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p` towards the light, `wi`.
@@ -336,35 +348,40 @@ impl Lights {
             return None;
         }
         let index = (first + relative) as usize;
-        let Emitter::Triangle { area, two_sided, .. } = &self.emitters[index] else { return None };
+        let Emitter::Triangle { area, two_sided, spread, .. } = &self.emitters[index] else { return None };
         let cos = surface.ng.dot(wo);
         if !(cos > 0.0 || (*two_sided && cos < 0.0)) {
             return None;
         }
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures);
         let cos = cos.abs();
+        let radiance = radiance * spread.of(cos);
         let choice = self.choice.as_ref()?;
         let [direct, start] = [choice.pdf(from, index), choice.power().pdf(index)].map(|chosen| chosen / area);
-        let onward = Self::lambertian(cos, *two_sided);
+        let onward = Self::onto(cos, *two_sided, spread);
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
     /// Calls `each(radiance, direct, start)` for every light at infinity that a ray leaving the scene from a receiver along `d` meets, with the densities of
-    /// [`EmissionDensity`].
+    /// [`EmissionDensity`]; a camera's own ray does not meet those that are hidden from cameras.
     #[inline]
-    pub fn escape(&self, from: &Receiver, d: Vec3, mut each: impl FnMut(Rgb, f32, f32)) {
+    pub fn escape(&self, from: &Receiver, d: Vec3, camera: bool, mut each: impl FnMut(Rgb, f32, f32)) {
         let Some(choice) = &self.choice else { return };
         let mut met = |radiance: Rgb, index: u32, pdf: f32| {
             let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
             each(radiance, direct * pdf, start * pdf);
         };
-        if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment) {
+        if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment)
+            && !(camera && self.sky.hidden_from_camera)
+        {
             met(environment.radiance(d), index, environment.pdf_w(d));
         }
         for &index in &self.suns {
-            if let Emitter::Sun { frame, irradiance, one_minus_cos: size } = &self.emitters[index as usize] {
+            if let Emitter::Sun { frame, irradiance, one_minus_cos: size, hidden_from_camera } =
+                &self.emitters[index as usize]
+            {
                 let size = *size;
-                if one_minus_cos(d, frame.n) < size {
+                if one_minus_cos(d, frame.n) < size && !(camera && *hidden_from_camera) {
                     let pdf = warp::cone_uniform_pdf_w(size);
                     met(Emitter::sun_radiance(*irradiance, size), index, pdf);
                 }
@@ -386,38 +403,39 @@ impl Lights {
         let emitter = &self.emitters[index];
         // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine at the light.
         let (origin, d, flux, [direct, onward, cos]) = match emitter {
-            Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
+            Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
                 let b = warp::triangle_uniform(point);
                 let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
                 let back = *two_sided && rest < 0.5;
                 let frame = Frame::from_normal(if back { -ng } else { ng });
-                let d = frame.to_world(warp::hemisphere_cosine(direction));
+                let (d, along) = spread.sample(direction);
+                let d = frame.to_world(d);
                 let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
                 let cos = ng.dot(d).abs();
                 // Along the surface nothing leaves it, and densities over the cosine would not be numbers.
                 if cos < LEAST_COSINE {
                     return None;
                 }
-                let flux = radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 });
-                (spawn(at, ng, d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
+                let flux = radiance * (PI * area * along * if *two_sided { 2.0 } else { 1.0 });
+                (spawn(at, ng, d), d, flux, [1.0 / area, Self::onto(cos, *two_sided, spread), cos])
             }
             Emitter::Point { p, intensity } => {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])
             }
-            Emitter::Spot { p, frame, intensity, inner, outer } => {
-                // Full cone and penumbra are chosen by their flux; inside the penumbra the ramp's square is inverted, so every
-                // path carries the same flux.
-                let edge = (outer - inner) / 3.0;
-                let x = direction.x * (inner + edge);
-                let h = if x < *inner { x } else { outer - (outer - inner) * ((x - inner) / edge).cbrt() };
+            Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } => {
+                // Full cone and penumbra are chosen by their flux; inside the penumbra the falloff's integral is inverted, so
+                // every path carries the same flux.
+                let penumbra = (outer - inner) * edge.mean();
+                let x = direction.x * (inner + penumbra);
+                let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
                 let sin = (h * (2.0 - h)).max(0.0).sqrt();
                 let (s, c) = (TAU * direction.y).sin_cos();
-                let filled = spot_solid_angle(*inner, *outer);
-                let falloff = spot_falloff(h, *inner, *outer);
+                let filled = spot_solid_angle(*inner, *outer, *edge);
+                let falloff = spot_falloff(h, *inner, *outer, *edge);
                 let d = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
-                (*p, d, *intensity * filled, [1.0, falloff / filled, 1.0])
+                (spot_point(*p, *radius, frame, point), d, *intensity * filled, [1.0, falloff / filled, 1.0])
             }
-            Emitter::Sun { frame, irradiance, one_minus_cos } => {
+            Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
                 // Irradiance is what a facing surface gets from the whole cone; a path from direction d stands for
                 // L / pdf = E / mean cosine.

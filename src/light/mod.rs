@@ -11,15 +11,17 @@ mod lights;
 mod receiver;
 mod region;
 mod sampler;
+mod spread;
 mod tree;
 
 pub use aim::Targets;
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
-pub use emitter::{Emitter, Sky};
+pub use emitter::{Emitter, Sky, SpotEdge};
 pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;
 pub use lights::Lights;
 pub use receiver::Receiver;
 pub use region::Region;
+pub use spread::Spread;

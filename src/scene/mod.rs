@@ -23,7 +23,7 @@ use crate::light::{Emitter, Environment, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::DVec3;
 use crate::trace::Tracer;
-use description::{CameraDescription, GuessedUnits};
+use description::{CameraDescription, GuessedUnits, Picture};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -41,8 +41,10 @@ pub struct Scene {
     pub objects: Vec<String>,
     /// Objects from this one on are spheres, made for point lights that have a radius.
     pub first_lamp: u32,
-    /// Geometry in Embree.
+    /// Geometry in Embree: all that has a body.
     pub tracer: Tracer,
+    /// What glows without a body ([`crate::material::Material::null_bsdf`]), if anything does.
+    pub bodiless: Option<Tracer>,
     /// Lights.
     pub lights: Lights,
     /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].
@@ -53,6 +55,8 @@ pub struct Scene {
     pub world_unsaid: bool,
     /// Cameras as described, in the file's order.
     pub cameras: Vec<CameraDescription>,
+    /// The picture that the scene was made for.
+    pub picture: Picture,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
     /// How the materials scatter.

@@ -3,10 +3,11 @@
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
 use super::eye::{Eye, EyeMeasure, Features};
+use super::glow::Glow;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
-use super::segment::{FirstHit, token};
+use super::segment::{FirstHit, token, told};
 use super::shares::{connected, shares, wanted};
 use super::site::ScatterPoint;
 use super::trail::Trail;
@@ -164,7 +165,8 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         }
         // Every pair of vertices has its own decisions at cut-outs.
-        let token = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
+        let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
+        let token = told(eye.scene, bits as u32, false);
         let way = vertex.shadow_ray_to(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium(), light.touching());
         if !is_lit(way.left) {
             return;
@@ -250,6 +252,20 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
 
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let (lights, materials) = (&self.shared.eye.scene.lights, &self.shared.eye.scene.materials);
+        let Some((radiance, density)) = lights.emitted(materials, &self.last, &glow.surface, glow.wo) else { return };
+        let before = (self.mis, self.trail, self.depth);
+        if let Some(scattered) = scattered {
+            self.trail.scattered(scattered.lobe);
+        }
+        self.depth = glow.depth;
+        let cos = glow.wo.dot(glow.surface.ng).abs();
+        self.mis = self.mis.arrive(glow.distance * glow.distance, cos).fly(glow.flight);
+        self.run_into(glow.throughput * radiance, glow.depth, glow.surface.p, &density);
+        (self.mis, self.trail, self.depth) = before;
+    }
+
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let merges = self.shared.strategies.eye_merge(vertex.depth, self.trail.delta);
@@ -288,7 +304,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.mis = self.mis.fly(flight);
         let lights = &self.shared.eye.scene.lights;
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
-        lights.escape(&last, direction, |radiance, direct, start| {
+        lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
             self.run_into(throughput * radiance, 0, direction, &density);
         });

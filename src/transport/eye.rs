@@ -18,7 +18,8 @@ use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
-use super::segment::{FirstHit, PrecomputedHit, token};
+use super::glow::Glow;
+use super::segment::{FirstHit, PrecomputedHit, camera_token};
 use super::shares::leads;
 use super::site::ScatterPoint;
 use super::surroundings::Around;
@@ -390,6 +391,18 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         if self.leads(onward) { Next::Continue(onward) } else { Next::Stop }
     }
 
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let (lights, materials, before) = (&self.scene.lights, &self.scene.materials, self.sight);
+        let from =
+            if scattered.is_none() { Receiver::anywhere(glow.surface.p + glow.wo * glow.distance) } else { self.last };
+        self.sight = self.arrived(scattered);
+        if let Some((radiance, pdf)) = lights.hit(materials, &from, &glow.surface) {
+            let density = || Some(lights.emitted(materials, &from, &glow.surface, glow.wo)?.1);
+            self.run_into((radiance, glow.throughput), pdf, scattered, density);
+        }
+        self.sight = before;
+    }
+
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         // A medium hides what is behind it as often as it takes the light.
         if scattered.is_none() && self.measure.first.is_none() && vertex.draws.one(Purpose::Roulette) < vertex.opacity {
@@ -444,7 +457,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let scene = self.scene;
         self.sight = self.arrived(scattered);
         let last = self.last;
-        scene.lights.escape(&last, direction, |radiance, direct, start| {
+        scene.lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start| {
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
             let density =
                 || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });
@@ -522,7 +535,7 @@ impl Eye<'_> {
                 origin: start.origin,
                 direction: start.direction,
                 tmax: f32::INFINITY,
-                token: token(self.scene, stream.vertex(0), Purpose::Alpha),
+                token: camera_token(self.scene, stream.vertex(0), Purpose::Alpha),
             })
         };
         self.scene.tracer.intersect8(ray, |k, hit| hits[k] = Some(hit));

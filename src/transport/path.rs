@@ -6,6 +6,7 @@
 use super::bidirectional::{Record, Technique};
 use super::bidirectional_eye::{look, look_in_medium};
 use super::eye::{Eye, EyeMeasure};
+use super::glow::Glow;
 use super::segment::token;
 use super::shares::{shares, wanted};
 use super::site::ScatterPoint;
@@ -113,6 +114,18 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.next()
     }
 
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let mut trail = self.trail;
+        if let Some(scattered) = scattered {
+            trail.scattered(scattered.lobe);
+        }
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, &glow.surface) {
+            let weight = Self::weight(scattered, pdf);
+            let light = glow.throughput * radiance * weight;
+            self.add(Technique::Hit { eye: glow.depth }, trail.sight.lit(false), light, weight);
+        }
+    }
+
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         look_in_medium(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
@@ -129,7 +142,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         let class = self.trail.sight.lit(false);
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
         let last = self.last;
-        scene.lights.escape(&last, direction, |light, pdf, _| {
+        scene.lights.escape(&last, direction, scattered.is_none(), |light, pdf, _| {
             let weight = Self::weight(scattered, pdf);
             self.add(technique, class, throughput * light * weight, weight);
         });

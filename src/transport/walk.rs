@@ -2,9 +2,12 @@
 //! [`Visitor`].
 
 use super::flight::{Fly, Split};
+use super::glow::{Glow, glows};
 use super::interior::Interior;
 use super::roulette::late_survival;
-use super::segment::{Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, next_vertex, token};
+use super::segment::{
+    Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token,
+};
 use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::bsdf::{LobeSet, Transport};
@@ -170,16 +173,16 @@ impl<'a> Path<'a> {
     fn travel<V: Visitor<'a>, const BESIDES: u8>(&mut self, met: &PrecomputedHit, visitor: &mut V) -> (End, Flight) {
         let Path { scene, throughput, depth, scattered, wavelength, survival_scale, origin, .. } = *self;
         let draws = self.stream.vertex(depth - 1);
-        let token = token(scene, draws, Purpose::Alpha);
+        let camera = depth == 1 && self.transport == Transport::Radiance;
+        let token =
+            if camera { camera_token(scene, draws, Purpose::Alpha) } else { token(scene, draws, Purpose::Alpha) };
         let start = Start { origin, direction: self.direction, interior: self.interior, leaving: self.leaving, token };
-        if BESIDES < ABSORPTION {
-            return (next_vertex(scene, start, met, &mut Clear), Flight::FREE);
-        }
-        if BESIDES < SCATTERING {
-            return (next_vertex(scene, start, met, &mut Attenuate), Flight::FREE);
-        }
         let mut flight = Flight::FREE;
-        let end = if V::SPLITS {
+        let end = if BESIDES < ABSORPTION {
+            next_vertex(scene, start, met, &mut Clear)
+        } else if BESIDES < SCATTERING {
+            next_vertex(scene, start, met, &mut Attenuate)
+        } else if V::SPLITS {
             let from = origin;
             let mut split =
                 Split { scene, visitor, throughput, draws, depth, scattered, from, wavelength, survival_scale };
@@ -191,7 +194,12 @@ impl<'a> Path<'a> {
             flight = fly.flight;
             end
         };
-        if let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered) {
+        if self.transport == Transport::Radiance && scene.bodiless.is_some() {
+            show_glows(scene, &start, &end, (self.in_medium, throughput, depth), scattered, visitor);
+        }
+        if BESIDES >= SCATTERING
+            && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered)
+        {
             scattered.pdf_w *= flight.forward;
         }
         (end, flight)
@@ -343,4 +351,25 @@ impl<'a> Path<'a> {
             None
         }
     }
+}
+
+/// Shows a visitor the lamps without a body on a segment that has ended somewhere, which began in a medium or not with some
+/// weight and is the last of so many.
+#[cold]
+#[inline(never)]
+fn show_glows<'a, V: Visitor<'a>>(
+    scene: &Scene,
+    start: &Start,
+    end: &End,
+    (from_medium, throughput, depth): (bool, Rgb, u32),
+    scattered: Option<Scattered>,
+    visitor: &mut V,
+) {
+    // Behind a vertex of a medium there may be more, whose light comes past it.
+    let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
+    glows(scene, start, reach, from_medium, |surface, distance, left, flight| {
+        let (surface, wo, throughput) = (*surface, -start.direction, throughput * left);
+        let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
+        visitor.glow(&Glow { surface, wo, throughput, depth, distance, flight }, scattered);
+    });
 }

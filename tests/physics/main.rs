@@ -13,6 +13,7 @@ mod dispersion;
 mod furnaces;
 mod glints;
 mod guide;
+mod lamps;
 mod long_paths;
 mod many_lights;
 mod material;

@@ -40,17 +40,18 @@ impl Bounds {
             intensity,
         };
         let bounds = match emitter {
-            Emitter::Triangle { area, two_sided, radiance, plane, corners, .. } => {
+            Emitter::Triangle { area, two_sided, radiance, spread, plane, corners, .. } => {
                 let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
-                let intensity = luminance(*radiance) * area;
+                let intensity = luminance(*radiance) * area * spread.of(1.0);
                 let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
                 Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
             }
             Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
-            Emitter::Spot { p, frame, intensity, outer, .. } => {
+            Emitter::Spot { p, radius, frame, intensity, outer, .. } => {
                 // The half angle's sine is half of the chord.
                 let reach = 2.0 * (0.5 * outer).clamp(0.0, 1.0).sqrt().asin();
-                at(*p, frame.n, 0.0, reach, luminance(*intensity))
+                let (low, high) = (p - *radius, p + *radius);
+                Bounds { low, high, ..at(*p, frame.n, 0.0, reach, luminance(*intensity)) }
             }
             Emitter::Sun { .. } | Emitter::Environment => return None,
         };

@@ -1,0 +1,227 @@
+//! Lamps as Blender has them: without a body, hidden from cameras, shining into a cone. Closed forms, by all methods.
+//!
+//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks),
+//! and each has to reject a picture that is off by the share it declares.
+
+use crate::support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::{Material, MediumParameters};
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::render::{Control, Method, Settings, render};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
+use caustique::scene::{Description, Scene};
+use std::f64::consts::PI;
+use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, mirror, quad, sphere, square};
+use support::stats::{mean_and_error, sidak, t_critical};
+
+const ERROR_RATE: f64 = 1e-3;
+const SEEDS: u64 = 12;
+/// Every family: eye paths, both, both with merging, photons; and light paths, few of which come to a narrow view.
+const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm, Method::Light];
+
+fn white_sky() -> Option<EnvironmentDescription> {
+    let source = EnvironmentSource::Color(Rgb::ONE);
+    Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 })
+}
+
+/// Mean of the picture and its standard error.
+fn seen(scene: &Scene, method: Method) -> (f64, f64) {
+    let camera = scene.camera(&square(12)).expect("a camera");
+    let settings = Settings {
+        method,
+        photons: 6000,
+        iterations: Some(48),
+        initial: InitialBandwidth::Fixed(0.03),
+        ..Settings::default()
+    };
+    let mean = |seed| {
+        let rendered = render(scene, &camera, &Settings { seed, ..settings.clone() }, |_, _| Control::Continue);
+        let all = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.element_sum() / 3.0);
+        all.sum::<f64>() / rendered.pixels.len() as f64
+    };
+    mean_and_error(&(1..=SEEDS).map(mean).collect::<Vec<_>>())
+}
+
+/// All methods but light tracing see `expected`, to `bias` (relative) and noise, and would tell it from what is off by
+/// `told`.
+fn check(what: &str, scene: &Scene, expected: f64, bias: f64, told: f64) {
+    let methods = &METHODS[..4];
+    let critical = t_critical(sidak(ERROR_RATE, methods.len()), 1, SEEDS as f64 - 1.0);
+    for &method in methods {
+        let (mean, error) = seen(scene, method);
+        println!("{what}, {method:?}: {mean:.5} +- {error:.5}, {expected:.5}");
+        let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected.abs();
+        assert!(passes(expected), "{what}, {method:?}: {mean} +- {error}, expected {expected}");
+        assert!(!passes((1.0 - told) * expected), "{what}, {method:?}: cannot tell {told} ({mean} +- {error})");
+    }
+}
+
+/// All methods see what the first of them does, to 1 % and noise, and would tell it from what is off by a fifth.
+fn agree(what: &str, scene: &Scene, methods: &[Method]) {
+    let found: Vec<(f64, f64)> = methods.iter().map(|&method| seen(scene, method)).collect();
+    println!("{what}: {found:?}");
+    let critical = t_critical(sidak(ERROR_RATE, methods.len() - 1), 1, SEEDS as f64 - 1.0);
+    let (expected, own) = found[0];
+    for &(mean, error) in &found[1..] {
+        let passes = |expected: f64| (mean - expected).abs() <= critical * error.hypot(own) + 0.01 * expected.abs();
+        assert!(passes(expected), "{what}: {found:?}");
+        assert!(!passes(0.8 * expected), "{what}: cannot tell 0.2 {found:?}");
+    }
+}
+
+/// A floor under a white sky, which a lamp of radiance 1 hangs over that shines on it or away from it.
+fn below_a_lamp(null_bsdf: bool, toward: bool) -> Scene {
+    let mut description = Description { environment: white_sky(), ..Description::default() };
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    let corner = Vec3::new(-0.5, 0.5, -0.5);
+    let lamp = if toward { quad(corner, Vec3::X, Vec3::Z) } else { quad(corner, Vec3::Z, Vec3::X) };
+    add(&mut description, "lamp", lamp, Material { null_bsdf, ..matte(0.0, 1.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, 0.1, 0.0), DVec3::ZERO, 20.0));
+    build(description)
+}
+
+/// A lamp without a body takes no light away: the floor reflects half of a white sky, and of what the lamp sends.
+#[test]
+fn lamps_without_a_body_let_light_through() {
+    check("away", &below_a_lamp(true, false), 0.5, 3e-3, 0.1);
+    let lamp = 0.5 / PI * below_a_square(0.5, 0.5);
+    check("toward", &below_a_lamp(true, true), 0.5 + lamp, 3e-3, 0.1);
+}
+
+/// One with a body takes most of the sky away.
+#[test]
+fn bodies_block_light() {
+    let (mean, error) = seen(&below_a_lamp(false, false), Method::Path);
+    assert!(mean + 4.0 * error < 0.4, "{mean} +- {error}");
+}
+
+/// Seen from its front in front of a sky its radiance adds to that, and from behind it is not there.
+#[test]
+fn lamps_without_a_body_are_seen_before_what_is_behind_them() {
+    for (z, expected) in [(1.0, 3.0), (-1.0, 1.0)] {
+        let mut description = Description { environment: white_sky(), ..Description::default() };
+        let lamp = quad(Vec3::new(-0.5, -0.5, 0.0), Vec3::X, Vec3::Y);
+        add(&mut description, "lamp", lamp, Material { null_bsdf: true, ..matte(0.0, 2.0) });
+        description.cameras.push(look_at(DVec3::new(0.0, 0.0, z), DVec3::ZERO, 20.0));
+        let scene = build(description);
+        for method in METHODS {
+            let (mean, _) = seen(&scene, method);
+            assert!((mean - expected).abs() < 1e-5, "{method:?}: {mean}, {expected}");
+        }
+    }
+}
+
+/// In a room with fog, a mirror, glass and a lamp without a body all methods that know fog agree.
+#[test]
+fn all_methods_see_lamps_without_a_body_alike() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    description.materials[1].null_bsdf = true;
+    description.materials[1].double_sided = true;
+    for p in &mut description.meshes[1].positions {
+        p.y -= 0.8;
+    }
+    add(&mut description, "mirror", sphere(Vec3::new(-0.5, 0.4, 0.2), 0.3, 48), mirror());
+    add(&mut description, "glass", sphere(Vec3::new(0.5, 0.4, 0.2), 0.3, 48), glass(1.5));
+    for fog in [false, true] {
+        description.medium = fog.then(|| MediumParameters {
+            sigma_a: Rgb::splat(0.05),
+            sigma_s: Rgb::splat(0.2),
+            ..MediumParameters::default()
+        });
+        let scene = build(description.clone());
+        let methods = if fog { &METHODS[..3] } else { &METHODS[..4] };
+        agree(if fog { "fog" } else { "air" }, &scene, methods);
+    }
+}
+
+/// Irradiance in the middle below a square of radiance 1 and half side a, at height h.
+fn below_a_square(a: f64, h: f64) -> f64 {
+    let x = a / h;
+    let root = (1.0 + x * x).sqrt();
+    4.0 * x / root * (x / root).atan()
+}
+
+/// A camera looks straight down at a floor through the lamp that lights it.
+#[test]
+fn cameras_look_through_lamps_that_are_hidden_from_them() {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0), matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::Z, Vec3::X);
+    add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.0, 2.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, 3.0));
+    let bright = seen(&build(description.clone()), Method::Path).0;
+    assert!((bright - 2.0).abs() < 1e-6, "not hidden, the lamp itself is seen: {bright}");
+    description.instances[1].hidden_from_camera = true;
+    // 0.4 % less at the corners of the view.
+    check("through", &build(description), 0.5 / PI * 2.0 * below_a_square(0.5, 1.0), 6e-3, 0.05);
+}
+
+/// In a room with a hidden lamp and a hidden white box, which both reflect in what is seen, all methods agree: what is
+/// hidden from cameras sends nothing to them by any way, and light to everything else.
+#[test]
+fn hidden_bodies_send_light_to_all_but_cameras() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    add(&mut description, "box", cuboid(Vec3::new(-0.5, 0.3, 0.4), Vec3::new(0.5, 1.2, 1.0), false), matte(0.9, 0.0));
+    let shown = seen(&build(description.clone()), Method::Path);
+    description.instances[1].hidden_from_camera = true;
+    description.instances[2].hidden_from_camera = true;
+    let scene = build(description);
+    let hidden = seen(&scene, Method::Path);
+    println!("shown {shown:?}, hidden {hidden:?}");
+    assert!((shown.0 - hidden.0).abs() > 8.0 * shown.1.hypot(hidden.1), "the box changes the picture");
+    agree("hidden", &scene, &METHODS);
+}
+
+/// A sky and the disc of a sun light a floor, and cameras see neither.
+#[test]
+fn cameras_see_no_hidden_light_from_infinity() {
+    let mut description = Description { environment: white_sky(), ..Description::default() };
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    description.lights.push(PunctualLight {
+        name: "sun".into(),
+        to_world: caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),
+        intensity: Rgb::ONE,
+        kind: PunctualKind::Sun { angle: 0.2 },
+        radius: 0.0,
+        hidden_from_camera: true,
+    });
+    description.environment_hidden_from_camera = true;
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::ZERO, 10.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 2.0, 0.0), 10.0));
+    // A sun of half angle x lights a floor that faces it with its irradiance.
+    check("floor", &build(description.clone()), 0.5 + 0.5 / PI, 4e-3, 0.05);
+    description.cameras.remove(0);
+    let upward = build(description);
+    for method in METHODS {
+        assert_eq!(seen(&upward, method).0, 0.0, "{method:?}");
+    }
+}
+
+/// Below a small lamp that spreads its light into a cone there is more of it than below a Lambertian one: by
+/// tan h / (tan h - h) on the axis, h the half angle.
+#[test]
+fn spreads_keep_the_flux() {
+    let (half, near) = (30f64.to_radians(), 0.3);
+    // The view is as large as the lamp.
+    let side = (2.0 * near * 4f64.to_radians().tan()) as f32;
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.5 * side, 1.0, -0.5 * side), Vec3::X * side, Vec3::Z * side);
+    add(&mut description, "lamp", lamp, Material { spread: half as f32, ..matte(0.0, 1000.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, near, 0.0), DVec3::ZERO, 8.0));
+    let on_axis = 0.5 / PI * 1000.0 * f64::from(side).powi(2) * half.tan() / (half.tan() - half);
+    // Two points of a square are 0.5214 of its side apart on average, and radiance falls with the tangent.
+    let expected = on_axis * (1.0 - 0.5214 * f64::from(side) / half.tan());
+    check("spread", &build(description), expected, 6e-3, 0.05);
+}
+
+/// The same light by all methods where a lamp that spreads little is seen in a mirror and through glass.
+#[test]
+fn all_methods_see_spreads_alike() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    description.materials[1].spread = 0.5;
+    add(&mut description, "mirror", sphere(Vec3::new(-0.4, 0.5, 0.0), 0.3, 48), mirror());
+    add(&mut description, "glass", sphere(Vec3::new(0.3, 0.5, 0.0), 0.3, 48), glass(1.5));
+    agree("spread", &build(description), &[Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm]);
+}
