@@ -35,16 +35,22 @@ def equal_time(figures):
 
 
 def guide(figures):
-    """Trimmed relMSE of photons that bring caustics alone, without and with a guide."""
-    rows = []
+    """Trimmed relMSE without and with a guide, of the pairs of runs that are the set."""
+    pairs = figures.of.split(",")
+    head, rows = ["scene"], []
+    for pair in pairs:
+        head += [f"{pair}, unguided", "guided", "gain"]
     for of in figures.all("guide"):
-        plain, guided = (of["relmse_trimmed"][name] for name in ("sppm", "sppm guided"))
-        rows.append([of["scene"], digits(plain), digits(guided), digits(plain / guided)])
-    return table(["scene", "unguided", "guided", "gain"], rows)
+        row = [of["scene"]]
+        for pair in pairs:
+            plain, guided = (of["relmse_trimmed"][name] for name in (pair, f"{pair} guided"))
+            row += [digits(plain), digits(guided), digits(plain / guided)]
+        rows.append(row)
+    return table(head, rows)
 
 
 def guided_layer(figures):
-    """relMSE of the layer Caustic, seed by seed."""
+    """relMSE of the layer Caustic by photons of caustics alone, seed by seed."""
     head, rows = ["scene", "unguided", "guided, one light path a pixel", "guided, as many light paths as unguided"], []
     for of in figures.all("guide", having="caustics"):
         errors = of["caustics"]["errors"]

@@ -3,7 +3,7 @@
 On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
 
 Settings, references and environment variables are those of auto.py; METHODS (sppm,all,cppm,vcm) chooses among the
-pairs. Each scene is stored on its own.
+pairs. Each scene is stored on its own, with the pairs as its set.
 """
 
 import os
@@ -90,7 +90,8 @@ def main():
             line = f"{name:<18}{'layer Caustic':<16}" + cells(mean, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
             rest = "".join(f"  {name} {error:.2g}" for name, error in mean.items() if name not in RUNS)
             print(line + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
-        record("guide", {"seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE, **row})
+        said = {"set": ",".join(PLAIN), "seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE}
+        record("guide", {**said, **row})
 
 
 if __name__ == "__main__":
