@@ -3,7 +3,7 @@
 leaving it out.
 
 sppm with one level, on one thread; renders take turns, and the fastest stretches of all rounds count. CAUSTIQUE_BIN is the program. SCENES, ROUNDS (4), ITERATIONS (5) and
-WIDTH (320) shorten a trial. The last lines are a table for docs/measurements.md.
+WIDTH (320) shorten a trial. Each scene is stored on its own.
 """
 
 import math
@@ -19,7 +19,6 @@ ITERATIONS = int(os.environ.get("ITERATIONS", "5"))
 WIDTH = os.environ.get("WIDTH", "320")
 ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))
 SCENES = os.environ["SCENES"].split(",") if "SCENES" in os.environ else ALL
-EFFECTS = "emission direct indirect glossy caustic sds volume dispersion depth_of_field environment alpha textures".split()
 OPTIONS = ["--method", "sppm", "--levels", "1", "--width", WIDTH]
 
 
@@ -38,29 +37,16 @@ def measure(scene, folder):
     return seconds.pop(None), {name: {"seconds_without": seconds[name], "error": errors[name]} for name in present}
 
 
-def table(rows):
-    """Seconds with everything and without each effect, and the error of that in percent, as Markdown."""
-    names = [name for name in EFFECTS if any(name in row["effects"] for row in rows)]
-    lines = ["| scene | all | " + " | ".join(f"`{name}`" for name in names) + " |", "| --- " * (len(names) + 2) + "|"]
-    for row in rows:
-        told = [row["effects"].get(name) for name in names]
-        cells = [f"{e['seconds_without']:.3f}, {100 * e['error']:.2g}" if e else "" for e in told]
-        lines.append(f"| {row['scene']} | {row['seconds']:.3f} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
 def main():
-    rows = []
     for scene in SCENES:
         with tempfile.TemporaryDirectory() as folder:
             whole, effects = measure(scene, Path(folder))
-        rows.append({"scene": scene, "seconds": whole, "effects": effects})
         print(f"{scene}: {whole:.3f} core-s an iteration")
         for name, effect in effects.items():
             saved = 1 - effect["seconds_without"] / whole
             print(f"    -{name:<16} {effect['seconds_without']:.3f} ({100 * saved:+.0f} % saved), error {100 * effect['error']:.0f} %", flush=True)
-    print(table(rows))
-    record("effects", {"rounds": ROUNDS, "iterations": ITERATIONS, "width": int(WIDTH), "scenes": rows})
+        said = {"scene": scene, "rounds": ROUNDS, "iterations": ITERATIONS, "width": int(WIDTH)}
+        record("effects", {**said, "seconds": whole, "effects": effects})
 
 
 if __name__ == "__main__":

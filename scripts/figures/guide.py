@@ -2,7 +2,8 @@
 """Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone, of sppm and cppm whose photons bring all light, and of vcm, with and without, of all pixels and without the worst 0.1 %.
 On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
 
-Settings, references and environment variables are those of auto.py; METHODS (sppm,all,cppm,vcm) chooses among the pairs.
+Settings, references and environment variables are those of auto.py; METHODS (sppm,all,cppm,vcm) chooses among the
+pairs. Each scene is stored on its own, with the pairs as its set.
 """
 
 import os
@@ -59,7 +60,6 @@ def cells(figures, columns, how):
 
 
 def main():
-    rows = []
     print(f"{'scene':<18}{'':<16}" + "".join(f"{name:>13}" for name in RUNS) + "".join(f"{name + ' gains':>12}" for name in PLAIN) + "  mean ratios, guided")
     views = [(scene, camera) for scene in auto.SCENES for camera in (None, *CLOSE.get(scene, []))]
     for scene, camera in views:
@@ -90,8 +90,8 @@ def main():
             line = f"{name:<18}{'layer Caustic':<16}" + cells(mean, RUNS, ">13.2g") + cells(gains, PLAIN, ">12.2f")
             rest = "".join(f"  {name} {error:.2g}" for name, error in mean.items() if name not in RUNS)
             print(line + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
-        rows.append(row)
-    record("guide", {"seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE, "scenes": rows})
+        said = {"set": ",".join(PLAIN), "seconds": auto.SECONDS, "width": auto.WIDTH, "reference_seconds": auto.REFERENCE}
+        record("guide", {**said, **row})
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = Path(__file__).resolve().parent / "results.jsonl"
 # Values that tell apart figures of one name.
-APART = ("scene", "rule", "parameters", "set")
+APART = ("scene", "rule", "parameters", "corrected", "set")
 
 
 def commit():

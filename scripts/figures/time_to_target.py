@@ -55,7 +55,6 @@ def crossing(points, target):
 
 def main():
     OUT.mkdir(parents=True, exist_ok=True)
-    rows = []
     print(f"{'scene':<10}{'error':<9}{'sppm':>10}   iterations and core-seconds in percent of sppm's, error after {ITERATIONS} in percent of its")
     for scene in SCENES:
         data = measure(scene)
@@ -74,8 +73,7 @@ def main():
                 spread = "/".join(f"{100 * e[0] / ITERATIONS:.0f}" if e else "-" for e in each)
                 line += f"   {method} {shown} ({spread}), {100 * left:.0f} %"
             print(line, flush=True)
-        rows.append(row)
-    record("time-to-target", {"iterations": ITERATIONS, "width": WIDTH, "photons": PHOTONS, "seeds": SEEDS, "scenes": rows})
+        record("time-to-target", {"iterations": ITERATIONS, "width": WIDTH, "light_paths": PHOTONS, "seeds": SEEDS, **row})
 
 
 if __name__ == "__main__":

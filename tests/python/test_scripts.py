@@ -1,6 +1,7 @@
 """The scripts count results as they should, and record figures as one JSON object a line."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,8 @@ sys.path.insert(0, str(support.ROOT / "scripts" / "figures"))
 sys.path.insert(0, str(support.ROOT / "scripts"))
 import record  # noqa: E402
 import tables  # noqa: E402
+from figure_tables.figures import Figures, Missing  # noqa: E402
+from figure_tables.markdown import digits  # noqa: E402
 
 COUNTS = support.ROOT / "scripts" / "test_counts.awk"
 RECORD = support.ROOT / "scripts" / "figures" / "record.py"
@@ -74,6 +77,13 @@ class Record(support.Scratch):
             self.assertGreaterEqual(line["machine"]["cores"], 1)
             self.assertTrue(line["machine"]["cpu"])
 
+    def test_corrected_and_not_are_two_figures(self):
+        file = self.dir / "results.jsonl"
+        with mock.patch.object(record, "commit", lambda: "a" * 40):
+            for corrected in (True, False):
+                record.record("mitsuba", {"scene": "wide", "corrected": corrected}, file)
+        self.assertEqual(len(file.read_text().splitlines()), 2)
+
     def test_a_tree_that_no_commit_has_stores_nothing(self):
         file = self.dir / "results.jsonl"
         with mock.patch.object(record, "commit", lambda: "a" * 40 + "-dirty"), mock.patch("sys.stderr"):
@@ -91,16 +101,77 @@ class Record(support.Scratch):
         self.assertEqual(done.returncode, 2)
 
 
-class Tables(unittest.TestCase):
+class Tables(support.Scratch):
+    def stored(self, *rows):
+        """Figures of a file with some rows: values, commit, and what else a row has."""
+        machine = {"cpu": "a processor", "cores": 2, "memory_gib": 8.0, "system": "a system"}
+        file = self.dir / "results.jsonl"
+        with file.open("w", encoding="utf-8") as out:
+            for values, commit, more in rows:
+                row = {"name": "rays", "values": values, "commit": commit, "date": "2026-01-02T03:04:05Z"}
+                out.write(json.dumps({**row, "machine": machine, **more}) + "\n")
+        return Figures(file=file)
+
     def test_the_documents_tables_are_what_is_stored(self):
         done = subprocess.run([sys.executable, TABLES, "--check"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
 
-    def test_a_changed_table_is_noticed(self):
-        text = tables.DOCUMENT.read_text(encoding="utf-8")
-        changed = text.replace("| bath | ", "| bath | 1e-9 ", 1)
-        self.assertNotEqual(changed, text)
-        self.assertEqual(tables.filled(changed), text)
+    def test_a_changed_number_of_any_table_is_noticed(self):
+        found = 0
+        for page in tables.PAGES:
+            for block in tables.BLOCK.finditer(page.read_text(encoding="utf-8")):
+                lines = block[0].splitlines()
+                # Below the head and its rule.
+                row = [index for index, line in enumerate(lines) if line.startswith("|")][2]
+                lines[row] = re.sub(r"\d(?=\D*$)", lambda digit: str((int(digit[0]) + 1) % 10), lines[row])
+                changed = "\n".join(lines)
+                with self.subTest(f"{page.name}: {block[2]}"):
+                    self.assertNotEqual(changed, block[0])
+                    self.assertEqual(tables.filled(changed), block[0])
+                found += 1
+        self.assertGreater(found, 10)
+
+    def test_no_measured_table_is_typed(self):
+        for name in ("measurements.md", "negative-results.md"):
+            text = (support.ROOT / "docs" / name).read_text(encoding="utf-8")
+            typed = [line for line in tables.BLOCK.sub("", text).splitlines() if line.startswith("|")]
+            self.assertEqual(typed, [], name)
+
+    def test_every_table_stands_in_a_page(self):
+        text = "".join(page.read_text(encoding="utf-8") for page in tables.PAGES)
+        self.assertEqual({block[2] for block in tables.BLOCK.finditer(text)}, set(tables.KINDS))
+
+    def test_what_is_not_stored_or_not_known_is_named(self):
+        for text, said in [
+            ("<!-- table: finished nowhere -->\n<!-- end -->", "'finished'.*'nowhere'"),
+            ("<!-- table: none -->\n<!-- end -->", "no table 'none'"),
+        ]:
+            with self.subTest(text), self.assertRaisesRegex(Missing, said):
+                tables.filled(text)
+
+    def test_a_source_says_what_a_figure_is_of(self):
+        pool, torus = ({"scene": "pool"}, "a" * 40, {}), ({"scene": "torus"}, "b" * 40 + "-dirty", {"carried": True})
+        figures = self.stored(pool)
+        figures.all("rays")
+        self.assertEqual(
+            figures.source(), "Measured at commit aaaaaaaaaa, 2026-01-02, 2 cores of a processor, 8 GiB, a system.\n"
+        )
+        figures = self.stored(torus, pool)
+        self.assertEqual([values["scene"] for values in figures.all("rays")], ["pool", "torus"])
+        lines = sorted(figures.source().replace("\n  ", " ").splitlines())
+        self.assertEqual(len(lines), 2)
+        self.assertRegex(lines[0], r"^- pool: commit a{10}, .* a system\.$")
+        self.assertRegex(lines[1], r"^- torus: commit b{10} with uncommitted changes, .*, carried over")
+
+    def test_one_figure_is_one(self):
+        figures = self.stored(({"scene": "pool"}, "a" * 40, {}), ({"scene": "torus"}, "a" * 40, {}))
+        self.assertEqual(figures.one("rays", scene="pool"), {"scene": "pool"})
+        with self.assertRaisesRegex(Missing, "2 figures 'rays'"):
+            figures.one("rays")
+
+    def test_numbers_keep_two_digits(self):
+        told = [digits(value) for value in (None, 0.0309, 0.03, 1.0, 11.3, 7e-5)]
+        self.assertEqual(told, ["-", "0.031", "0.030", "1.0", "11", "7.0e-05"])
 
 
 if __name__ == "__main__":
