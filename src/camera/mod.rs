@@ -24,6 +24,8 @@ pub struct Camera {
     projection: Projection,
     lens_radius: f32,
     focus_distance: f32,
+    /// Middle of the film against the axis, in the lengths of the projection.
+    offset: Vec2,
     width: u32,
     height: u32,
     /// Share of a pixel's side that its rays cover.
@@ -64,10 +66,17 @@ impl Camera {
             projection,
             lens_radius: lens.0,
             focus_distance: lens.1,
+            offset: Vec2::ZERO,
             width: size.0,
             height: size.1,
             covered: 1.0,
         }
+    }
+
+    /// The same with its film moved by `shift`, in widths to the right and heights up.
+    pub fn shifted(&self, shift: Vec2) -> Camera {
+        let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
+        Camera { offset: 2.0 * shift * half, ..*self }
     }
 
     /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film: each sees as much as a pixel does here. What light
@@ -106,13 +115,13 @@ impl Camera {
 
     /// Corners of a plane that all rays start in.
     pub fn origins(&self) -> [Vec3; 4] {
-        let film = match self.projection {
-            Projection::Perspective(_) => Vec2::ZERO,
-            Projection::Orthographic(half) => half,
+        let (film, middle) = match self.projection {
+            Projection::Perspective(_) => (Vec2::ZERO, Vec2::ZERO),
+            Projection::Orthographic(half) => (half, self.offset),
         };
         let half = film + if self.has_lens() { self.lens_radius } else { 0.0 };
         [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
-            .map(|(x, y)| self.position + self.rotation * (half * Vec2::new(x, y)).extend(0.0))
+            .map(|(x, y)| self.position + self.rotation * (middle + half * Vec2::new(x, y)).extend(0.0))
     }
 
     /// Unit viewing direction.
@@ -130,12 +139,12 @@ impl Camera {
         self.lens_radius > 0.0
     }
 
-    /// Film point in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size.
+    /// Film point in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size, about the film's middle.
     #[inline]
     fn plane(&self, film: Vec2, half: Vec2) -> Vec2 {
         let size = Vec2::new(self.width as f32, self.height as f32);
         let ndc = film / size * 2.0 - 1.0;
-        Vec2::new(ndc.x, -ndc.y) * half
+        Vec2::new(ndc.x, -ndc.y) * half + self.offset
     }
 
     /// The ray through `film` (pixels) from lens point `lens` (uniform on the unit square).
@@ -190,7 +199,7 @@ impl Camera {
         }
         // Where the ray crosses the plane in focus, as a film point at distance 1.
         let focus = lens_local + local * (self.focus_distance / cos);
-        let plane = focus.truncate() / self.focus_distance / half;
+        let plane = (focus.truncate() / self.focus_distance - self.offset) / half;
         let film = Vec2::new(plane.x + 1.0, 1.0 - plane.y) * 0.5 * Vec2::new(self.width as f32, self.height as f32);
         if !(film.x >= 0.0 && film.y >= 0.0 && film.x < self.width as f32 && film.y < self.height as f32) {
             return None;
@@ -218,13 +227,14 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// A ray and the connection back agree about the film point, with and without a lens.
+    /// A ray and the connection back agree about the film point, with and without a lens and a shift.
     #[test]
     fn rays_and_connections_are_inverse() {
-        for lens_radius in [0.0, 0.3] {
+        for (lens_radius, shift) in [(0.0, Vec2::ZERO), (0.3, Vec2::ZERO), (0.3, Vec2::new(0.7, -0.2))] {
             let rotation = Mat3::from_rotation_y(0.4) * Mat3::from_rotation_x(-0.2);
             let projection = Projection::Perspective(Vec2::new(0.8, 0.45));
             let camera = Camera::new(DVec3::new(1.0, 2.0, 3.0), rotation, projection, (lens_radius, 4.0), (160, 90));
+            let camera = camera.shifted(shift);
             for i in 0..1000 {
                 let draws = Stream::new(0, 0, Domain::Test, i).vertex(0);
                 let film = draws.two(Purpose::Pixel) * Vec2::new(160.0, 90.0);

@@ -8,6 +8,7 @@ use caustique::error::Result;
 use caustique::film::{self, Layer, LayerSet, Naming, Plane};
 use caustique::image::exr;
 use caustique::render::Clock;
+use caustique::scene::description::Picture;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -75,7 +76,7 @@ pub fn run(args: &CombineArgs) -> Result<()> {
         object["combined"] = ready.facts(&account);
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
-        args.picture.write_png(&set)?;
+        args.picture.write_png(&set, &Picture::default())?;
         say(&format!("finished with {} in {}", ready.name(), duration(clock.seconds())));
         Ok(())
     })

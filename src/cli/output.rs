@@ -6,6 +6,7 @@ use caustique::film::LayerSet;
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
 use caustique::image::{atomic, exr};
+use caustique::scene::description::{Picture, ToneCurve};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -65,6 +66,16 @@ impl From<Compression> for exr::Compression {
     }
 }
 
+impl From<ToneCurve> for Tonemap {
+    fn from(curve: ToneCurve) -> Self {
+        match curve {
+            ToneCurve::Agx => Self::Agx,
+            ToneCurve::Filmic => Self::Filmic,
+            ToneCurve::Srgb => Self::Srgb,
+        }
+    }
+}
+
 impl From<Tonemap> for ToneMap {
     fn from(tonemap: Tonemap) -> Self {
         match tonemap {
@@ -84,14 +95,14 @@ pub struct PictureArgs {
     #[arg(long, value_name = "FILE.png")]
     #[serde(skip)]
     pub png: Option<PathBuf>,
-    /// Exposure of the PNG in stops
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    /// Exposure of the PNG in stops [default: the scene's, else 0]
+    #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true)]
     #[serde(skip)]
-    pub exposure: f64,
-    /// From light to the PNG's colours
-    #[arg(long, value_enum, default_value_t = Tonemap::Agx)]
+    pub exposure: Option<f64>,
+    /// From light to the PNG's colours [default: the scene's, else agx]
+    #[arg(long, value_enum)]
     #[serde(skip)]
-    pub tonemap: Tonemap,
+    pub tonemap: Option<Tonemap>,
     /// Compression of the EXR; all are lossless
     #[arg(long, value_enum, default_value_t = Compression::Zip)]
     pub compression: Compression,
@@ -108,10 +119,18 @@ impl PictureArgs {
         exr::Options { compression: self.compression.into(), naming }
     }
 
+    /// Exposure in stops and tone curve: the user's, else those of the picture that a scene was made for.
+    pub fn look(&self, made_for: &Picture) -> (f32, ToneMap) {
+        let exposure = self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or(0.0);
+        let tonemap = self.tonemap.or(made_for.tonemap.map(Tonemap::from)).unwrap_or(Tonemap::Agx);
+        (exposure, tonemap.into())
+    }
+
     /// Writes the PNG if one is asked for.
-    pub fn write_png(&self, set: &LayerSet) -> Result<()> {
+    pub fn write_png(&self, set: &LayerSet, made_for: &Picture) -> Result<()> {
         let Some(path) = &self.png else { return Ok(()) };
-        png::write_tonemapped(path, set.width, set.height, &set.beauty()?, self.exposure as f32, self.tonemap.into())
+        let (exposure, tonemap) = self.look(made_for);
+        png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, tonemap)
     }
 }
 

@@ -58,6 +58,8 @@ pub struct Instance {
     pub material: u32,
     /// Index of the object: several instances (primitives) of one node share it.
     pub object: u32,
+    /// Cameras look through it; all else meets it.
+    pub hidden_from_camera: bool,
     /// Local to world; `None` when the mesh is already in world space.
     pub to_world: Option<Placement>,
 }

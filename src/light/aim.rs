@@ -261,7 +261,7 @@ mod tests {
         let areas: Vec<f32> = spheres.iter().map(|s: &(Vec3, f32)| PI * s.1 * s.1).collect();
         let choice = Cdf::new(areas.iter().map(|&a| f64::from(a)));
         let targets = Targets { spheres, choice, area: areas.iter().sum() };
-        let sky = Sky { center: Vec3::ZERO, radius: 1.05, environment: None };
+        let sky = Sky { center: Vec3::ZERO, radius: 1.05, environment: None, hidden_from_camera: false };
         let d = Vec3::NEG_Y;
         let whole = PI * sky.radius * sky.radius;
         let n = 200_000u64;
@@ -319,7 +319,7 @@ mod tests {
             let area = PI;
             let spheres = vec![(Vec3::new(0.3, -0.2, 0.5) * ratio, 1.0)];
             let targets = Targets { spheres, choice: Cdf::new(std::iter::once(f64::from(area))), area };
-            let sky = Sky { center: Vec3::ZERO, radius: ratio, environment: None };
+            let sky = Sky { center: Vec3::ZERO, radius: ratio, environment: None, hidden_from_camera: false };
             let whole = PI * ratio * ratio;
             let region = Region::new(Vec3::new(-0.4, 0.2, 0.1) * ratio, 1.0, ratio);
             let (mut mean, mut greatest) = (0.0f64, 0.0f32);

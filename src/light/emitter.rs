@@ -2,7 +2,7 @@
 
 use super::Environment;
 use crate::geometry::Shapes;
-use crate::math::{Frame, Rgb, Vec3, Vec4, luminance, sqr};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
 /// A light source. The set is closed: a scene's lights are one flat list.
@@ -35,10 +35,13 @@ pub enum Emitter {
         /// Radiant intensity (W/sr).
         intensity: Rgb,
     },
-    /// A point that shines into a cone with a smooth edge.
+    /// What shines into a cone with an edge, from a point, or alike from every point of a disc across its axis that no
+    /// ray can hit.
     Spot {
-        /// Position.
+        /// Position; the middle of the disc.
         p: Vec3,
+        /// Radius of the disc (m); 0 is a mathematical point.
+        radius: f32,
         /// Frame whose normal is the axis, in the direction of the light.
         frame: Frame,
         /// Radiant intensity on the axis (W/sr).
@@ -47,6 +50,8 @@ pub enum Emitter {
         inner: f32,
         /// 1 - cos of the half angle of no intensity, which is greater.
         outer: f32,
+        /// How it falls off between them.
+        edge: SpotEdge,
     },
     /// Light from a small cone of directions at infinity.
     Sun {
@@ -56,6 +61,8 @@ pub enum Emitter {
         irradiance: Rgb,
         /// 1 - cos of the half angle; 0 is exactly parallel light.
         one_minus_cos: f32,
+        /// Cameras do not see its disc.
+        hidden_from_camera: bool,
     },
     /// The environment.
     Environment,
@@ -70,26 +77,84 @@ pub struct Sky {
     pub radius: f32,
     /// The environment, if any.
     pub environment: Option<Environment>,
+    /// Cameras do not see it.
+    pub hidden_from_camera: bool,
 }
 
-/// glTF's smooth edge of a spot: the square of a linear ramp in the cosine (KHR_lights_punctual's recommendation), at
-/// an angle to the axis; of it and of the borders 1 - cos is told.
+/// How a spot's intensity falls across its edge, as a function of a ramp that is linear in the cosine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SpotEdge {
+    /// The ramp's square: what KHR_lights_punctual recommends.
+    #[default]
+    Squared,
+    /// Its smoothstep, 3 t^2 - 2 t^3: Blender's.
+    Smooth,
+}
+
+impl SpotEdge {
+    #[inline]
+    fn falloff(self, ramp: f32) -> f32 {
+        match self {
+            SpotEdge::Squared => sqr(ramp),
+            SpotEdge::Smooth => sqr(ramp) * (3.0 - 2.0 * ramp),
+        }
+    }
+
+    /// Mean over the ramp.
+    #[inline]
+    pub(super) fn mean(self) -> f32 {
+        match self {
+            SpotEdge::Squared => 1.0 / 3.0,
+            SpotEdge::Smooth => 0.5,
+        }
+    }
+
+    /// The ramp below which a share of the light in the edge lies.
+    #[inline]
+    pub(super) fn ramp(self, share: f32) -> f32 {
+        match self {
+            SpotEdge::Squared => share.cbrt(),
+            SpotEdge::Smooth => {
+                // Newton's iteration for 2 t^3 - t^4 = share, which is convex: after its first step it comes down to the root.
+                let mut t = (0.5 * share).cbrt();
+                for _ in 0..5 {
+                    let slope = t * t * (6.0 - 4.0 * t);
+                    if slope > 0.0 {
+                        t = (t - (t * t * t * (2.0 - t) - share) / slope).min(1.0);
+                    }
+                }
+                t
+            }
+        }
+    }
+}
+
+/// A spot's intensity against that on its axis, at an angle to it; of it and of the borders 1 - cos is told.
 #[inline]
-pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32) -> f32 {
+pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32, edge: SpotEdge) -> f32 {
     if one_minus_cos <= inner {
         1.0
     } else if one_minus_cos >= outer {
         0.0
     } else {
-        sqr((outer - one_minus_cos) / (outer - inner))
+        edge.falloff((outer - one_minus_cos) / (outer - inner))
     }
 }
 
 /// Solid angle that a spot fills, what its edge dims counted in part.
 #[inline]
-pub fn spot_solid_angle(inner: f32, outer: f32) -> f32 {
-    // The mean of a ramp's square is a third.
-    TAU * (inner + (outer - inner) / 3.0)
+pub fn spot_solid_angle(inner: f32, outer: f32, edge: SpotEdge) -> f32 {
+    TAU * (inner + (outer - inner) * edge.mean())
+}
+
+/// Where on its disc a spot at `p` shines from.
+#[inline]
+pub fn spot_point(p: Vec3, radius: f32, frame: &Frame, u: Vec2) -> Vec3 {
+    if radius == 0.0 {
+        return p;
+    }
+    let on = warp::disc_concentric(u) * radius;
+    p + frame.t * on.x + frame.b * on.y
 }
 
 impl Emitter {
@@ -102,7 +167,9 @@ impl Emitter {
                 luminance(*radiance) * area * PI * if *two_sided { 2.0 } else { 1.0 }
             }
             Emitter::Point { intensity, .. } => luminance(*intensity) * 2.0 * TAU,
-            Emitter::Spot { intensity, inner, outer, .. } => luminance(*intensity) * spot_solid_angle(*inner, *outer),
+            Emitter::Spot { intensity, inner, outer, edge, .. } => {
+                luminance(*intensity) * spot_solid_angle(*inner, *outer, *edge)
+            }
             Emitter::Sun { irradiance, .. } => luminance(*irradiance) * disc,
             Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc,
         })

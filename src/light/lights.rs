@@ -5,7 +5,7 @@ use super::aim::Targets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
-use super::emitter::{Emitter, Sky, spot_falloff, spot_solid_angle};
+use super::emitter::{Emitter, Sky, spot_falloff, spot_point, spot_solid_angle};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use crate::geometry::{Shapes, Surface, spawn};
@@ -177,9 +177,9 @@ impl Lights {
                 (cos >= LEAST_COSINE).then(|| (Self::lambertian(cos, *two_sided), cos))
             }
             Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
-            Emitter::Spot { frame, inner, outer, .. } => {
-                let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer);
-                (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer), 1.0))
+            Emitter::Spot { frame, inner, outer, edge, .. } => {
+                let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer, *edge);
+                (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer, *edge), 1.0))
             }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
@@ -241,18 +241,19 @@ impl Lights {
                 let arrival_pdf_a = 0.5 / TAU / to.length_squared();
                 Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
-            Emitter::Spot { p: at, frame, intensity, inner, outer } => {
-                let to = *at - p;
+            Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge } => {
+                let at = spot_point(*middle, *radius, frame, u);
+                let to = at - p;
                 let wi = to.try_normalize()?;
-                let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer);
+                let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer, *edge);
                 if falloff == 0.0 {
                     return None;
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
-                let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer) * to.length_squared());
-                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
+                let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
+                Some(DirectSample { wi, target: Some(at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
             }
-            Emitter::Sun { frame, irradiance, one_minus_cos } => {
+            Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
                     let arrival_pdf_a = self.entry_pdf_a(p, wi);
@@ -291,7 +292,10 @@ impl Lights {
                 Some((corners[0] + corners[1] * b.x + corners[2] * b.y, None))
             }
             Emitter::Point { p, .. } => Some((*p, None)),
-            Emitter::Spot { p, frame, outer, .. } => Some((*p, Cone::new(*p, frame.n, *outer))),
+            Emitter::Spot { p, radius, frame, outer, .. } => {
+                let at = spot_point(*p, *radius, frame, u);
+                Some((at, Cone::new(at, frame.n, *outer)))
+            }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -350,21 +354,25 @@ impl Lights {
     }
 
     /// Calls `each(radiance, direct, start)` for every light at infinity that a ray leaving the scene from a receiver along `d` meets, with the densities of
-    /// [`EmissionDensity`].
+    /// [`EmissionDensity`]; a camera's own ray does not meet those that are hidden from cameras.
     #[inline]
-    pub fn escape(&self, from: &Receiver, d: Vec3, mut each: impl FnMut(Rgb, f32, f32)) {
+    pub fn escape(&self, from: &Receiver, d: Vec3, camera: bool, mut each: impl FnMut(Rgb, f32, f32)) {
         let Some(choice) = &self.choice else { return };
         let mut met = |radiance: Rgb, index: u32, pdf: f32| {
             let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
             each(radiance, direct * pdf, start * pdf);
         };
-        if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment) {
+        if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment)
+            && !(camera && self.sky.hidden_from_camera)
+        {
             met(environment.radiance(d), index, environment.pdf_w(d));
         }
         for &index in &self.suns {
-            if let Emitter::Sun { frame, irradiance, one_minus_cos: size } = &self.emitters[index as usize] {
+            if let Emitter::Sun { frame, irradiance, one_minus_cos: size, hidden_from_camera } =
+                &self.emitters[index as usize]
+            {
                 let size = *size;
-                if one_minus_cos(d, frame.n) < size {
+                if one_minus_cos(d, frame.n) < size && !(camera && *hidden_from_camera) {
                     let pdf = warp::cone_uniform_pdf_w(size);
                     met(Emitter::sun_radiance(*irradiance, size), index, pdf);
                 }
@@ -404,20 +412,20 @@ impl Lights {
             Emitter::Point { p, intensity } => {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])
             }
-            Emitter::Spot { p, frame, intensity, inner, outer } => {
-                // Full cone and penumbra are chosen by their flux; inside the penumbra the ramp's square is inverted, so every
-                // path carries the same flux.
-                let edge = (outer - inner) / 3.0;
-                let x = direction.x * (inner + edge);
-                let h = if x < *inner { x } else { outer - (outer - inner) * ((x - inner) / edge).cbrt() };
+            Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } => {
+                // Full cone and penumbra are chosen by their flux; inside the penumbra the falloff's integral is inverted, so
+                // every path carries the same flux.
+                let penumbra = (outer - inner) * edge.mean();
+                let x = direction.x * (inner + penumbra);
+                let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
                 let sin = (h * (2.0 - h)).max(0.0).sqrt();
                 let (s, c) = (TAU * direction.y).sin_cos();
-                let filled = spot_solid_angle(*inner, *outer);
-                let falloff = spot_falloff(h, *inner, *outer);
+                let filled = spot_solid_angle(*inner, *outer, *edge);
+                let falloff = spot_falloff(h, *inner, *outer, *edge);
                 let d = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
-                (*p, d, *intensity * filled, [1.0, falloff / filled, 1.0])
+                (spot_point(*p, *radius, frame, point), d, *intensity * filled, [1.0, falloff / filled, 1.0])
             }
-            Emitter::Sun { frame, irradiance, one_minus_cos } => {
+            Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
                 // Irradiance is what a facing surface gets from the whole cone; a path from direction d stands for
                 // L / pdf = E / mean cosine.

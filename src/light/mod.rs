@@ -17,7 +17,7 @@ pub use aim::Targets;
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
-pub use emitter::{Emitter, Sky};
+pub use emitter::{Emitter, Sky, SpotEdge};
 pub use environment::{Environment, ImageEnvironment};
 pub use guide::Guide;
 pub use lights::Lights;

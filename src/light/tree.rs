@@ -248,7 +248,8 @@ impl LightTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Rgb, Vec4, warp};
+    use crate::light::emitter::{SpotEdge, spot_point};
+    use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};
 
     /// Triangles, points and spots of all orientations, in a box of 10 m.
@@ -269,6 +270,8 @@ mod tests {
                     intensity: radiance,
                     inner: 0.1,
                     outer: 0.3 + draws(3).one(Purpose::Lobe),
+                    radius: if i % 8 == 1 { 0.3 } else { 0.0 },
+                    edge: SpotEdge::Smooth,
                 },
                 _ => {
                     let corners = [p, vector(4) - 0.5, vector(5) - 0.5];
@@ -294,7 +297,11 @@ mod tests {
     fn shines(emitter: &Emitter, p: Vec3) -> bool {
         match emitter {
             Emitter::Triangle { two_sided, plane, .. } => *two_sided || plane.truncate().dot(p) - plane.w > 1e-4,
-            Emitter::Spot { p: at, frame, outer, .. } => frame.n.dot((p - at).normalize()) > 1.0 - outer + 1e-4,
+            Emitter::Spot { p: at, radius, frame, outer, .. } => (0..16).any(|k| {
+                let u = Vec2::new((0.5 + k as f32) / 16.0, 0.99);
+                let at = spot_point(*at, *radius, frame, u);
+                frame.n.dot((p - at).normalize()) > 1.0 - outer + 1e-4
+            }),
             _ => true,
         }
     }

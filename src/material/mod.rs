@@ -48,6 +48,8 @@ pub struct Material {
     pub alpha: Alpha,
     /// Back faces emit too (and nothing else: scattering always has two sides).
     pub double_sided: bool,
+    /// Rays pass the back of its faces as if nothing were there.
+    pub backface_culling: bool,
     /// KHR_materials_unlit: emits its base colour, scatters nothing.
     pub unlit: bool,
     /// Index of refraction (KHR_materials_ior), at least 1; infinity for the extension's legacy 0.
@@ -111,6 +113,7 @@ impl Default for Material {
             emission_texture: None,
             alpha: Alpha::Opaque,
             double_sided: false,
+            backface_culling: false,
             unlit: false,
             ior: 1.5,
             transmission: 0.0,

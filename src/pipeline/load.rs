@@ -59,6 +59,7 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
             Environment::File(path) => environment_file::read(path, &mut description.warnings)?,
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.environment_hidden_from_camera = false;
         description.world_unsaid = false;
     }
     let given = [("--env-rotation", order.rotation), ("--env-strength", order.strength)];

@@ -7,7 +7,7 @@ use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
-use crate::trace::{AlphaTest, Tracer};
+use crate::trace::{CAMERA, MeetsTest, Tracer};
 use std::sync::Arc;
 
 /// Farther from the origin than this many scene radii, coordinates are moved to the scene's centre: f32 would lose the digits.
@@ -19,17 +19,6 @@ const FAR_FROM_ORIGIN: f64 = 8.0;
 /// Embree is missing, or out of memory.
 pub(super) fn build(mut description: Description, threads: usize) -> Result<Scene> {
     let mut warnings = std::mem::take(&mut description.warnings);
-    let mut sized = description.lights.iter().filter(|l| l.radius > 0.0 && !matches!(l.kind, PunctualKind::Point));
-    if let Some(first) = sized.next() {
-        let others = match sized.count() {
-            0 => String::new(),
-            n => format!(" and {n} more"),
-        };
-        warnings.push(format!(
-            "light \"{}\"{others}: a radius is simulated for point lights only; it shines from a point",
-            first.name
-        ));
-    }
     for placed in &description.instances {
         let material = &description.materials[placed.material as usize];
         let warning =
@@ -54,6 +43,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         center: (center - origin).as_vec3(),
         // A little room, so that no light from infinity starts inside the geometry.
         radius: radius as f32 * 1.001,
+        hidden_from_camera: description.environment_hidden_from_camera,
         environment: environment(description.environment),
     };
     let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);
@@ -104,6 +94,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         guessed_units: description.guessed_units,
         world_unsaid: description.world_unsaid,
         cameras: description.cameras,
+        picture: description.picture,
         medium: description.medium,
         scattering,
         survey,
@@ -124,8 +115,8 @@ pub(super) fn dress(
     environment: Option<Environment>,
 ) -> Result<Scene> {
     let (shapes, materials) = (Arc::clone(&scene.shapes), Arc::new(materials));
-    // Embree asks about cut-outs the materials that it was given.
-    let cut = |materials: &Materials| materials.list.iter().map(|material| material.alpha).collect::<Vec<Alpha>>();
+    // Embree asks about cut-outs and backs the materials that it was given.
+    let cut = |materials: &Materials| materials.list.iter().map(asks).collect::<Vec<_>>();
     let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<bool>>();
     let contacts = match passing(&materials) == passing(&scene.materials) {
         true => Arc::clone(&scene.contacts),
@@ -149,6 +140,7 @@ pub(super) fn dress(
         guessed_units: scene.guessed_units.clone(),
         world_unsaid: scene.world_unsaid,
         cameras: scene.cameras.clone(),
+        picture: scene.picture,
         medium,
         scattering: scene.scattering.again(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
@@ -193,6 +185,7 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
             mesh: placed.mesh,
             material: placed.material,
             object: placed.object,
+            hidden_from_camera: placed.hidden_from_camera,
             to_world: shared.then(|| Placement::new(glam::Affine3A::from_mat4(glam::DMat4::from(to_world).as_mat4()))),
         });
     }
@@ -219,17 +212,35 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
 }
 
-/// Commits shapes to Embree, with the cut-outs of what they wear.
-fn tracer(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<Tracer> {
-    let cut = |instance: &Instance| materials.list[instance.material as usize].alpha != Alpha::Opaque;
-    let cutout: Vec<bool> = shapes.instances.iter().map(cut).collect();
-    Tracer::build(shapes, &cutout, &alpha_test(shapes, materials), threads)
+/// What a material makes rays ask for at a hit.
+fn asks(material: &Material) -> (Alpha, bool) {
+    (material.alpha, material.backface_culling)
 }
 
-fn alpha_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> AlphaTest {
+/// Commits shapes to Embree, with what rays pass of them.
+fn tracer(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<Tracer> {
+    let solid = (Alpha::Opaque, false);
+    let asked =
+        |instance: &Instance| instance.hidden_from_camera || asks(&materials.list[instance.material as usize]) != solid;
+    let asked: Vec<bool> = shapes.instances.iter().map(asked).collect();
+    Tracer::build(shapes, &asked, &meets_test(shapes, materials), threads)
+}
+
+fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> MeetsTest {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
-    Arc::new(move |instance, primitive, barycentric, token| {
-        let material = &materials.list[shapes.instances[instance as usize].material as usize];
+    Arc::new(move |instance, primitive, barycentric, direction, token| {
+        let placed = &shapes.instances[instance as usize];
+        if placed.hidden_from_camera && token & CAMERA != 0 {
+            return false;
+        }
+        let material = &materials.list[placed.material as usize];
+        if asks(material) == (Alpha::Opaque, false) {
+            return true;
+        }
+        let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
+        if material.backface_culling && surface.ng.dot(direction) > 0.0 {
+            return false;
+        }
         let cutoff = match material.alpha {
             Alpha::Opaque => return true,
             Alpha::Mask(cutoff) => cutoff,
@@ -240,7 +251,6 @@ fn alpha_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> AlphaTest {
                 (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
             }
         };
-        let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
         material.alpha(&surface, &materials.textures) >= cutoff
     })
 }
@@ -275,21 +285,24 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
     let p = (light.to_world.translation - origin).as_vec3();
     match light.kind {
         PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
-        PunctualKind::Spot { inner, outer } => {
+        PunctualKind::Spot { inner, outer, edge } => {
             let [inner, outer] = [inner, outer].map(|angle| one_minus_cos(f64::from(angle)));
             Emitter::Spot {
                 p,
+                radius: light.radius,
                 frame: Frame::from_normal(axis(light)),
                 intensity: light.intensity,
                 inner: inner as f32,
                 // Greater than the inner one, so that the ramp has a width.
                 outer: outer.max(inner * (1.0 + 1e-6)) as f32,
+                edge,
             }
         }
         PunctualKind::Sun { angle } => Emitter::Sun {
             frame: Frame::from_normal(-axis(light)),
             irradiance: light.intensity,
             one_minus_cos: one_minus_cos(0.5 * f64::from(angle)) as f32,
+            hidden_from_camera: light.hidden_from_camera,
         },
     }
 }
@@ -324,6 +337,7 @@ fn add_lamps(description: &mut Description) {
             mesh: description.meshes.len() as u32,
             material: description.materials.len() as u32,
             object: description.objects.len() as u32,
+            hidden_from_camera: light.hidden_from_camera,
             to_world: DAffine3::from_translation(light.to_world.translation),
         });
         description.objects.push(light.name.clone());

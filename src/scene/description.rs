@@ -1,9 +1,11 @@
 //! What a scene file says, as plain data: what readers (glTF, USD) produce and `Scene::build` takes.
 
 use crate::geometry::Mesh;
+use crate::light::SpotEdge;
 use crate::material::{Material, MediumParameters};
 use crate::math::{DAffine3, Rgb};
 use crate::texture::Texture;
+use serde::Deserialize;
 use std::path::PathBuf;
 
 /// Everything a reader found in a scene file. Indices are valid; numbers are finite; transforms can be inverted.
@@ -29,10 +31,14 @@ pub struct Description {
     pub guessed_units: Option<GuessedUnits>,
     /// Light from infinity.
     pub environment: Option<EnvironmentDescription>,
+    /// Cameras do not see it; it lights the scene all the same.
+    pub environment_hidden_from_camera: bool,
     /// The file's writer leaves light from infinity out, and nothing in the file says that there is none.
     pub world_unsaid: bool,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
+    /// The picture that the scene was made for.
+    pub picture: Picture,
     /// Whatever was ignored or approximated, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
 }
@@ -48,6 +54,8 @@ pub struct Placed {
     pub material: u32,
     /// Index into [`Description::objects`].
     pub object: u32,
+    /// Cameras look through it; all else meets it.
+    pub hidden_from_camera: bool,
     /// Local to world, composed in f64.
     pub to_world: DAffine3,
 }
@@ -65,6 +73,31 @@ pub struct CameraDescription {
     pub aperture_radius: f32,
     /// Distance of the plane in focus (m).
     pub focus_distance: f32,
+    /// Where the middle of the picture is, in widths to the right and heights up of the camera's axis.
+    pub shift: [f32; 2],
+}
+
+/// The picture that a scene was made for: what is taken where the user asks for nothing else.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels.
+    pub resolution: Option<[u32; 2]>,
+    /// Exposure in stops when it is looked at.
+    pub exposure: Option<f32>,
+    /// From light to a display's colours.
+    pub tonemap: Option<ToneCurve>,
+}
+
+/// Tone curves by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ToneCurve {
+    /// Blender's default since 4.0.
+    Agx,
+    /// Blender's default before.
+    Filmic,
+    /// The display's own curve alone.
+    Srgb,
 }
 
 /// Projection of a camera.
@@ -97,8 +130,10 @@ pub struct PunctualLight {
     pub intensity: Rgb,
     /// Shape of the emission.
     pub kind: PunctualKind,
-    /// Radius of the lamp (m); 0 is a mathematical point.
+    /// Radius of the lamp (m): a point light's sphere, the disc that a spot shines from; 0 is a mathematical point.
     pub radius: f32,
+    /// Cameras do not see it.
+    pub hidden_from_camera: bool,
 }
 
 /// Units of punctual lights that neither the file nor the user states.
@@ -115,12 +150,14 @@ pub struct GuessedUnits {
 pub enum PunctualKind {
     /// All directions alike.
     Point,
-    /// A cone with glTF's smooth edge between two half angles (radians).
+    /// A cone with an edge between two half angles (radians).
     Spot {
         /// Half angle of full intensity.
         inner: f32,
         /// Half angle of no intensity.
         outer: f32,
+        /// How it falls off between them.
+        edge: SpotEdge,
     },
     /// From infinity, spread over a cone.
     Sun {

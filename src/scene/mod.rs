@@ -23,7 +23,7 @@ use crate::light::{Emitter, Environment, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::DVec3;
 use crate::trace::Tracer;
-use description::{CameraDescription, GuessedUnits};
+use description::{CameraDescription, GuessedUnits, Picture};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -53,6 +53,8 @@ pub struct Scene {
     pub world_unsaid: bool,
     /// Cameras as described, in the file's order.
     pub cameras: Vec<CameraDescription>,
+    /// The picture that the scene was made for.
+    pub picture: Picture,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
     /// How the materials scatter.

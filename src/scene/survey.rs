@@ -9,6 +9,8 @@ use crate::material::{Alpha, Materials, MediumParameters};
 pub struct Survey {
     /// Some material has alpha cut-outs or blending.
     pub alpha: bool,
+    /// Something is hidden from cameras.
+    pub hidden_from_camera: bool,
     /// Some mesh bounds a solid that light enters.
     pub solids: bool,
     /// Rays may cross boundaries that do not scatter: index-matched solids, or solids inside others.
@@ -44,6 +46,7 @@ impl Survey {
         let mut worn = vec![0usize; materials.list.len()];
         for instance in &shapes.instances {
             worn[instance.material as usize] += 1;
+            survey.hidden_from_camera |= instance.hidden_from_camera;
         }
         let (mut solids, mut perfect, mut sharp) = (0, false, false);
         for (material, &worn) in materials.list.iter().zip(&worn) {

@@ -50,16 +50,20 @@ impl Scene {
                 }
             },
         };
-        let aspect = match described.projection {
-            Projection::Perspective { aspect, .. } => aspect.unwrap_or(DEFAULT_ASPECT),
-            Projection::Orthographic { xmag, ymag } => (xmag / ymag).abs(),
+        let aspect = match (self.picture.resolution, described.projection) {
+            (Some([width, height]), _) => width as f32 / height as f32,
+            (None, Projection::Perspective { aspect, .. }) => aspect.unwrap_or(DEFAULT_ASPECT),
+            (None, Projection::Orthographic { xmag, ymag }) => (xmag / ymag).abs(),
         };
         let scaled = |x: u32, factor: f32| ((x as f32 * factor).round() as u32).max(1);
         let (width, height) = match (view.width, view.height) {
             (Some(w), Some(h)) => (w, h),
             (Some(w), None) => (w, scaled(w, 1.0 / aspect)),
             (None, Some(h)) => (scaled(h, aspect), h),
-            (None, None) => (DEFAULT_WIDTH, scaled(DEFAULT_WIDTH, 1.0 / aspect)),
+            (None, None) => match self.picture.resolution {
+                Some([width, height]) => (width, height),
+                None => (DEFAULT_WIDTH, scaled(DEFAULT_WIDTH, 1.0 / aspect)),
+            },
         };
         if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
             let cause = format!("a picture of {width} x {height} pixels cannot be made");
@@ -85,7 +89,8 @@ impl Scene {
             (0.0, 1.0)
         };
         let position = described.to_world.translation - self.origin;
-        Ok(Camera::new(position, rotation(&described.to_world), projection, lens, (width, height)))
+        let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
+        Ok(camera.shifted(described.shift.into()))
     }
 
     /// A view of the whole scene from the front, a little from above.
@@ -103,6 +108,7 @@ impl Scene {
             projection: Projection::Perspective { yfov, aspect: None },
             aperture_radius: 0.0,
             focus_distance: 1.0,
+            shift: [0.0; 2],
         }
     }
 }

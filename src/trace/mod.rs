@@ -2,4 +2,4 @@
 
 mod tracer;
 
-pub use tracer::{AlphaTest, Hit, Ray, Tracer};
+pub use tracer::{CAMERA, Hit, MeetsTest, Ray, Tracer};

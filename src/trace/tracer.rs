@@ -16,9 +16,13 @@ pub struct Ray {
     pub direction: Vec3,
     /// Largest t; may be infinite.
     pub tmax: f32,
-    /// Random bits that decide about alpha cut-outs along this ray.
+    /// Random bits that decide about alpha cut-outs along this ray, and in scenes that hide something from cameras
+    /// whether this is a camera's ([`CAMERA`]).
     pub token: u32,
 }
+
+/// The bit of a token by which a camera's own rays, and rays to its lens, pass what is hidden from cameras.
+pub const CAMERA: u32 = 1;
 
 /// The nearest triangle along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +49,9 @@ impl From<embree::Hit> for Hit {
     }
 }
 
-/// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs. A pure function.
-pub type AlphaTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
+/// Whether a ray along `direction` with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha
+/// cut-outs, culled backs, what is hidden from cameras. A pure function of (instance, primitive, barycentric, direction, token).
+pub type MeetsTest = Arc<dyn Fn(u32, u32, [f32; 2], Vec3, u32) -> bool + Send + Sync>;
 
 /// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are faster there than
 /// through an instance's own tree, whose box overlaps its neighbours'.
@@ -71,17 +76,17 @@ fn column_major(m: &Affine3A) -> [f32; 12] {
 }
 
 impl Tracer {
-    /// Commits `shapes`; `cutout[i]` tells whether hits of instance `i` are put to the `alpha` test.
+    /// Commits `shapes`; `asked[i]` tells whether hits of instance `i` are put to the test `meets`.
     ///
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.
-    pub fn build(shapes: &Shapes, cutout: &[bool], alpha: &AlphaTest, threads: usize) -> Result<Tracer> {
+    pub fn build(shapes: &Arc<Shapes>, asked: &[bool], meets: &MeetsTest, threads: usize) -> Result<Tracer> {
         let library = embree::Library::load().map_err(convert)?;
         let device = embree::Device::new(&library, threads).map_err(convert)?;
         // A mesh is filtered if any instance of it is: the test itself then accepts the opaque ones.
         let mut filtered = vec![false; shapes.meshes.len()];
-        for (instance, &cut) in shapes.instances.iter().zip(cutout) {
-            filtered[instance.mesh as usize] |= cut;
+        for (instance, &asked) in shapes.instances.iter().zip(asked) {
+            filtered[instance.mesh as usize] |= asked;
         }
         let mut copies = vec![0; shapes.meshes.len()];
         for instance in &shapes.instances {
@@ -94,10 +99,13 @@ impl Tracer {
                 let positions: Vec<[f32; 3]> = data.positions.iter().map(|&p| place(p).to_array()).collect();
                 builder.triangles(GeometryId(id), &positions, &data.triangles).map_err(named)?;
                 if filtered[mesh as usize] {
-                    let alpha = Arc::clone(alpha);
+                    let (meets, placed) = (Arc::clone(meets), Arc::clone(shapes));
                     let filter: embree::Filter = Arc::new(move |c: &embree::Candidate| {
-                        let instance = c.instance.unwrap_or(c.geometry).0;
-                        alpha(instance, c.primitive, [c.u, c.v], c.token)
+                        let (instance, direction) = match c.instance {
+                            None => (c.geometry.0, c.direction.into()),
+                            Some(id) => (id.0, placed.instances[id.0 as usize].direction(c.direction.into())),
+                        };
+                        meets(instance, c.primitive, [c.u, c.v], direction, c.token)
                     });
                     builder.filter(GeometryId(id), filter).map_err(named)?;
                 }

@@ -6,7 +6,7 @@ use super::eye::{Eye, EyeMeasure, Features};
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
-use super::segment::{FirstHit, token};
+use super::segment::{FirstHit, token, told};
 use super::shares::{connected, shares, wanted};
 use super::site::ScatterPoint;
 use super::trail::Trail;
@@ -164,7 +164,8 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         }
         // Every pair of vertices has its own decisions at cut-outs.
-        let token = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth))) as u32;
+        let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
+        let token = told(eye.scene, bits as u32, false);
         let way = vertex.shadow_ray_to(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium(), light.touching());
         if !is_lit(way.left) {
             return;
@@ -288,7 +289,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.mis = self.mis.fly(flight);
         let lights = &self.shared.eye.scene.lights;
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
-        lights.escape(&last, direction, |radiance, direct, start| {
+        lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
             self.run_into(throughput * radiance, 0, direction, &density);
         });

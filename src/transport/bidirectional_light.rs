@@ -6,7 +6,7 @@ use super::light::LightPass;
 use super::light_vertex::{LightVertex, Scatterer};
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
-use super::segment::token;
+use super::segment::camera_token;
 use super::shares::{shares, wanted};
 use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
@@ -113,8 +113,8 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if !is_lit(value) {
             return;
         }
-        let way =
-            vertex.shadow_ray(eye.scene, sample.wi, Some(sample.lens), token(eye.scene, draws, Purpose::ShadowAlpha));
+        let token = camera_token(eye.scene, draws, Purpose::ShadowAlpha);
+        let way = vertex.shadow_ray(eye.scene, sample.wi, Some(sample.lens), token);
         if !is_lit(way.left) {
             return;
         }
@@ -168,7 +168,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     dispersed: vertex.wavelength.is_some(),
                 });
             }
-            if strategies.camera {
+            if strategies.camera && !eye.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera {
                 self.connect_camera(vertex);
             }
         }

@@ -88,7 +88,7 @@ fn second_strategy(scene: &Scene, vertex: &impl ScatterPoint, set: LobeSet) -> R
         }
         End::Escaped(left) => {
             let add = |radiance, pdf, _| light += radiance * left * weight(pdf);
-            scene.lights.escape(&vertex.receiver(), sample.wi, add);
+            scene.lights.escape(&vertex.receiver(), sample.wi, false, add);
         }
         End::Medium(_) | End::Lost => {}
     }

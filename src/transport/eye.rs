@@ -18,7 +18,7 @@ use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
-use super::segment::{FirstHit, PrecomputedHit, token};
+use super::segment::{FirstHit, PrecomputedHit, camera_token};
 use super::shares::leads;
 use super::site::ScatterPoint;
 use super::surroundings::Around;
@@ -444,7 +444,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let scene = self.scene;
         self.sight = self.arrived(scattered);
         let last = self.last;
-        scene.lights.escape(&last, direction, |radiance, direct, start| {
+        scene.lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start| {
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
             let density =
                 || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });
@@ -522,7 +522,7 @@ impl Eye<'_> {
                 origin: start.origin,
                 direction: start.direction,
                 tmax: f32::INFINITY,
-                token: token(self.scene, stream.vertex(0), Purpose::Alpha),
+                token: camera_token(self.scene, stream.vertex(0), Purpose::Alpha),
             })
         };
         self.scene.tracer.intersect8(ray, |k, hit| hits[k] = Some(hit));

@@ -129,7 +129,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         let class = self.trail.sight.lit(false);
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
         let last = self.last;
-        scene.lights.escape(&last, direction, |light, pdf, _| {
+        scene.lights.escape(&last, direction, scattered.is_none(), |light, pdf, _| {
             let weight = Self::weight(scattered, pdf);
             self.add(technique, class, throughput * light * weight, weight);
         });

@@ -8,7 +8,7 @@ use crate::medium::Flight;
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::scene::contact::{self, Along, Place};
-use crate::trace::{Hit, Ray};
+use crate::trace::{CAMERA, Hit, Ray};
 
 /// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a
 /// numerical trap and end the path.
@@ -195,7 +195,20 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
 /// What decides where a ray passes what is there in part only; nothing is drawn where all is there.
 #[inline(always)]
 pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
-    if scene.survey.alpha { draws.token(purpose) } else { 0 }
+    let bits = if scene.survey.alpha { draws.token(purpose) } else { 0 };
+    told(scene, bits, false)
+}
+
+/// The same of a camera's own ray, or of one to its lens: such rays pass what is hidden from cameras, too.
+#[inline(always)]
+pub(super) fn camera_token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
+    told(scene, token(scene, draws, purpose), true)
+}
+
+/// Random bits that tell of a camera's ray where that matters.
+#[inline(always)]
+pub(super) fn told(scene: &Scene, bits: u32, camera: bool) -> u32 {
+    if scene.survey.hidden_from_camera { bits & !CAMERA | if camera { CAMERA } else { 0 } } else { bits }
 }
 
 /// A ray from inside `interior`, about to be followed.

@@ -4,7 +4,7 @@
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::roulette::late_survival;
-use super::segment::{Arrival, Attenuate, Clear, End, PrecomputedHit, Start, next_vertex, token};
+use super::segment::{Arrival, Attenuate, Clear, End, PrecomputedHit, Start, camera_token, next_vertex, token};
 use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::bsdf::{LobeSet, Transport};
@@ -104,7 +104,8 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     let mut wavelength = None;
     for depth in 1..=max_depth {
         let last = stream.vertex(depth - 1);
-        let token = token(scene, last, Purpose::Alpha);
+        let camera = depth == 1 && transport == Transport::Radiance;
+        let token = if camera { camera_token(scene, last, Purpose::Alpha) } else { token(scene, last, Purpose::Alpha) };
         let met = std::mem::replace(&mut known, &PrecomputedHit::Unknown);
         let mut flight = Flight::FREE;
         let start = Start { origin, direction, interior, leaving, token };

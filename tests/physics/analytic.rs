@@ -75,6 +75,7 @@ fn sun(intensity: f32) -> PunctualLight {
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Sun { angle: 0.0 },
         radius: 0.0,
+        hidden_from_camera: false,
     }
 }
 

@@ -321,6 +321,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
             intensity: Rgb::ONE,
             kind: PunctualKind::Sun { angle: 0.0 },
             radius: 0.0,
+            hidden_from_camera: false,
         });
         let scene = build(description);
         assert_eq!(scene.survey.dispersion, abbe < 1e6);
@@ -436,6 +437,7 @@ fn sun(direction: DVec3, angle_deg: f32, irradiance: f32) -> PunctualLight {
         intensity: Rgb::splat(irradiance),
         kind: PunctualKind::Sun { angle: angle_deg.to_radians() },
         radius: 0.0,
+        hidden_from_camera: false,
     }
 }
 

@@ -6,7 +6,7 @@ use crate::support;
 
 use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::finish::{Denoiser, Finish};
-use caustique::light::{Guide, Region};
+use caustique::light::{Guide, Region, SpotEdge};
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
@@ -54,7 +54,7 @@ fn lit() -> Vec<(&'static str, Scene)> {
     };
     let point: Light = |d| d.lights.push(point_light(DVec3::new(0.2, 1.7, 0.8), 4.0));
     let kinds = |kind| PunctualLight { kind, ..point_light(DVec3::new(-0.2, 0.5, 3.0), 5.0) };
-    let spot = kinds(PunctualKind::Spot { inner: 0.3, outer: 0.6 });
+    let spot = kinds(PunctualKind::Spot { inner: 0.3, outer: 0.6, edge: SpotEdge::Squared });
     let sky: Light = |d| {
         let (width, height) = (16, 8);
         let texels = (0..width * height).map(|i| [0.2 + (i % 5) as f32, 1.0, 0.5]).collect();

@@ -24,3 +24,4 @@ mod nesting;
 mod photon_mapping;
 mod progressive;
 mod stopping;
+mod visibility;

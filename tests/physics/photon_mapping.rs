@@ -122,6 +122,7 @@ fn sun_through_a_slab() {
         intensity: Rgb::splat(e),
         kind: PunctualKind::Sun { angle: 0.0 },
         radius: 0.0,
+        hidden_from_camera: false,
     });
     description.cameras.push(look_at(DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, 14.0));
     let scene = build(description);

@@ -42,6 +42,7 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
         mesh: description.meshes.len() as u32,
         material: description.materials.len() as u32,
         object: description.objects.len() as u32,
+        hidden_from_camera: false,
         to_world,
     });
     description.objects.push(name.into());
@@ -114,6 +115,7 @@ pub fn look_at(eye: DVec3, target: DVec3, yfov_deg: f32) -> CameraDescription {
         projection: Projection::Perspective { yfov: yfov_deg.to_radians(), aspect: Some(1.0) },
         aperture_radius: 0.0,
         focus_distance: 1.0,
+        shift: [0.0; 2],
     }
 }
 
@@ -125,6 +127,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Point,
         radius: 0.0,
+        hidden_from_camera: false,
     }
 }
 

@@ -77,7 +77,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "N", value_parser = whole(2_u64..=2_000_000_000), conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
-    /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
+    /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]
     #[arg(long, value_name = "W", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Height in pixels; without a width the camera's aspect is kept

@@ -108,7 +108,7 @@ pub struct Job {
     #[arg(long, value_name = "I/N", help_heading = "Running")]
     pub shard: Option<ShardChoice>,
 
-    /// Width in pixels; without a height the camera's aspect is kept [default: 1280]
+    /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]
     #[arg(long, value_name = "W", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Height in pixels; without a width the camera's aspect is kept

@@ -21,6 +21,7 @@ use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
 use caustique::render::auto::Choice;
 use caustique::render::{Progress, Rendered, Settings, Told};
+use caustique::scene::description::Picture;
 use caustique::scene::{Scene, Survey};
 use preview::Preview;
 use serde_json::json;
@@ -59,8 +60,16 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         arguments: json!(args),
         reproducible: args.reproducible,
     };
-    let mut told =
-        Telling { args, interrupt: None, waiting: None, reporter: None, preview: None, why: None, summary: None };
+    let mut told = Telling {
+        args,
+        interrupt: None,
+        waiting: None,
+        reporter: None,
+        preview: None,
+        why: None,
+        summary: None,
+        made_for: Picture::default(),
+    };
     let delivery = pipeline::render(order, &mut told)?;
     told.deliver(delivery)
 }
@@ -75,6 +84,8 @@ struct Telling<'a> {
     /// Why auto has chosen what it has.
     why: Option<String>,
     summary: Option<Summary>,
+    /// The picture that the scene was made for.
+    made_for: Picture,
 }
 
 impl Watch for Telling<'_> {
@@ -89,6 +100,7 @@ impl Watch for Telling<'_> {
 
     fn loaded(&mut self, scene: &Scene) -> Result<()> {
         scene::tell(&self.args.job.scene, &scene.warnings)?;
+        self.made_for = scene.picture;
         self.interrupt = Some(Interrupt::listen()?);
         Ok(())
     }
@@ -142,13 +154,13 @@ impl Watch for Telling<'_> {
 impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
-        let Telling { args, summary, preview, .. } = self;
+        let Telling { args, summary, preview, made_for, .. } = self;
         let Delivery { set, attributes, techniques, finished, finishing, refusal } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
         let written = write(args, &set, &attributes);
-        let pictured = args.picture.write_png(&set);
-        let debugged = techniques::write(args, (set.width, set.height), &techniques);
+        let pictured = args.picture.write_png(&set, &made_for);
+        let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if let Some(mut preview) = preview {
             preview.show(beauty(&set));
         }

@@ -6,6 +6,7 @@ use caustique::film::{Layer, LayerSet};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::render::TechniquePicture;
+use caustique::scene::description::Picture;
 use std::path::Path;
 
 /// Makes the folder.
@@ -23,11 +24,11 @@ pub fn prepare(args: &RenderArgs) -> Result<()> {
 ///
 /// # Errors
 /// The file system.
-pub fn write(args: &RenderArgs, size: (usize, usize), pictures: &[TechniquePicture]) -> Result<()> {
+pub fn write(args: &RenderArgs, size: (usize, usize), pictures: &[TechniquePicture], made_for: &Picture) -> Result<()> {
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     for picture in pictures {
         for (values, kind) in [(&picture.weighted, "weighted"), (&picture.unweighted, "unweighted")] {
-            one(args, folder, &format!("{}.{kind}", picture.name()), size, values)?;
+            one(args, folder, &format!("{}.{kind}", picture.name()), size, values, made_for)?;
         }
     }
     Ok(())
@@ -39,11 +40,12 @@ fn one(
     name: &str,
     (width, height): (usize, usize),
     values: &[[f32; 3]],
+    made_for: &Picture,
 ) -> Result<()> {
     let mut set = LayerSet::new(width, height);
     set.push(Layer::interleaved("", "RGB", values.iter().copied()))?;
     let options = args.picture.exr_options(args.exr_naming.into());
     exr::write(&folder.join(format!("{name}.exr")), &set, &Attributes::default(), options)?;
-    let (exposure, curve) = (args.picture.exposure as f32, args.picture.tonemap.into());
+    let (exposure, curve) = args.picture.look(made_for);
     png::write_tonemapped(&folder.join(format!("{name}.png")), width, height, values, exposure, curve)
 }

@@ -47,10 +47,11 @@ impl Bounds {
                 Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
             }
             Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
-            Emitter::Spot { p, frame, intensity, outer, .. } => {
+            Emitter::Spot { p, radius, frame, intensity, outer, .. } => {
                 // The half angle's sine is half of the chord.
                 let reach = 2.0 * (0.5 * outer).clamp(0.0, 1.0).sqrt().asin();
-                at(*p, frame.n, 0.0, reach, luminance(*intensity))
+                let (low, high) = (p - *radius, p + *radius);
+                Bounds { low, high, ..at(*p, frame.n, 0.0, reach, luminance(*intensity)) }
             }
             Emitter::Sun { .. } | Emitter::Environment => return None,
         };

@@ -5,6 +5,7 @@ use super::fault;
 use crate::error::Result;
 use crate::material::MediumParameters;
 use crate::math::Rgb;
+use crate::scene::description::ToneCurve;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -16,6 +17,25 @@ pub(super) struct SceneExtras {
     pub(super) environment: Option<EnvironmentExtras>,
     pub(super) medium: Option<Medium>,
     pub(super) light_units: Option<Units>,
+    pub(super) losses: Vec<String>,
+    pub(super) resolution: Option<[u32; 2]>,
+    pub(super) exposure: Option<f32>,
+    pub(super) tonemap: Option<ToneCurve>,
+    pub(super) crop: Option<[f64; 4]>,
+    pub(super) film_transparent: bool,
+}
+
+/// To whom something is visible; light meets it either way.
+#[derive(Deserialize)]
+#[serde(default)]
+pub(super) struct Visible {
+    pub(super) camera: bool,
+}
+
+impl Default for Visible {
+    fn default() -> Self {
+        Visible { camera: true }
+    }
 }
 
 /// Light from infinity: a colour or a file.
@@ -26,6 +46,7 @@ pub(super) struct EnvironmentExtras {
     pub(super) file: Option<String>,
     pub(super) rotation_deg: f32,
     pub(super) strength: Option<f32>,
+    pub(super) visible: Visible,
 }
 
 /// Units of punctual lights.
@@ -65,6 +86,14 @@ impl Medium {
 pub(super) struct MaterialExtras {
     pub(super) medium: Option<Medium>,
     pub(super) priority: i32,
+    pub(super) backface_culling: bool,
+}
+
+/// Extras of a node with a mesh.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct ObjectExtras {
+    pub(super) visible: Visible,
 }
 
 /// Extras of a camera, or of its node.
@@ -73,6 +102,7 @@ pub(super) struct MaterialExtras {
 pub(super) struct CameraExtras {
     pub(super) aperture_radius: Option<f32>,
     pub(super) focus_distance: Option<f32>,
+    pub(super) shift: Option<[f32; 2]>,
 }
 
 /// Extras of a light's node, or of the light.
@@ -81,6 +111,8 @@ pub(super) struct CameraExtras {
 pub(super) struct LightExtras {
     pub(super) radius: Option<f32>,
     pub(super) angle_deg: Option<f32>,
+    pub(super) blend: Option<f32>,
+    pub(super) visible: Option<Visible>,
 }
 
 /// Keys of each kind; those of nested objects follow a dot.
@@ -90,16 +122,26 @@ pub(super) const SCENE: &[&str] = &[
     "environment.file",
     "environment.rotation_deg",
     "environment.strength",
+    "environment.visible",
+    "environment.visible.camera",
     "medium",
     "medium.sigma_a",
     "medium.sigma_s",
     "medium.g",
     "light_units",
+    "losses",
+    "resolution",
+    "exposure",
+    "tonemap",
+    "crop",
+    "film_transparent",
 ];
-pub(super) const MATERIAL: &[&str] = &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority"];
-pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance"];
-pub(super) const LIGHT: &[&str] = &["radius", "angle_deg"];
-pub(super) const NODE: &[&str] = &["aperture_radius", "focus_distance", "radius", "angle_deg"];
+pub(super) const MATERIAL: &[&str] =
+    &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "backface_culling"];
+pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
+pub(super) const LIGHT: &[&str] = &["radius", "angle_deg", "blend", "visible", "visible.camera"];
+pub(super) const NODE: &[&str] =
+    &["aperture_radius", "focus_distance", "shift", "radius", "angle_deg", "blend", "visible", "visible.camera"];
 
 /// `extras.caustique` of a part of the document; the default if there is none.
 pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> Result<T> {

@@ -4,6 +4,7 @@ use super::document::{Document, get, named};
 use super::extras::{self, CameraExtras, LightExtras, Units};
 use super::{LightUnits, fault};
 use crate::error::Result;
+use crate::light::SpotEdge;
 use crate::math::{DAffine3, Rgb};
 use crate::scene::description::{CameraDescription, GuessedUnits, Projection, PunctualKind, PunctualLight};
 use gltf::json::camera::Type;
@@ -115,7 +116,7 @@ pub(super) fn light(
     let angle = length(on_node.angle_deg.or(on_light.angle_deg), "angle_deg")?.to_radians();
     let kind = match light.kind.as_str() {
         "point" => PunctualKind::Point,
-        "spot" => cone(&light.spot, &place, warnings)?,
+        "spot" => cone(&light.spot, on_node.blend.or(on_light.blend), &place, warnings)?,
         "directional" if angle <= PI => PunctualKind::Sun { angle },
         "directional" => return Err(fault(place, "extras.caustique.angle_deg is above 180")),
         other => return Err(fault(place, format!("its type \"{other}\" is unknown"))),
@@ -125,10 +126,16 @@ pub(super) fn light(
         let key = if sun { "radius" } else { "angle_deg" };
         warnings.push(format!("{place}: extras.caustique.{key} says nothing about a {} light", light.kind));
     }
-    Ok(PunctualLight { name, to_world, intensity, kind, radius: if sun { 0.0 } else { radius } })
+    if !matches!(kind, PunctualKind::Spot { .. }) && on_node.blend.or(on_light.blend).is_some() {
+        warnings.push(format!("{place}: extras.caustique.blend says nothing about a {} light", light.kind));
+    }
+    let hidden_from_camera = on_node.visible.or(on_light.visible).is_some_and(|visible| !visible.camera);
+    let radius = if sun { 0.0 } else { radius };
+    Ok(PunctualLight { name, to_world, intensity, kind, radius, hidden_from_camera })
 }
 
-fn cone(spot: &Spot, place: &str, warnings: &mut Vec<String>) -> Result<PunctualKind> {
+/// `blend`: the share of the cone's 1 - cos that its edge takes, which then is Blender's.
+fn cone(spot: &Spot, blend: Option<f32>, place: &str, warnings: &mut Vec<String>) -> Result<PunctualKind> {
     let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
     if !(inner.is_finite() && outer.is_finite()) {
         return Err(fault(place, "its cone angles are not finite"));
@@ -138,7 +145,15 @@ fn cone(spot: &Spot, place: &str, warnings: &mut Vec<String>) -> Result<Punctual
     if (narrow, wide) != (inner, outer) {
         warnings.push(format!("{place}: its cone from {inner} to {outer} radians is taken as {narrow} to {wide}"));
     }
-    Ok(PunctualKind::Spot { inner: narrow, outer: wide })
+    match blend {
+        None => Ok(PunctualKind::Spot { inner: narrow, outer: wide, edge: SpotEdge::Squared }),
+        Some(blend) if (0.0..=1.0).contains(&blend) => {
+            // 1 - cos x = 2 sin^2 (x / 2)
+            let inner = 2.0 * ((1.0 - blend).sqrt() * (0.5 * wide).sin()).asin();
+            Ok(PunctualKind::Spot { inner, outer: wide, edge: SpotEdge::Smooth })
+        }
+        Some(blend) => Err(fault(place, format!("extras.caustique.blend must lie between 0 and 1, it is {blend}"))),
+    }
 }
 
 /// The camera that stands on a node.
@@ -186,7 +201,11 @@ pub(super) fn camera(
     if aperture_radius > 0.0 && focus_distance.is_none() {
         warnings.push(format!("{place}: it has an aperture but no focus_distance; 1 m is used"));
     }
+    let shift = on_node.shift.or(on_camera.shift).unwrap_or_default();
+    if !shift.iter().all(|x| x.is_finite()) {
+        return Err(fault(place, "extras.caustique.shift must be finite"));
+    }
     let name = if node.0.is_empty() { camera.name.clone().unwrap_or_else(|| place.clone()) } else { node.0.into() };
     let focus_distance = focus_distance.unwrap_or(1.0);
-    Ok(CameraDescription { name, to_world, projection, aperture_radius, focus_distance })
+    Ok(CameraDescription { name, to_world, projection, aperture_radius, focus_distance, shift })
 }

@@ -297,6 +297,12 @@ impl Reader<'_> {
         extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
         let said: MaterialExtras = extras::read(self.raw, self.place)?;
         material.priority = said.priority;
+        material.backface_culling = said.backface_culling && !material.double_sided && material.transmission == 0.0;
+        if said.backface_culling && !material.backface_culling {
+            let why =
+                if material.double_sided { "the material is doubleSided" } else { "it bounds what transmits light" };
+            self.warnings.push(format!("{}: its backface_culling is ignored: {why}", self.place));
+        }
         if let Some(medium) = said.medium {
             material.medium = Some(medium.parameters(self.place)?);
             solid = Some(true);

@@ -1,7 +1,7 @@
 //! The node hierarchy: transforms composed in f64, and what stands on the nodes.
 
 use super::document::{Document, extension, get, named};
-use super::extras::{self, SceneExtras};
+use super::extras::{self, ObjectExtras, SceneExtras};
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
 use super::{ReadOptions, counted, fault, lights, mesh, shading_frame, topology};
@@ -10,7 +10,7 @@ use crate::geometry::Mesh;
 use crate::math::{DAffine3, DMat3, DVec3, Rgb};
 use crate::memory;
 use crate::scene::Description;
-use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Placed};
+use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Picture, Placed};
 use crate::scene::environment_file;
 use crate::scene::folder::Folder;
 use serde::Deserialize;
@@ -117,12 +117,35 @@ impl Reader<'_> {
         if let Some(medium) = &self.scene.medium {
             self.out.medium = Some(medium.parameters(&place)?);
         }
+        self.out.warnings.append(&mut self.scene.losses);
+        self.picture(&place)?;
         self.environment(&place).map_err(|e| e.within(&place))?;
         self.walk(roots)?;
         if let Some(animations) = document.raw["animations"].as_array().filter(|a| !a.is_empty()) {
             let n = counted(animations.len(), "animation", "animations");
             self.out.warnings.push(format!("{n} ignored: the nodes are rendered where they stand"));
         }
+        Ok(())
+    }
+
+    /// The picture that the file was made for.
+    fn picture(&mut self, place: &str) -> Result<()> {
+        let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, .. } = self.scene;
+        if resolution.is_some_and(|size| size.contains(&0)) {
+            return Err(fault(place, "extras.caustique.resolution must be two numbers above zero"));
+        }
+        if exposure.is_some_and(|ev| !ev.is_finite()) {
+            return Err(fault(place, "extras.caustique.exposure must be finite"));
+        }
+        if crop.is_some() {
+            self.out.warnings.push(format!("{place}: its crop is ignored: the whole picture is rendered"));
+        }
+        if film_transparent {
+            self.out
+                .warnings
+                .push(format!("{place}: its film_transparent is ignored: the environment is part of the picture"));
+        }
+        self.out.picture = Picture { resolution, exposure, tonemap };
         Ok(())
     }
 
@@ -170,6 +193,7 @@ impl Reader<'_> {
                 return Ok(());
             }
         };
+        self.out.environment_hidden_from_camera = !said.visible.camera;
         self.out.environment = Some(EnvironmentDescription { source, rotation_deg: said.rotation_deg, strength });
         Ok(())
     }
@@ -234,7 +258,8 @@ impl Reader<'_> {
             let mesh_name = get(&document.meshes, mesh, "mesh").map_err(|e| e.within(place))?.name.clone();
             let known = |name: &String| !name.is_empty();
             let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
-            self.place(mesh, name, self.copies(raw, place)?, to_world, place)?;
+            let hidden_from_camera = !extras::read::<ObjectExtras>(raw, place)?.visible.camera;
+            self.place(mesh, name, self.copies(raw, place)?, to_world, hidden_from_camera, place)?;
         }
         Ok(())
     }
@@ -246,6 +271,7 @@ impl Reader<'_> {
         name: String,
         copies: Vec<DAffine3>,
         to_world: DAffine3,
+        hidden_from_camera: bool,
         place: &str,
     ) -> Result<()> {
         let parts = self.parts(mesh)?;
@@ -264,7 +290,8 @@ impl Reader<'_> {
             }
             for &Part { mesh, material } in &parts {
                 self.check_reach(mesh, &to_world, place)?;
-                self.out.instances.push(Placed { name: name.clone(), mesh, material, object, to_world });
+                let name = name.clone();
+                self.out.instances.push(Placed { name, mesh, material, object, hidden_from_camera, to_world });
             }
         }
         if flat > 0 {

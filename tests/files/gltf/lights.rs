@@ -2,6 +2,7 @@
 
 use super::glb::Glb;
 use super::{message, read, try_read};
+use caustique::light::SpotEdge;
 use caustique::math::{DVec3, Rgb};
 use caustique::scene::Description;
 use caustique::scene::description::{EnvironmentSource, Projection, PunctualKind};
@@ -45,11 +46,14 @@ fn kinds_of_lights() {
     assert_eq!((bulb.name.as_str(), bulb.kind, bulb.radius), ("bulb", PunctualKind::Point, 0.5));
     assert!((bulb.intensity - Rgb::new(1.0, 0.5, 0.0)).length() < 1e-6);
     assert_eq!(bulb.to_world.translation, DVec3::new(1.0, 2.0, 3.0));
-    assert_eq!(beam.kind, PunctualKind::Spot { inner: 0.1, outer: 0.2 });
+    assert_eq!(beam.kind, PunctualKind::Spot { inner: 0.1, outer: 0.2, edge: SpotEdge::Squared });
     assert!((beam.intensity.x - 1.0 / 683.0).abs() < 1e-9);
     assert_eq!((sun.name.as_str(), sun.kind), ("sun", PunctualKind::Sun { angle: 0.53f32.to_radians() }));
     assert!((sun.intensity.x - 2.0).abs() < 1e-6);
-    assert_eq!((dark.intensity, dark.kind), (Rgb::ZERO, PunctualKind::Spot { inner: 0.25, outer: 0.25 }));
+    assert_eq!(
+        (dark.intensity, dark.kind),
+        (Rgb::ZERO, PunctualKind::Spot { inner: 0.25, outer: 0.25, edge: SpotEdge::Squared })
+    );
     assert_eq!(
         scene.warnings,
         [

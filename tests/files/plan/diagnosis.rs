@@ -3,6 +3,7 @@
 use super::{floor, plan, plan_by};
 use crate::support::scenes::{add, cuboid, glass, matte, point_light, quad, sphere};
 use caustique::geometry::Mesh;
+use caustique::light::SpotEdge;
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::plan::Search;
@@ -182,7 +183,7 @@ fn lamps_in_a_casing() {
     assert!(warning(panel).starts_with("object \"Filament\": all its light stays within \"Casing\", "));
     // A spot that lights nothing but the floor: what it lights scatters its light away.
     let mut spot = lit();
-    spot.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2 };
+    spot.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2, edge: SpotEdge::Squared };
     spot.lights[0].to_world.matrix3 = glam::DMat3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
     silent(spot);
 }
@@ -205,7 +206,7 @@ fn glass_that_no_light_reaches() {
     silent(clear);
     // A spot that shines past it.
     let mut past = ball(glass(1.5));
-    past.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2 };
+    past.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2, edge: SpotEdge::Squared };
     past.lights[0].to_world.translation = DVec3::new(3.0, 3.0, 0.0);
     past.lights[0].to_world.matrix3 = glam::DMat3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
     assert_eq!(

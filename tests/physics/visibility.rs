@@ -1,0 +1,152 @@
+//! What lets light and sight through: backs that are culled, and what is hidden from cameras. Closed forms, by all methods.
+//!
+//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks),
+//! and each has to reject a picture that is off by the share it declares.
+
+use crate::support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::Material;
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::render::{Control, Method, Settings, render};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
+use caustique::scene::{Description, Scene};
+use std::f64::consts::PI;
+use support::scenes::{add, build, cuboid, lit_room, look_at, matte, quad, square};
+use support::stats::{mean_and_error, sidak, t_critical};
+
+const ERROR_RATE: f64 = 1e-3;
+const SEEDS: u64 = 12;
+/// Every family: eye paths, both, both with merging, photons; and light paths, few of which come to a narrow view.
+const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm, Method::Light];
+
+fn white_sky() -> Option<EnvironmentDescription> {
+    let source = EnvironmentSource::Color(Rgb::ONE);
+    Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 })
+}
+
+/// Mean of the picture and its standard error.
+fn seen(scene: &Scene, method: Method) -> (f64, f64) {
+    let camera = scene.camera(&square(12)).expect("a camera");
+    let settings = Settings {
+        method,
+        photons: 6000,
+        iterations: Some(12),
+        initial: InitialBandwidth::Fixed(0.03),
+        ..Settings::default()
+    };
+    let mean = |seed| {
+        let rendered = render(scene, &camera, &Settings { seed, ..settings.clone() }, |_, _| Control::Continue);
+        let all = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.element_sum() / 3.0);
+        all.sum::<f64>() / rendered.pixels.len() as f64
+    };
+    mean_and_error(&(1..=SEEDS).map(mean).collect::<Vec<_>>())
+}
+
+/// All methods but light tracing see `expected`, to `bias` (relative) and noise, and would tell it from what is off by
+/// `told`.
+fn check(what: &str, scene: &Scene, expected: f64, bias: f64, told: f64) {
+    let methods = &METHODS[..4];
+    let critical = t_critical(sidak(ERROR_RATE, methods.len()), 1, SEEDS as f64 - 1.0);
+    for &method in methods {
+        let (mean, error) = seen(scene, method);
+        println!("{what}, {method:?}: {mean:.5} +- {error:.5}, {expected:.5}");
+        let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected.abs();
+        assert!(passes(expected), "{what}, {method:?}: {mean} +- {error}, expected {expected}");
+        assert!(!passes((1.0 - told) * expected), "{what}, {method:?}: cannot tell {told} ({mean} +- {error})");
+    }
+}
+
+/// A floor under a white sky, and a lamp that hangs over it with its back down.
+fn below_a_lamp(backface_culling: bool) -> Scene {
+    let mut description = Description { environment: white_sky(), ..Description::default() };
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-1.0, 0.6, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    add(&mut description, "lamp", lamp, Material { backface_culling, ..matte(0.0, 3.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, 0.45, 1.5), DVec3::ZERO, 8.0));
+    build(description)
+}
+
+/// A lamp from behind is not there: the floor below reflects half of a white sky.
+#[test]
+fn culled_backs_let_light_through() {
+    check("back", &below_a_lamp(true), 0.5, 2e-3, 0.05);
+}
+
+/// The same lamp with a back takes most of the sky away.
+#[test]
+fn backs_that_are_not_culled_block_it() {
+    let (mean, error) = seen(&below_a_lamp(false), Method::Path);
+    assert!(mean + 4.0 * error < 0.4, "{mean} +- {error}");
+}
+
+/// Irradiance in the middle below a square of radiance 1 and half side a, at height h.
+fn below_a_square(a: f64, h: f64) -> f64 {
+    let x = a / h;
+    let root = (1.0 + x * x).sqrt();
+    4.0 * x / root * (x / root).atan()
+}
+
+/// A camera looks straight down at a floor through the lamp that lights it.
+#[test]
+fn cameras_look_through_lamps_that_are_hidden_from_them() {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0), matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::Z, Vec3::X);
+    add(&mut description, "lamp", lamp, Material { double_sided: true, ..matte(0.0, 2.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, 2.0, 0.0), DVec3::ZERO, 3.0));
+    let bright = seen(&build(description.clone()), Method::Path).0;
+    assert!((bright - 2.0).abs() < 1e-6, "not hidden, the lamp itself is seen: {bright}");
+    description.instances[1].hidden_from_camera = true;
+    // 0.4 % less at the corners of the view.
+    check("through", &build(description), 0.5 / PI * 2.0 * below_a_square(0.5, 1.0), 6e-3, 0.05);
+}
+
+/// In a room with a hidden lamp and a hidden white box, which both reflect in what is seen, all methods agree: what is
+/// hidden from cameras sends nothing to them by any way, and light to everything else.
+#[test]
+fn hidden_bodies_send_light_to_all_but_cameras() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    add(&mut description, "box", cuboid(Vec3::new(-0.5, 0.3, 0.4), Vec3::new(0.5, 1.2, 1.0), false), matte(0.9, 0.0));
+    let shown = seen(&build(description.clone()), Method::Path);
+    description.instances[1].hidden_from_camera = true;
+    description.instances[2].hidden_from_camera = true;
+    let scene = build(description);
+    let hidden = seen(&scene, Method::Path);
+    println!("shown {shown:?}, hidden {hidden:?}");
+    assert!((shown.0 - hidden.0).abs() > 8.0 * shown.1.hypot(hidden.1), "the box changes the picture");
+    let critical = t_critical(sidak(ERROR_RATE, METHODS.len() - 1), 1, SEEDS as f64 - 1.0);
+    for method in &METHODS[1..] {
+        let (mean, error) = seen(&scene, *method);
+        println!("{method:?}: {mean:.5} +- {error:.5}");
+        let passes =
+            |expected: f64| (mean - expected).abs() <= critical * error.hypot(hidden.1) + 0.01 * expected.abs();
+        assert!(passes(hidden.0), "{method:?}: {mean} +- {error}, {hidden:?}");
+        assert!(!passes(0.8 * hidden.0), "{method:?}: cannot tell 0.2");
+    }
+}
+
+/// A sky and the disc of a sun light a floor, and cameras see neither.
+#[test]
+fn cameras_see_no_hidden_light_from_infinity() {
+    let mut description = Description { environment: white_sky(), ..Description::default() };
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    description.lights.push(PunctualLight {
+        name: "sun".into(),
+        to_world: caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),
+        intensity: Rgb::ONE,
+        kind: PunctualKind::Sun { angle: 0.2 },
+        radius: 0.0,
+        hidden_from_camera: true,
+    });
+    description.environment_hidden_from_camera = true;
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::ZERO, 10.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 2.0, 0.0), 10.0));
+    // A sun of half angle x lights a floor that faces it with its irradiance.
+    check("floor", &build(description.clone()), 0.5 + 0.5 / PI, 4e-3, 0.05);
+    description.cameras.remove(0);
+    let upward = build(description);
+    for method in METHODS {
+        assert_eq!(seen(&upward, method).0, 0.0, "{method:?}");
+    }
+}
