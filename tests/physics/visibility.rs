@@ -31,7 +31,7 @@ fn seen(scene: &Scene, method: Method) -> (f64, f64) {
     let settings = Settings {
         method,
         photons: 6000,
-        iterations: Some(12),
+        iterations: Some(48),
         initial: InitialBandwidth::Fixed(0.03),
         ..Settings::default()
     };

@@ -1,0 +1,158 @@
+"""The scene as a render would evaluate it, flat: every visible thing once, in the world, without modifiers or parents.
+
+`Flat` is a scene of its own that holds them while the exporter runs: meshes after all modifiers, shape keys, armatures
+and geometry nodes, shared by the instances of the same; lamps and cameras with their evaluated transforms.
+"""
+
+import bpy
+from mathutils import Matrix
+
+import visibility
+
+_SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+# What stands in a scene and is not seen.
+_UNSEEN = {"EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
+_PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
+_LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
+         "POINTCLOUD": "point clouds are not carried: convert them to meshes",
+         "GREASEPENCIL": "grease pencil is not carried: " + _PATHS, "GPENCIL": "grease pencil is not carried: " + _PATHS}
+
+
+class Flat:
+    """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
+
+    `things` are its objects, `names` the names of the objects and meshes that they stand for, `stands_for` the objects
+    themselves, and `hidden` the kinds of rays that do not see each of `things`.
+    """
+
+    def __init__(self, scene, undo, warn):
+        visibility.as_rendered(scene, undo, warn)
+        layer = bpy.context.view_layer
+        layer.update()
+        self.things, self.names, self.stands_for, self.hidden = [], {}, {}, {}
+        self._undo, self._warn, self._meshes = undo, warn, {}
+        self._indirect = visibility.indirect_only(layer)
+        self.scene = self._make(bpy.data.scenes, scene.name)
+        for name in ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"):
+            setattr(self.scene.render, name, getattr(scene.render, name))
+        self.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        # All is taken before anything is put: new objects end the walk through the old ones.
+        found = [self._take(instance, depsgraph) for instance in depsgraph.object_instances]
+        if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
+            place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()  # looked through, although it is not shown
+            found.append((scene.camera, scene.camera.data, place, []))
+        for taken in filter(None, found):
+            self._put(*taken)
+        for thing in scene.objects:
+            self._warn_of(thing)
+
+    def say(self, thing, **keys):
+        """Lets keys of `extras.caustique` stand on the node of one of `things`."""
+        before = thing["caustique"].to_dict() if "caustique" in thing else {}
+        thing["caustique"] = {**before, **keys}
+
+    def where(self, thing):
+        """One of `things` in the words of a warning."""
+        kind = {"LIGHT": "light", "CAMERA": "camera"}.get(thing.type, "object")
+        return f'{kind} "{self.names[thing.name]}"'
+
+    def _make(self, kind, name, *content):
+        block = kind.new(name, *content)
+        self._undo.callback(kind.remove, block)
+        self.names[block.name] = name
+        return block
+
+    def _take(self, instance, depsgraph):
+        """The object, data and place (world matrix) of an instance, and what does not see it; None of what is not seen."""
+        thing = instance.object
+        if not (instance.is_instance or instance.show_self) or thing.type in _UNSEEN:
+            return None
+        if thing.type in _LOST:
+            self._warn(f'object "{thing.name}"', _LOST[thing.type])
+            return None
+        data = thing.original.data
+        if thing.type in _SOLID:
+            data = self._mesh(instance, depsgraph)
+        elif thing.type not in {"LIGHT", "CAMERA"}:
+            self._warn(f'object "{thing.name}"', f"objects of type {thing.type} are not carried")
+            return None
+        hidden = visibility.hidden_rays(thing, instance.parent if instance.is_instance else None)
+        if (instance.parent or thing).name in self._indirect and "camera" not in hidden:
+            hidden.append("camera")
+        return data and (thing.original, data, instance.matrix_world.copy(), hidden)
+
+    def _mesh(self, instance, depsgraph):
+        """The evaluated mesh of an instance, made once for all that share it; None if it has no faces."""
+        thing = instance.object
+        key = thing.original.name_full, thing.data.as_pointer()
+        if key in self._meshes:
+            return self._meshes[key]
+        name = thing.original.data.name
+        if instance.is_instance and thing.type == "MESH" and instance.instance_object.original == instance.parent.original:
+            mesh = thing.data.copy()  # geometry that nodes have made; it is of no object
+        else:
+            mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
+        self._undo.callback(bpy.data.meshes.remove, mesh)
+        self.names[mesh.name] = name
+        for index, slot in enumerate(thing.material_slots):
+            if slot.link == "OBJECT" and index < len(mesh.materials):
+                mesh.materials[index] = slot.material and slot.material.original
+        self._meshes[key] = mesh if mesh.polygons else None
+        if not mesh.polygons and mesh.vertices:
+            self._warn(f'object "{thing.name}"', "it has no faces: edges and points alone are not seen")
+        return self._meshes[key]
+
+    def _put(self, original, data, matrix, hidden):
+        if isinstance(data, bpy.types.Mesh) and not _is_plain(matrix):
+            # A sheared object has no place that location, rotation and scale could tell: its mesh gets it instead.
+            sheared = data.copy()
+            self._undo.callback(bpy.data.meshes.remove, sheared)
+            self.names[sheared.name] = self.names[data.name]
+            sheared.transform(matrix)
+            if matrix.determinant() < 0:
+                sheared.flip_normals()
+            data, matrix = sheared, Matrix()
+        body = self._make(bpy.data.objects, original.name, data)
+        self.scene.collection.objects.link(body)
+        body.matrix_world = matrix
+        self.things.append(body)
+        self.stands_for[body.name], self.hidden[body.name] = original, hidden
+        if "caustique" in original:
+            body["caustique"] = original["caustique"].to_dict()
+        if original == bpy.context.scene.camera and self.scene.camera is None:
+            self.scene.camera = body
+        self._show(body, hidden)
+
+    def _show(self, body, hidden):
+        """Carries what cameras do not see, and names what other rays do not."""
+        if "camera" in hidden:
+            self.say(body, visible={"camera": False})
+        rest = [ray for ray in hidden if ray != "camera"]
+        if rest:
+            self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it")
+
+    def _warn_of(self, thing):
+        """Names what Cycles would show of an object and this does not."""
+        where = f'object "{thing.name}"'
+        if thing.hide_render:
+            return
+        for system in getattr(thing, "particle_systems", ()):
+            kind = system.settings.render_type
+            if kind not in {"NONE", "OBJECT", "COLLECTION"}:
+                what = "hair" if kind == "PATH" else f"particles that render as {kind}"
+                self._warn(where, f'{what} of particle system "{system.name}" is not carried: convert it to a mesh')
+        if thing.is_holdout or thing.is_shadow_catcher:
+            what = "a holdout" if thing.is_holdout else "a shadow catcher"
+            self._warn(where, f"it is {what}, which is not carried: it is seen as any other object")
+        if any(getattr(thing.light_linking, name + "_collection", None) for name in ("receiver", "blocker")):
+            self._warn(where, "light linking is not carried: every light shines on every object")
+        if getattr(thing.cycles, "use_adaptive_subdivision", False):
+            self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken")
+
+
+def _is_plain(matrix):
+    """Whether location, rotation and scale say all about a transform."""
+    again = Matrix.LocRotScale(*matrix.decompose())
+    size = max(abs(x) for row in matrix.to_3x3() for x in row)
+    return all(abs(a - b) <= 1e-5 * size for x, y in zip(again.to_3x3(), matrix.to_3x3()) for a, b in zip(x, y))

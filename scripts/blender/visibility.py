@@ -1,0 +1,114 @@
+"""What a render would show, made what the viewport shows while the exporter evaluates the scene.
+
+Blender evaluates geometry for Python as the viewport shows it. `as_rendered` puts the settings for renders in the place
+of those for the viewport: which objects, collections, instancers and modifiers are shown, and at which level of detail.
+"""
+
+import bpy
+
+RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+# Settings for the viewport by what they are called for renders.
+_MODIFIER = {"show_render": "show_viewport", "render_levels": "levels", "resolution": "viewport_resolution"}
+_CURVE = {"render_resolution_u": "resolution_u", "render_resolution_v": "resolution_v"}
+_PARTICLES = {"rendered_child_count": "child_percent", "render_step": "display_step"}
+_SIMPLIFY = {"simplify_subdivision_render": "simplify_subdivision",
+             "simplify_child_particles_render": "simplify_child_particles"}
+
+
+def as_rendered(scene, undo, warn):
+    """Until `undo` (a contextlib.ExitStack) closes, let the viewport of `scene` show what a render would."""
+
+    def put(thing, name, value):
+        before = getattr(thing, name)
+        if before != value:
+            undo.callback(setattr, thing, name, before)
+            setattr(thing, name, value)
+
+    def take(thing, names):
+        for render, viewport in names.items():
+            if hasattr(thing, render) and hasattr(thing, viewport):
+                put(thing, viewport, getattr(thing, render))
+
+    layer = _layer(scene, warn)
+    if bpy.context.view_layer != layer:
+        undo.callback(setattr, bpy.context.window, "view_layer", bpy.context.view_layer)
+        bpy.context.window.view_layer = layer
+    take(scene.render, _SIMPLIFY)
+    for collection in bpy.data.collections:
+        put(collection, "hide_viewport", collection.hide_render)
+    _show_layers(layer.layer_collection, put, warn)
+    for thing in bpy.data.objects:
+        # The scene's camera need not be shown to be looked through.
+        put(thing, "hide_viewport", thing.hide_render and thing.type != "CAMERA")
+        put(thing, "show_instancer_for_viewport", thing.show_instancer_for_render)
+        for modifier in thing.modifiers:
+            take(modifier, _MODIFIER)
+            _warn_of_viewport_nodes(thing, modifier, warn)
+    for thing in layer.objects:
+        if thing.hide_get(view_layer=layer):
+            undo.callback(thing.hide_set, True, view_layer=layer)
+            thing.hide_set(False, view_layer=layer)
+    for curve in bpy.data.curves:
+        for render, viewport in _CURVE.items():
+            if getattr(curve, render, 0) > 0:  # 0: as in the viewport
+                put(curve, viewport, getattr(curve, render))
+    for ball in bpy.data.metaballs:
+        put(ball, "resolution", ball.render_resolution)
+    for settings in bpy.data.particles:
+        put(settings, "display_percentage", 100)
+        take(settings, _PARTICLES)
+
+
+def _layer(scene, warn):
+    """The view layer that is rendered: the first that is switched on."""
+    rendered = [layer for layer in scene.view_layers if layer.use] or [scene.view_layers[0]]
+    if len(rendered) > 1:
+        rest = ", ".join(f'"{layer.name}"' for layer in rendered[1:])
+        warn(f'scene "{scene.name}"', f'of its view layers only "{rendered[0].name}" is exported, not {rest}')
+    layer = rendered[0]
+    if layer.material_override is not None:
+        warn(f'view layer "{layer.name}"', "its material override is not carried: objects keep their own materials")
+    return layer
+
+
+def _show_layers(branch, put, warn):
+    for child in branch.children:
+        put(child, "hide_viewport", False)  # the eye in the outliner: renders do not look at it
+        if child.holdout and not child.exclude:
+            warn(f'collection "{child.name}"', "it is a holdout, which is not carried: its objects are seen")
+        _show_layers(child, put, warn)
+
+
+def _warn_of_viewport_nodes(thing, modifier, warn):
+    if modifier.type == "NODES" and modifier.show_render and _asks_for_viewport(modifier.node_group, set()):
+        warn(f'object "{thing.name}"', f'its modifier "{modifier.name}" has an Is Viewport node, which says yes here: '
+             "switch the node's use off before the export")
+
+
+def _asks_for_viewport(tree, seen):
+    if tree is None or tree in seen:
+        return False
+    seen.add(tree)
+    return any(node.bl_idname == "GeometryNodeIsViewport" or _asks_for_viewport(getattr(node, "node_tree", None), seen)
+               for node in tree.nodes)
+
+
+def indirect_only(layer):
+    """Names of objects that stand only in collections of the view layer which cameras do not see."""
+    seen, hidden = set(), set()
+
+    def look(branch, indirect):
+        if branch.exclude:
+            return
+        indirect = indirect or branch.indirect_only
+        (hidden if indirect else seen).update(thing.name for thing in branch.collection.objects)
+        for child in branch.children:
+            look(child, indirect)
+
+    look(layer.layer_collection, False)
+    return hidden - seen
+
+
+def hidden_rays(thing, instancer=None):
+    """Kinds of rays that do not see an object in Cycles, of which those of its instancer hide it, too."""
+    return [ray for ray in RAYS if not all(getattr(t, "visible_" + ray, True) for t in (thing, instancer) if t)]
