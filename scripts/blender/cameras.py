@@ -1,17 +1,18 @@
 """Cameras, and the picture that a scene was made for, in terms of `extras.caustique`."""
 
+import itertools
 import math
 
 import bpy
 
 _TONEMAPS = {"AgX": "agx", "Filmic": "filmic", "Standard": "srgb"}
-# Nearer than this share of the distance in between, a clipping plane takes away what is seen.
-_APERTURE = "the shape of the aperture is not carried: it is round"
+# Rays a side of the picture that look for what is clipped.
+_GRID = 16
 
 
-def extras(thing, render, where, warn):
+def extras(thing, flat, warn):
     """Keys of a camera: `shift` (widths and heights of the picture), `aperture_radius` and `focus_distance` (m)."""
-    camera, said = thing.data, {}
+    camera, render, where, said = thing.data, flat.scene.render, flat.where(thing), {}
     if camera.type == "PANO":
         warn(where, "panoramic cameras are not carried: it is a perspective camera here")
     if camera.shift_x or camera.shift_y:
@@ -28,23 +29,55 @@ def extras(thing, render, where, warn):
         at = camera.dof.focus_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation
         focus = abs(thing.matrix_world.col[2].xyz.normalized().dot(at - thing.matrix_world.translation))
     if camera.dof.aperture_blades or camera.dof.aperture_ratio != 1:
-        warn(where, _APERTURE)
+        warn(where, "the shape of the aperture is not carried: it is round")
     return {**said, "aperture_radius": focal / (2 * camera.dof.aperture_fstop), "focus_distance": focus}
 
 
-def warn_of_clipping(thing, bodies, where, warn):
-    """Names what the clipping planes of a camera cut away from the picture in Blender; `bodies` are mesh objects."""
-    camera, near, far = thing.data, [], []
-    to_camera = thing.matrix_world.inverted()
-    for body in bodies:
-        corners = [(to_camera @ body.matrix_world @ _vector(corner)) for corner in body.bound_box]
-        depths = [-corner.z for corner in corners]
-        if min(depths) < camera.clip_start and max(depths) > 0 and _around(corners):
-            near.append(body)
-        if max(depths) > camera.clip_end:
-            far.append(body)
-    for found, what in ((near, f"nearer than its clip start of {camera.clip_start:g} m"),
-                        (far, f"beyond its clip end of {camera.clip_end:g} m")):
-        if found:
-            others = f" and {len(found) - 1} more" if len(found) > 1 else ""
-            warn(where, f'clipping is not carried: object "{found[0].name}"{others} may be {what}, and is seen')
+def warn_of_clipping(thing, flat, warn):
+    """Names what the clipping planes of a camera cut away from the picture in Blender, as a grid of rays finds it."""
+    camera, found = thing.data, {}
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    corners = [thing.matrix_world @ corner for corner in camera.view_frame(scene=flat.scene)]
+    eye, axis = thing.matrix_world.translation, -thing.matrix_world.col[2].xyz.normalized()
+    steps = [(k + 0.5) / _GRID for k in range(_GRID)]
+    for x, y in itertools.product(steps, steps):
+        through = corners[2].lerp(corners[1], x).lerp(corners[3].lerp(corners[0], x), y)
+        origin = through if camera.type == "ORTHO" else eye
+        along = axis if camera.type == "ORTHO" else (through - eye).normalized()
+        hit, at, _, _, body, _ = flat.scene.ray_cast(depsgraph, origin, along)
+        depth = (at - eye).dot(axis)
+        if hit and not camera.clip_start <= depth <= camera.clip_end:
+            found.setdefault(depth < camera.clip_start, body)
+    for near, body in found.items():
+        what = f"before its clip start of {camera.clip_start:g}" if near else f"beyond its clip end of {camera.clip_end:g}"
+        warn(flat.where(thing), f"clipping is not carried: {flat.where(body)} is seen, also {what} m")
+
+
+def picture(scene, warn):
+    """Keys of the scene: `resolution` (pixels), `crop` (x, y from the top left, width, height; shares of the picture),
+    `exposure` (stops), `tonemap` and `film_transparent`."""
+    render, view, where = scene.render, scene.view_settings, f'scene "{scene.name}"'
+    share = render.resolution_percentage / 100
+    said = {"resolution": [max(round(n * share), 1) for n in (render.resolution_x, render.resolution_y)]}
+    if render.pixel_aspect_x != render.pixel_aspect_y:
+        warn(where, "pixels that are not square are not carried")
+    if render.use_border:
+        left, right, low, high = (getattr(render, f"border_{name}") for name in ("min_x", "max_x", "min_y", "max_y"))
+        said["crop"] = [left, 1 - high, right - left, high - low]
+    if scene.render.film_transparent:
+        said["film_transparent"] = True
+    film = getattr(scene.cycles, "film_exposure", 1.0) if hasattr(scene, "cycles") else 1.0
+    if film != 1:
+        warn(where, f"its film exposure of {film:g} brightens the PNG alone: the EXR holds radiance as it is")
+    exposure = view.exposure + math.log2(max(film, 1e-6))
+    if exposure:
+        said["exposure"] = exposure
+    if view.view_transform in _TONEMAPS:
+        said["tonemap"] = _TONEMAPS[view.view_transform]
+    else:
+        warn(where, f'its view transform "{view.view_transform}" is not carried: the PNG is made with agx')
+    if view.look not in {"None", ""} or view.gamma != 1 or view.use_curve_mapping:
+        warn(where, "look, gamma and curves of its colour management are not carried: they concern the PNG alone")
+    if render.use_motion_blur:
+        warn(where, "motion blur is not carried: everything stands still")
+    return said

@@ -2,46 +2,49 @@
 
     python3 scripts/blender/export.py IN.blend OUT.glb               with bpy from PyPI (4.5 on Python 3.11, 5.2 on 3.13)
     blender -b IN.blend --python scripts/blender/export.py -- OUT.glb
+    ... OUT.####.glb --frames 1-24                                   a file for each frame
     import export; export.write("OUT.glb")                           the scene that is open in bpy
 
-Blender's own glTF exporter writes the file. Beyond its defaults this switches on cameras, lights, custom properties and
-applied modifiers (at render level), and completes what it leaves out:
+Blender's own glTF exporter writes the file, of a scene that `objects` has evaluated as a render would. Around it:
 
-- area lights become one-sided emissive meshes of the same radiance;
-- Glass, Refraction, Glossy, Diffuse and volume shaders become what glTF has for them;
-- transmissive materials on closed meshes become solid (KHR_materials_volume), so that they refract;
-- absorption keeps Cycles' coefficients; a material's custom property `abbe` (number V_d) or `dispersion` (20/V_d, as in
-  glTF) becomes KHR_materials_dispersion;
-- `extras.caustique` holds the rest: of the scene `environment` and `medium`, of cameras `aperture_radius` and
-  `focus_distance`, of light nodes `radius` or `angle_deg`, of materials a `medium` that scatters.
+- `lighting`: area lamps become one-sided glowing meshes of the same radiance, other lamps get size, edge and colour;
+- `shading`: Glass, Refraction, Glossy, Diffuse and volume shaders become what glTF has for them, and transmissive
+  materials on closed meshes become solid (KHR_materials_volume), so that they refract;
+- `world` and `sky`: environment and medium, the sun of a sky texture as a lamp;
+- `cameras`: lens, shift, and the picture that the scene was made for.
 
-Lights keep the exporter's standard units (lm/W 683). Whatever cannot be carried is named in a warning on stderr.
+What glTF cannot say stands in `extras.caustique` (docs/scene-format.md). Lights keep the exporter's standard units
+(lm/W 683). Whatever cannot be carried is named in a warning on stderr and in the file.
 """
 
 import contextlib
 import os
+import re
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import bpy  # noqa: E402
 
+import cameras  # noqa: E402
 import glb  # noqa: E402
 import lighting  # noqa: E402
+import objects  # noqa: E402
 import shading  # noqa: E402
+import sky  # noqa: E402
+import world  # noqa: E402
 
-_CARRIED = {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY", "LIGHT", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER"}
+_USAGE = """usage: export.py IN.blend OUT.glb [--frames A-B]
+       blender -b IN.blend --python export.py -- OUT.glb [--frames A-B]"""
 
 
 def write(path, scene=None):
-    """Export the open scene (or `scene`) to the .glb at `path`; return the warnings, a list of strings.
+    """Export the open scene (or `scene`) at its current frame to the .glb at `path`; return the warnings, a list of strings.
 
-    The scene is left as it was found.
+    They stand in the file, too, as the scene's `losses`. The scene is left as it was found.
     """
     path = os.path.abspath(path)
-    if scene is not None and scene != bpy.context.window.scene:
-        bpy.context.window.scene = scene
-    scene = bpy.context.scene
+    scene = scene or bpy.context.scene
     warnings = []
 
     def warn(where, what):
@@ -50,24 +53,34 @@ def write(path, scene=None):
             warnings.append(line)
             print("warning: " + line, file=sys.stderr)
 
-    shown = [thing for thing in scene.objects if not thing.hide_render]
     with contextlib.ExitStack() as undo:
-        for thing in shown:
-            _render_level(thing, undo, warn)
-        for material in _worn(shown):
-            shading.principled(material, undo, warn)
-        for thing in shown:
-            if thing.type == "LIGHT" and thing.data.type == "AREA":
-                lighting.area_mesh(thing, undo, warn)
+        _look_at(scene, undo)
+        said, sun = world.extras(scene, path, warn)
+        said.update(cameras.picture(scene, warn))
+        flat = objects.Flat(scene, undo, warn)
+        _look_at(flat.scene, undo)
         bpy.context.view_layer.update()
-        bodies = _bodies()
+        for thing in flat.things:
+            if thing.type == "CAMERA":
+                flat.say(thing, **cameras.extras(thing, flat, warn))
+        if flat.scene.camera is not None:
+            cameras.warn_of_clipping(flat.scene.camera, flat, warn)
+        for material in _worn(flat.things):
+            shading.principled(material, undo, warn)
+        lighting.warn_of_soft_falloff(flat, warn)
+        lighting.hang(flat, undo, warn)
+        if sun is not None:
+            sky.hang(sun, flat, undo)
+        bodies = _bodies(flat.things)
+        bpy.context.view_layer.update()
         _run_exporter(path)
     document, buffer = glb.read(path)
+    _finish_names(document, flat.names)
     _finish_materials(document, bodies, warn)
-    _finish_nodes(document, scene, warn)
     _finish_lamps(document)
-    said = lighting.world_extras(scene, path, warn)
-    document["scenes"][document.get("scene", 0)].setdefault("extras", {}).setdefault("caustique", {}).update(said)
+    _active_camera_first(document, scene)
+    said["losses"] = warnings
+    document["scenes"][document.get("scene", 0)].setdefault("extras", {})["caustique"] = said
     used = {name for part in document.get("materials", []) for name in part.get("extensions", {})}
     document["extensionsUsed"] = sorted(used | set(document.get("extensionsUsed", [])))
     if not document["extensionsUsed"]:
@@ -76,63 +89,59 @@ def write(path, scene=None):
     return warnings
 
 
+def write_frames(path, first, last):
+    """Export frames `first` to `last` of the open scene, one .glb each; `####` in `path` becomes the number of the frame."""
+    scene, warnings = bpy.context.scene, []
+    before = scene.frame_current, scene.frame_subframe
+    try:
+        for frame in range(first, last + 1):
+            scene.frame_set(frame)
+            warnings += [w for w in write(_numbered(path, frame)) if w not in warnings]
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
+    return warnings
+
+
+def _numbered(path, frame):
+    return re.sub("#+", lambda run: str(frame).zfill(len(run.group())), path)
+
+
+def _look_at(scene, undo):
+    """Until `undo` closes, makes `scene` the one that is open."""
+    window, before = bpy.context.window, bpy.context.window.scene
+    if before != scene:
+        undo.callback(setattr, window, "scene", before)
+        window.scene = scene
+
+
 def _run_exporter(path):
     bpy.ops.export_scene.gltf(
         filepath=path, export_format="GLB", export_import_convert_lighting_mode="SPEC", export_yup=True,
-        export_apply=True, export_cameras=True, export_lights=True, export_extras=True, use_renderable=True,
-        use_active_scene=True, export_animations=False, export_skins=False, export_morph=False,
+        export_apply=False, export_cameras=True, export_lights=True, export_extras=True, use_active_scene=True,
+        export_animations=False, export_current_frame=True, export_skins=False, export_morph=False,
         export_tangents=False, export_image_format="AUTO")
 
 
-def _render_level(thing, undo, warn):
-    """The exporter evaluates modifiers as the viewport shows them: let it show what a render would."""
-    where = f'object "{thing.name}"'
-    if thing.type not in _CARRIED:
-        warn(where, f"objects of type {thing.type} are not carried")
-    if getattr(thing, "particle_systems", None):
-        warn(where, "particle systems are not carried: convert them to meshes")
-    for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
-        lamp = thing.type == "LIGHT" and (ray != "camera" or thing.data.type == "AREA")
-        if (lamp or thing.type == "MESH") and not getattr(thing, "visible_" + ray, True):
-            warn(where, f"it is hidden from {ray} rays in Cycles: caustique shows it to all")
-    for modifier in thing.modifiers:
-        for name, value in (("levels", getattr(modifier, "render_levels", None)), ("show_viewport", modifier.show_render)):
-            if value is not None and hasattr(modifier, name) and getattr(modifier, name) != value:
-                undo.callback(setattr, modifier, name, getattr(modifier, name))
-                setattr(modifier, name, value)
-
-
 def _worn(things):
-    """Materials with nodes that something in the scene wears, instanced collections included."""
-    inside = [o for t in things if t.instance_collection for o in t.instance_collection.all_objects]
-    found = {}
-    for thing in [*things, *inside]:
-        for slot in thing.material_slots:
-            if slot.material is not None and shading.nodes_of(slot.material) is not None:
-                found[slot.material.name] = slot.material
-    return list(found.values())
+    """Materials with nodes that some of `things` wear."""
+    slots = [slot for thing in things for slot in thing.material_slots]
+    found = {slot.material.name: slot.material for slot in slots if slot.material is not None}
+    return [material for material in found.values() if shading.nodes_of(material) is not None]
 
 
-def _bodies():
+def _bodies(things):
     """For each worn material whether all its meshes are closed, and the least extent of their bounding boxes (m)."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
     shapes, bodies = {}, {}
-    for instance in depsgraph.object_instances:
-        thing = instance.object
-        if thing.type not in {"MESH", "CURVE", "SURFACE", "FONT", "META"}:
+    for thing in things:
+        materials = [slot.material for slot in thing.material_slots if slot.material is not None]
+        if thing.type != "MESH" or not any(may_transmit(material) for material in materials):
             continue
-        materials = [slot.material.original for slot in thing.material_slots if slot.material is not None]
-        if not any(may_transmit(m) for m in materials):
-            continue
-        key = thing.original.name
-        if key not in shapes:
-            mesh = thing.to_mesh()
-            shapes[key] = _closed(mesh)
-            thing.to_mesh_clear()
+        if thing.data not in shapes:
+            shapes[thing.data] = _closed(thing.data)
         extent = min(d for d in thing.dimensions) or max(thing.dimensions) or 1.0
         for material in materials:
             closed, least = bodies.get(material.name, (True, extent))
-            bodies[material.name] = (closed and shapes[key], min(least, extent))
+            bodies[material.name] = (closed and shapes[thing.data], min(least, extent))
     return bodies
 
 
@@ -171,28 +180,18 @@ def _finish_materials(document, bodies, warn):
             shading.finish(entry, material, closed, least, warn)
 
 
-def _finish_nodes(document, scene, warn):
-    nodes = document.get("nodes", [])
-    for node in nodes:
-        thing = scene.objects.get(node.get("name", ""))
-        if thing is None:
-            continue
-        if "camera" in node:
-            said, holder = lighting.camera_extras(thing, warn), document["cameras"][node["camera"]]
-        elif thing.type == "LIGHT" and thing.data.type != "AREA":
-            said, holder = lighting.light_extras(thing, warn), node
-        else:
-            continue
-        if said:
-            holder.setdefault("extras", {}).setdefault("caustique", {}).update(said)
-    _active_camera_first(document, scene)
+def _finish_names(document, names):
+    """Gives things the names of what they stand for, whose own names are taken in Blender while both are there."""
+    for part in ("scenes", "nodes", "meshes"):
+        for entry in document.get(part, []):
+            entry["name"] = names.get(entry.get("name", ""), entry.get("name", ""))
 
 
 def _finish_lamps(document):
-    """A lamp's Emission node multiplies its power and colour; the exporter takes them one for the other."""
+    """The exporter takes an Emission node of a lamp for its power and colour, which it multiplies."""
     for entry in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
         light = bpy.data.lights.get(entry.get("name", ""))
-        if light is not None and lighting.emission_node(light) is not None:
+        if light is not None:
             entry.update(lighting.punctual(light))
 
 
@@ -216,14 +215,26 @@ def _active_camera_first(document, scene):
 
 
 def main(arguments):
-    """Command line: [IN.blend] OUT.glb; the exit code."""
+    """Command line: [IN.blend] OUT.glb [--frames A-B]; the exit code."""
+    frames = None
+    if "--frames" in arguments:
+        at = arguments.index("--frames")
+        frames = re.fullmatch(r"(-?\d+)-(-?\d+)", "".join(arguments[at + 1:at + 2]))
+        arguments = arguments[:at] + arguments[at + 2:]
+        if frames is None or int(frames[1]) > int(frames[2]) or "#" not in arguments[-1:][0]:
+            print("error: --frames: give the first and last frame, as in --frames 1-24, and a name with ####, "
+                  "as in shot.####.glb", file=sys.stderr)
+            return 2
     if not 1 <= len(arguments) <= 2 or not arguments[-1].endswith(".glb"):
-        print("usage: export.py IN.blend OUT.glb\n       blender -b IN.blend --python export.py -- OUT.glb", file=sys.stderr)
+        print(_USAGE, file=sys.stderr)
         return 2
     try:
         if len(arguments) == 2:
             bpy.ops.wm.open_mainfile(filepath=os.path.abspath(arguments[0]), load_ui=False, use_scripts=False)
-        write(arguments[-1])
+        if frames is not None:
+            write_frames(arguments[-1], int(frames[1]), int(frames[2]))
+        else:
+            write(arguments[-1])
     except Exception as error:  # whatever Blender raises: a message and a code, never a hanging process
         print(f"error: {arguments[0]}: {error}".strip(), file=sys.stderr)
         return 1

@@ -21,15 +21,15 @@ _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes 
 class Flat:
     """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
 
-    `things` are its objects, `names` the names of the objects and meshes that they stand for, `stands_for` the objects
-    themselves, and `hidden` the kinds of rays that do not see each of `things`.
+    `things` are its objects, `names` the names of the objects and meshes that they stand for, and `hidden` the kinds of
+    rays that do not see each of `things`.
     """
 
     def __init__(self, scene, undo, warn):
         visibility.as_rendered(scene, undo, warn)
         layer = bpy.context.view_layer
         layer.update()
-        self.things, self.names, self.stands_for, self.hidden = [], {}, {}, {}
+        self.things, self.names, self.hidden = [], {}, {}
         self._undo, self._warn, self._meshes = undo, warn, {}
         self._indirect = visibility.indirect_only(layer)
         self.scene = self._make(bpy.data.scenes, scene.name)
@@ -38,13 +38,17 @@ class Flat:
         self.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         # All is taken before anything is put: new objects end the walk through the old ones.
-        found = [self._take(instance, depsgraph) for instance in depsgraph.object_instances]
+        concerned = {thing for thing in scene.objects if thing.visible_get(view_layer=layer)}
+        found = []
+        for instance in depsgraph.object_instances:
+            concerned.add(instance.object.original)
+            found.append(self._take(instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
             place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()  # looked through, although it is not shown
             found.append((scene.camera, scene.camera.data, place, []))
         for taken in filter(None, found):
             self._put(*taken)
-        for thing in scene.objects:
+        for thing in sorted(concerned, key=lambda thing: thing.name):
             self._warn_of(thing)
 
     def say(self, thing, **keys):
@@ -113,36 +117,40 @@ class Flat:
             if matrix.determinant() < 0:
                 sheared.flip_normals()
             data, matrix = sheared, Matrix()
-        body = self._make(bpy.data.objects, original.name, data)
-        self.scene.collection.objects.link(body)
-        body.matrix_world = matrix
-        self.things.append(body)
-        self.stands_for[body.name], self.hidden[body.name] = original, hidden
+        body = self.add(original.name, data, matrix, hidden)
         if "caustique" in original:
-            body["caustique"] = original["caustique"].to_dict()
+            self.say(body, **original["caustique"].to_dict())
         if original == bpy.context.scene.camera and self.scene.camera is None:
             self.scene.camera = body
-        self._show(body, hidden)
-
-    def _show(self, body, hidden):
-        """Carries what cameras do not see, and names what other rays do not."""
-        if "camera" in hidden:
-            self.say(body, visible={"camera": False})
         rest = [ray for ray in hidden if ray != "camera"]
         if rest:
             self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it")
 
+    def add(self, name, data, matrix, hidden=()):
+        """A thing of this name, data, place (world matrix), and kinds of rays that do not see it."""
+        body = self._make(bpy.data.objects, name, data)
+        self.scene.collection.objects.link(body)
+        body.matrix_world = matrix
+        self.things.append(body)
+        self.hidden[body.name] = hidden
+        if "camera" in hidden:
+            self.say(body, visible={"camera": False})
+        return body
+
+    def remove(self, thing):
+        """Takes one of `things` out of the scene."""
+        self.things.remove(thing)
+        self.scene.collection.objects.unlink(thing)
+
     def _warn_of(self, thing):
         """Names what Cycles would show of an object and this does not."""
         where = f'object "{thing.name}"'
-        if thing.hide_render:
-            return
         for system in getattr(thing, "particle_systems", ()):
             kind = system.settings.render_type
             if kind not in {"NONE", "OBJECT", "COLLECTION"}:
                 what = "hair" if kind == "PATH" else f"particles that render as {kind}"
                 self._warn(where, f'{what} of particle system "{system.name}" is not carried: convert it to a mesh')
-        if thing.is_holdout or thing.is_shadow_catcher:
+        if thing.type != "LIGHT" and (thing.is_holdout or thing.is_shadow_catcher):
             what = "a holdout" if thing.is_holdout else "a shadow catcher"
             self._warn(where, f"it is {what}, which is not carried: it is seen as any other object")
         if any(getattr(thing.light_linking, name + "_collection", None) for name in ("receiver", "blocker")):

@@ -14,6 +14,8 @@ import build  # noqa: E402
 import export  # noqa: E402
 import glb  # noqa: E402
 import lighting  # noqa: E402
+import objects  # noqa: E402
+import sky  # noqa: E402
 import numpy  # noqa: E402
 from contextlib import ExitStack  # noqa: E402
 
@@ -181,10 +183,10 @@ class Export(unittest.TestCase):
         bpy.context.view_layer.update()
         document, _ = self.write()
         self.assertEqual([c["name"] for c in document["cameras"]], ["eye", "other"])
-        said = document["cameras"][0]["extras"]["caustique"]
+        first = document["nodes"][document["scenes"][0]["nodes"][0]]
+        said = first["extras"]["caustique"]
         self.assertAlmostEqual(said["aperture_radius"], 0.02, 6)
         self.assertAlmostEqual(said["focus_distance"], 6, 5)
-        first = document["nodes"][document["scenes"][0]["nodes"][0]]
         self.assertEqual((first["name"], first["camera"]), ("eye", 0))
 
     def test_lamps(self):
@@ -198,7 +200,7 @@ class Export(unittest.TestCase):
         self.assertAlmostEqual(lamps["p"], 683, 2)
         self.assertAlmostEqual(lamps["s"], 2 * 683, 2)
         said = {node["name"]: node["extras"]["caustique"] for node in document["nodes"]}
-        self.assertEqual(said["p"], {"radius": 0.25})
+        self.assertEqual(said["p"], {"radius": 0.25, "visible": {"camera": False}})
         self.assertAlmostEqual(said["s"]["angle_deg"], 3, 5)
 
     def test_lamp_nodes_multiply(self):
@@ -230,12 +232,16 @@ class Export(unittest.TestCase):
             data = bpy.data.lights.new(shape, "AREA")
             data.shape, data.size, data.size_y, data.energy, data.color = shape, 1.2, 0.6, 40, (1, 0.5, 0.25)
             lamp = place(shape, data, (1, 0.5, 3))
-            lamp.rotation_euler = (0.2, 0.3, 0.4)
+            lamp.rotation_euler, lamp.scale = (0.2, 0.3, 0.4), (1.5, 0.7, 1)
             bpy.context.view_layer.update()
             by_lamp = self.render().mean((0, 1))
-            lamp.hide_render = True
             with ExitStack() as undo:
-                lighting.area_mesh(lamp, undo, self.fail)
+                flat = objects.Flat(bpy.context.scene, undo, lambda *lost: self.fail(lost))
+                lighting.hang(flat, undo, lambda *lost: self.fail(lost))
+                lamp.hide_render = True
+                for body in flat.things:
+                    if body.name.startswith(shape):
+                        bpy.context.scene.collection.objects.link(body)
                 by_mesh = self.render().mean((0, 1))
             numpy.testing.assert_allclose(by_mesh, by_lamp, rtol=0.01, err_msg=shape)
 
@@ -300,7 +306,7 @@ class Export(unittest.TestCase):
             self.assertEqual((said["file"], said["strength"]), ("scene.environment.exr", 2))
             numpy.testing.assert_allclose(pixels(os.path.join(self.folder.name, said["file"])), self.gradient()[..., :3], atol=1e-3)
             # What Cycles sees around it, in the layout of the interface: the image turned by rotation_deg about +Y.
-            lighting._baked(bpy.context.scene, self.path, 64)
+            sky.baked(bpy.context.scene, self.path, 64)
             seen = pixels(os.path.join(self.folder.name, "scene.environment.exr")) / 2
             numpy.testing.assert_allclose(seen[1:-1], self.gradient(said["rotation_deg"])[1:-1, :, :3], atol=0.03, err_msg=f"{kind} {degrees}")
 

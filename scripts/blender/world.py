@@ -1,0 +1,124 @@
+"""The world in terms of `extras.caustique`: light from infinity, and the medium that fills the scene."""
+
+import contextlib
+import math
+import os
+
+import bpy
+
+import sky
+from shading import constant, medium, nodes_of, output_of, source
+
+
+def extras(scene, path, warn):
+    """Keys of the scene, `environment` (also where it is black) and `medium`, and the `Sun` in its sky or None.
+
+    Images are put beside the .glb at `path`.
+    """
+    world, said = scene.world, {"environment": {"color": [0.0, 0.0, 0.0]}}
+    if world is None:
+        return said, None
+    where = f'world "{world.name}"'
+    output = output_of(nodes_of(world))
+    if output is None:
+        if nodes_of(world) is None:
+            said["environment"]["color"] = list(world.color)
+        return said, None
+    inside = medium(source(output.inputs["Volume"]), where, warn)
+    if inside is not None:
+        said["medium"] = inside
+    shader = source(output.inputs["Surface"])
+    if shader is None:
+        return said, None
+    said["environment"], disc = _background(shader, path), None
+    if said["environment"] is None:
+        with contextlib.ExitStack() as undo:
+            disc = sky.sun(scene, undo, where, warn)
+            said["environment"] = sky.baked(scene, path)
+        warn(where, f"its nodes are baked to {said['environment']['file']}")
+        if any(node.type == "LIGHT_PATH" for node in output.id_data.nodes):
+            warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too")
+    _say_visibility(world, said["environment"], where, warn)
+    return said, disc
+
+
+def _say_visibility(world, environment, where, warn):
+    rays = {"camera": "camera", "diffuse": "diffuse", "glossy": "glossy", "transmission": "transmission",
+            "scatter": "volume scatter"}
+    hidden = [name for name in rays if not getattr(world.cycles_visibility, name, True)]
+    if "camera" in hidden:
+        environment["visible"] = {"camera": False}
+        hidden.remove("camera")
+    if hidden:
+        warn(where, f"it is hidden from {', '.join(rays[name] for name in hidden)} rays in Cycles: here they meet it")
+
+
+def _background(shader, path):
+    """What a plain Background shader says: one colour, or one environment texture turned about the vertical."""
+    if shader.type not in {"BACKGROUND", "EMISSION"} or constant(shader.inputs["Strength"]) is None:
+        return None
+    strength = constant(shader.inputs["Strength"])
+    colour = constant(shader.inputs["Color"])
+    if colour is not None:
+        return {"color": [c * strength for c in colour]}
+    texture = source(shader.inputs["Color"])
+    if texture.type != "TEX_ENVIRONMENT" or texture.image is None or texture.projection != "EQUIRECTANGULAR":
+        return None
+    turn = _turn(texture.inputs["Vector"])
+    if turn is None:
+        return None
+    return {"file": _beside(texture.image, path), "rotation_deg": turn, "strength": strength}
+
+
+def _turn(socket):
+    """Degrees by which the nodes before an environment texture turn it about the vertical, or None."""
+    node = source(socket)
+    if node is None:
+        return 0.0
+    if node.type == "TEX_COORD":
+        return 0.0 if socket.links[0].from_socket.name == "Generated" else None
+    if node.type != "MAPPING" or node.vector_type not in {"POINT", "TEXTURE", "VECTOR", "NORMAL"}:
+        return None
+    rotation = constant(node.inputs["Rotation"])
+    scale = constant(node.inputs["Scale"])
+    shift = constant(node.inputs["Location"]) if "Location" in node.inputs else [0, 0, 0]
+    if rotation is None or scale != [1, 1, 1] or any(rotation[:2]) or (node.vector_type in {"POINT", "TEXTURE"} and shift != [0, 0, 0]):
+        return None
+    before = _turn(node.inputs["Vector"])
+    # A point mapping turns the direction that looks the image up, so the image turns the other way.
+    return None if before is None else before + math.degrees(rotation[2]) * (1 if node.vector_type == "TEXTURE" else -1)
+
+
+def _beside(image, path):
+    """Put an image beside the .glb at `path`, as Radiance or OpenEXR; its file name there."""
+    stem = os.path.splitext(os.path.basename(path))[0]
+    kind = {"HDR": ".hdr", "OPEN_EXR": ".exr", "OPEN_EXR_MULTILAYER": None}.get(image.file_format)
+    data = None
+    if image.packed_file is not None:
+        data = image.packed_file.data
+    elif image.source == "FILE" and os.path.isfile(bpy.path.abspath(image.filepath)):
+        with open(bpy.path.abspath(image.filepath), "rb") as file:
+            data = file.read()
+    if kind and data:
+        name = f"{stem}.environment{kind}"
+        with open(os.path.join(os.path.dirname(path), name), "wb") as file:
+            file.write(data)
+        return name
+    name = f"{stem}.environment.exr"
+    flat = bpy.data.images.new(name, *image.size, float_buffer=True)
+    try:
+        pixels = list(image.pixels)
+        if image.colorspace_settings.name == "sRGB" and not image.is_float:
+            pixels = [v if i % 4 == 3 else _linear(v) for i, v in enumerate(pixels)]
+        flat.colorspace_settings.name = "Non-Color"  # save the numbers as they are
+        flat.pixels = pixels
+        flat.file_format = "OPEN_EXR"
+        flat.filepath_raw = os.path.join(os.path.dirname(path), name)
+        flat.save()
+    finally:
+        bpy.data.images.remove(flat)
+    return name
+
+
+def _linear(value):
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
