@@ -42,7 +42,7 @@ def _colour(socket):
         return None
     bulb = bpy.data.lights.new("blackbody", "POINT")
     try:
-        bulb.temperature = temperature
+        bulb.use_temperature, bulb.temperature = True, temperature
         return [max(c, 0.0) for c in bulb.temperature_color]
     finally:
         bpy.data.lights.remove(bulb)
@@ -111,7 +111,9 @@ def _area_mesh(thing, flat, undo):
     if bpy.app.version < (5, 0, 0):
         material.use_nodes = True
     material.use_backface_culling = True
-    material["caustique"] = {"backface_culling": True}
+    material["caustique"] = {"null_bsdf": True}
+    if light.spread < math.pi:
+        material["caustique"] = {"null_bsdf": True, "spread_deg": math.degrees(light.spread)}
     tree = material.node_tree
     tree.nodes.clear()
     emission = tree.nodes.new("ShaderNodeEmission")
@@ -128,8 +130,6 @@ def _warn_of(thing, where, warn):
     light, scale = thing.data, [abs(s) for s in thing.matrix_world.to_scale()]
     if not getattr(light, "use_shadow", True):
         warn(where, "it casts no shadows in Cycles: here it does")
-    if light.type == "AREA" and light.spread < math.pi * 0.999:
-        warn(where, "an area light's spread is not carried: it shines as a Lambertian emitter")
     if light.type == "SPOT" and max(scale) > 1.001 * min(scale):
         warn(where, "a spot's uneven scale is not carried: its cone is round")
     output = output_of(nodes_of(light))

@@ -70,7 +70,7 @@ class Flat:
     def _take(self, instance, depsgraph):
         """The object, data and place (world matrix) of an instance, and what does not see it; None of what is not seen."""
         thing = instance.object
-        if not (instance.is_instance or instance.show_self) or thing.type in _UNSEEN:
+        if not (instance.is_instance or instance.show_self) or thing.type in _UNSEEN or _is_pattern(instance):
             return None
         if thing.type in _LOST:
             self._warn(f'object "{thing.name}"', _LOST[thing.type])
@@ -157,6 +157,14 @@ class Flat:
             self._warn(where, "light linking is not carried: every light shines on every object")
         if getattr(thing.cycles, "use_adaptive_subdivision", False):
             self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken")
+
+
+def _is_pattern(instance):
+    """Whether renders do not show a child in its own place, because its parent puts it onto vertices or faces."""
+    parent = instance.object.original.parent
+    if parent is None or parent.instance_type not in {"VERTS", "FACES"}:
+        return False
+    return not instance.is_instance or instance.parent.original != parent
 
 
 def _is_plain(matrix):

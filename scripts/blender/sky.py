@@ -51,7 +51,8 @@ def hang(found, flat, undo):
     undo.callback(bpy.data.lights.remove, light)
     light.energy, light.color = strongest, [x / strongest for x in found.irradiance]
     light.angle = found.angle
-    flat.add(light.name, light, found.toward.to_track_quat("Z", "Y").to_matrix().to_4x4())
+    body = flat.add(light.name, light, found.toward.to_track_quat("Z", "Y").to_matrix().to_4x4())
+    flat.say(body, angle_deg=math.degrees(found.angle))
 
 
 def _light_from(scene, toward, angle):

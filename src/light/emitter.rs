@@ -1,6 +1,6 @@
 //! One light source and the densities that belong to it.
 
-use super::Environment;
+use super::{Environment, Spread};
 use crate::geometry::Shapes;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
@@ -20,6 +20,8 @@ pub enum Emitter {
         two_sided: bool,
         /// Mean emitted radiance.
         radiance: Rgb,
+        /// How it falls off with the angle.
+        spread: Spread,
         /// Unit normal of its front and the plane's distance from the origin along it. This and the next are here so that light sampling, which
         /// asks every time, finds all it needs in one place.
         plane: Vec4,

@@ -8,10 +8,11 @@ use super::emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
 use super::emitter::{Emitter, Sky, spot_falloff, spot_point, spot_solid_angle};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
+use super::spread::Spread;
 use crate::geometry::{Shapes, Surface, spawn};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
 /// Share of the choices that all lights get alike; the rest goes by power.
@@ -93,6 +94,7 @@ impl Lights {
                     area,
                     two_sided,
                     radiance,
+                    spread: Spread::new(material.spread),
                     plane,
                     corners,
                     plain,
@@ -171,10 +173,11 @@ impl Lights {
     #[inline]
     pub(super) fn onward(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
         match &self.emitters[index] {
-            Emitter::Triangle { two_sided, plane, .. } => {
+            Emitter::Triangle { two_sided, spread, plane, .. } => {
                 let cos = plane.truncate().dot(d);
                 let cos = if *two_sided { cos.abs() } else { cos };
-                (cos >= LEAST_COSINE).then(|| (Self::lambertian(cos, *two_sided), cos))
+                let density = if cos >= LEAST_COSINE { Self::onto(cos, *two_sided, spread) } else { 0.0 };
+                (density > 0.0).then_some((density, cos))
             }
             Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
             Emitter::Spot { frame, inner, outer, edge, .. } => {
@@ -212,7 +215,7 @@ impl Lights {
         u: Vec2,
     ) -> Option<DirectSample> {
         match &self.emitters[index] {
-            Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
+            Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
                 // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near the plane rounding
                 // decides.
                 let ng = plane.truncate();
@@ -228,9 +231,14 @@ impl Lights {
                 if cos == 0.0 || (cos < 0.0 && !two_sided) {
                     return None;
                 }
+                let toward = spread.of(cos.abs());
+                if toward == 0.0 {
+                    return None;
+                }
                 let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
+                let radiance = radiance * toward;
                 let pdf_w = probability * distance2 / (area * cos.abs());
-                let arrival_pdf_a = Self::lambertian(cos.abs(), *two_sided) / distance2;
+                let arrival_pdf_a = Self::onto(cos.abs(), *two_sided, spread) / distance2;
                 let target = Some(spawn(at, ng, -wi));
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
@@ -312,8 +320,8 @@ impl Lights {
 
     /// Density per solid angle of emission along cosine `cos` from a triangle.
     #[inline]
-    fn lambertian(cos: f32, two_sided: bool) -> f32 {
-        cos * FRAC_1_PI * if two_sided { 0.5 } else { 1.0 }
+    fn onto(cos: f32, two_sided: bool, spread: &Spread) -> f32 {
+        spread.pdf_w(cos) * if two_sided { 0.5 } else { 1.0 }
     }
 
     /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p` towards the light, `wi`.
@@ -340,16 +348,17 @@ impl Lights {
             return None;
         }
         let index = (first + relative) as usize;
-        let Emitter::Triangle { area, two_sided, .. } = &self.emitters[index] else { return None };
+        let Emitter::Triangle { area, two_sided, spread, .. } = &self.emitters[index] else { return None };
         let cos = surface.ng.dot(wo);
         if !(cos > 0.0 || (*two_sided && cos < 0.0)) {
             return None;
         }
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures);
         let cos = cos.abs();
+        let radiance = radiance * spread.of(cos);
         let choice = self.choice.as_ref()?;
         let [direct, start] = [choice.pdf(from, index), choice.power().pdf(index)].map(|chosen| chosen / area);
-        let onward = Self::lambertian(cos, *two_sided);
+        let onward = Self::onto(cos, *two_sided, spread);
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
@@ -394,20 +403,21 @@ impl Lights {
         let emitter = &self.emitters[index];
         // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine at the light.
         let (origin, d, flux, [direct, onward, cos]) = match emitter {
-            Emitter::Triangle { instance, primitive, area, two_sided, radiance, plane, corners, plain } => {
+            Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
                 let b = warp::triangle_uniform(point);
                 let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
                 let back = *two_sided && rest < 0.5;
                 let frame = Frame::from_normal(if back { -ng } else { ng });
-                let d = frame.to_world(warp::hemisphere_cosine(direction));
+                let (d, along) = spread.sample(direction);
+                let d = frame.to_world(d);
                 let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
                 let cos = ng.dot(d).abs();
                 // Along the surface nothing leaves it, and densities over the cosine would not be numbers.
                 if cos < LEAST_COSINE {
                     return None;
                 }
-                let flux = radiance * (PI * area * if *two_sided { 2.0 } else { 1.0 });
-                (spawn(at, ng, d), d, flux, [1.0 / area, Self::lambertian(cos, *two_sided), cos])
+                let flux = radiance * (PI * area * along * if *two_sided { 2.0 } else { 1.0 });
+                (spawn(at, ng, d), d, flux, [1.0 / area, Self::onto(cos, *two_sided, spread), cos])
             }
             Emitter::Point { p, intensity } => {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])

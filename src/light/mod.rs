@@ -11,6 +11,7 @@ mod lights;
 mod receiver;
 mod region;
 mod sampler;
+mod spread;
 mod tree;
 
 pub use aim::Targets;
@@ -23,3 +24,4 @@ pub use guide::Guide;
 pub use lights::Lights;
 pub use receiver::Receiver;
 pub use region::Region;
+pub use spread::Spread;

@@ -248,6 +248,7 @@ impl LightTree {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::Spread;
     use crate::light::emitter::{SpotEdge, spot_point};
     use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};
@@ -283,6 +284,7 @@ mod tests {
                         area: 0.5 * normal.length(),
                         two_sided: i % 8 == 3,
                         radiance,
+                        spread: Spread::LAMBERTIAN,
                         plane: Vec4::new(n.x, n.y, n.z, n.dot(p)),
                         corners,
                         plain: true,

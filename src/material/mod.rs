@@ -10,6 +10,7 @@ pub use scattering::Scattering;
 
 use crate::math::Rgb;
 use crate::texture::TextureRef;
+use std::f32::consts::FRAC_PI_2;
 
 /// How alpha acts.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -42,14 +43,16 @@ pub struct Material {
     pub normal_texture: Option<(TextureRef, f32)>,
     /// Emitted radiance (W/sr/m2): factor times strength.
     pub emission: Rgb,
+    /// Half angle (rad) of the cone that it emits into, towards whose edge it falls off; a right angle: Lambertian.
+    pub spread: f32,
     /// Emission texture (sRGB).
     pub emission_texture: Option<TextureRef>,
     /// Alpha mode.
     pub alpha: Alpha,
     /// Back faces emit too (and nothing else: scattering always has two sides).
     pub double_sided: bool,
-    /// Rays pass the back of its faces as if nothing were there.
-    pub backface_culling: bool,
+    /// Light passes it as if nothing were there; what it emits it emits all the same.
+    pub null_bsdf: bool,
     /// KHR_materials_unlit: emits its base colour, scatters nothing.
     pub unlit: bool,
     /// Index of refraction (KHR_materials_ior), at least 1; infinity for the extension's legacy 0.
@@ -110,10 +113,11 @@ impl Default for Material {
             metallic_roughness_texture: None,
             normal_texture: None,
             emission: Rgb::ZERO,
+            spread: FRAC_PI_2,
             emission_texture: None,
             alpha: Alpha::Opaque,
             double_sided: false,
-            backface_culling: false,
+            null_bsdf: false,
             unlit: false,
             ior: 1.5,
             transmission: 0.0,

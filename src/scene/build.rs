@@ -37,7 +37,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
 
     let shapes = Arc::new(place(&mut description, origin));
     let materials = Arc::new(Materials { list: description.materials, textures: description.textures.into() });
-    let tracer = tracer(&shapes, &materials, threads)?;
+    let (tracer, bodiless) = tracers(&shapes, &materials, threads)?;
 
     let sky = Sky {
         center: (center - origin).as_vec3(),
@@ -89,6 +89,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         objects: description.objects,
         first_lamp,
         tracer,
+        bodiless,
         lights,
         light_names,
         guessed_units: description.guessed_units,
@@ -115,16 +116,16 @@ pub(super) fn dress(
     environment: Option<Environment>,
 ) -> Result<Scene> {
     let (shapes, materials) = (Arc::clone(&scene.shapes), Arc::new(materials));
-    // Embree asks about cut-outs and backs the materials that it was given.
+    // Embree asks about cut-outs the materials that it was given.
     let cut = |materials: &Materials| materials.list.iter().map(asks).collect::<Vec<_>>();
     let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<bool>>();
     let contacts = match passing(&materials) == passing(&scene.materials) {
         true => Arc::clone(&scene.contacts),
         false => Arc::new(Contacts::new(&shapes, &materials)),
     };
-    let tracer = match cut(&materials) == cut(&scene.materials) {
-        true => scene.tracer.clone(),
-        false => tracer(&shapes, &materials, rayon::current_num_threads())?,
+    let (tracer, bodiless) = match cut(&materials) == cut(&scene.materials) {
+        true => (scene.tracer.clone(), scene.bodiless.clone()),
+        false => tracers(&shapes, &materials, rayon::current_num_threads())?,
     };
     let lamps = scene.lights.emitters().iter();
     let lamps = lamps.filter(|lamp| !matches!(lamp, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
@@ -136,6 +137,7 @@ pub(super) fn dress(
         objects: scene.objects.clone(),
         first_lamp: scene.first_lamp,
         tracer,
+        bodiless,
         light_names: scene.light_names.clone(),
         guessed_units: scene.guessed_units.clone(),
         world_unsaid: scene.world_unsaid,
@@ -212,35 +214,36 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
 }
 
-/// What a material makes rays ask for at a hit.
+/// What decides about a material where rays meet it.
 fn asks(material: &Material) -> (Alpha, bool) {
-    (material.alpha, material.backface_culling)
+    (material.alpha, material.null_bsdf)
 }
 
-/// Commits shapes to Embree, with what rays pass of them.
-fn tracer(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<Tracer> {
-    let solid = (Alpha::Opaque, false);
-    let asked =
-        |instance: &Instance| instance.hidden_from_camera || asks(&materials.list[instance.material as usize]) != solid;
-    let asked: Vec<bool> = shapes.instances.iter().map(asked).collect();
-    Tracer::build(shapes, &asked, &meets_test(shapes, materials), threads)
+/// Commits shapes to Embree, with what rays pass of them: what has a body, and what glows without one, if anything does.
+fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {
+    let of = |instance: &Instance| &materials.list[instance.material as usize];
+    let asked = |null_bsdf: bool| {
+        let asked = |instance: &Instance| {
+            let asked = instance.hidden_from_camera || of(instance).alpha != Alpha::Opaque;
+            (of(instance).null_bsdf == null_bsdf).then_some(asked)
+        };
+        shapes.instances.iter().map(asked).collect::<Vec<_>>()
+    };
+    let meets = meets_test(shapes, materials);
+    let tracer = Tracer::build(shapes, &asked(false), &meets, threads)?;
+    let bodiless = shapes.instances.iter().any(|instance| of(instance).null_bsdf);
+    let glowing = bodiless.then(|| Tracer::build(shapes, &asked(true), &meets, threads)).transpose()?;
+    Ok((tracer, glowing))
 }
 
 fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> MeetsTest {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
-    Arc::new(move |instance, primitive, barycentric, direction, token| {
+    Arc::new(move |instance, primitive, barycentric, token| {
         let placed = &shapes.instances[instance as usize];
         if placed.hidden_from_camera && token & CAMERA != 0 {
             return false;
         }
         let material = &materials.list[placed.material as usize];
-        if asks(material) == (Alpha::Opaque, false) {
-            return true;
-        }
-        let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
-        if material.backface_culling && surface.ng.dot(direction) > 0.0 {
-            return false;
-        }
         let cutoff = match material.alpha {
             Alpha::Opaque => return true,
             Alpha::Mask(cutoff) => cutoff,
@@ -251,6 +254,7 @@ fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> MeetsTest {
                 (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
             }
         };
+        let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
         material.alpha(&surface, &materials.textures) >= cutoff
     })
 }

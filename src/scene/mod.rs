@@ -41,8 +41,10 @@ pub struct Scene {
     pub objects: Vec<String>,
     /// Objects from this one on are spheres, made for point lights that have a radius.
     pub first_lamp: u32,
-    /// Geometry in Embree.
+    /// Geometry in Embree: all that has a body.
     pub tracer: Tracer,
+    /// What glows without a body ([`crate::material::Material::null_bsdf`]), if anything does.
+    pub bodiless: Option<Tracer>,
     /// Lights.
     pub lights: Lights,
     /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].

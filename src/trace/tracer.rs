@@ -49,9 +49,9 @@ impl From<embree::Hit> for Hit {
     }
 }
 
-/// Whether a ray along `direction` with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha
-/// cut-outs, culled backs, what is hidden from cameras. A pure function of (instance, primitive, barycentric, direction, token).
-pub type MeetsTest = Arc<dyn Fn(u32, u32, [f32; 2], Vec3, u32) -> bool + Send + Sync>;
+/// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs, and what is
+/// hidden from cameras. A pure function.
+pub type MeetsTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
 /// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are faster there than
 /// through an instance's own tree, whose box overlaps its neighbours'.
@@ -76,17 +76,18 @@ fn column_major(m: &Affine3A) -> [f32; 12] {
 }
 
 impl Tracer {
-    /// Commits `shapes`; `asked[i]` tells whether hits of instance `i` are put to the test `meets`.
+    /// Commits those of `shapes` for which there is an answer in `asked`, by instance: whether hits of it are put to the
+    /// test `meets`.
     ///
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.
-    pub fn build(shapes: &Arc<Shapes>, asked: &[bool], meets: &MeetsTest, threads: usize) -> Result<Tracer> {
+    pub fn build(shapes: &Shapes, asked: &[Option<bool>], meets: &MeetsTest, threads: usize) -> Result<Tracer> {
         let library = embree::Library::load().map_err(convert)?;
         let device = embree::Device::new(&library, threads).map_err(convert)?;
         // A mesh is filtered if any instance of it is: the test itself then accepts the opaque ones.
         let mut filtered = vec![false; shapes.meshes.len()];
         for (instance, &asked) in shapes.instances.iter().zip(asked) {
-            filtered[instance.mesh as usize] |= asked;
+            filtered[instance.mesh as usize] |= asked == Some(true);
         }
         let mut copies = vec![0; shapes.meshes.len()];
         for instance in &shapes.instances {
@@ -99,13 +100,10 @@ impl Tracer {
                 let positions: Vec<[f32; 3]> = data.positions.iter().map(|&p| place(p).to_array()).collect();
                 builder.triangles(GeometryId(id), &positions, &data.triangles).map_err(named)?;
                 if filtered[mesh as usize] {
-                    let (meets, placed) = (Arc::clone(meets), Arc::clone(shapes));
+                    let meets = Arc::clone(meets);
                     let filter: embree::Filter = Arc::new(move |c: &embree::Candidate| {
-                        let (instance, direction) = match c.instance {
-                            None => (c.geometry.0, c.direction.into()),
-                            Some(id) => (id.0, placed.instances[id.0 as usize].direction(c.direction.into())),
-                        };
-                        meets(instance, c.primitive, [c.u, c.v], direction, c.token)
+                        let instance = c.instance.unwrap_or(c.geometry).0;
+                        meets(instance, c.primitive, [c.u, c.v], c.token)
                     });
                     builder.filter(GeometryId(id), filter).map_err(named)?;
                 }
@@ -113,7 +111,7 @@ impl Tracer {
             };
         let mut shared: Vec<Option<embree::Scene>> = vec![None; shapes.meshes.len()];
         let mut root = embree::SceneBuilder::new(&device).map_err(convert)?;
-        for (i, instance) in shapes.instances.iter().enumerate() {
+        for (i, instance) in shapes.instances.iter().enumerate().filter(|(i, _)| asked[*i].is_some()) {
             let id = i as u32;
             match &instance.to_world {
                 _ if copies[instance.mesh as usize] <= MOST_COPIED => {

@@ -3,6 +3,7 @@
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
 use super::eye::{Eye, EyeMeasure, Features};
+use super::glow::Glow;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
@@ -249,6 +250,20 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.last = vertex.receiver();
         // Without connections and merging only what mirrors and clear glass show is left to find.
         Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
+    }
+
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let (lights, materials) = (&self.shared.eye.scene.lights, &self.shared.eye.scene.materials);
+        let Some((radiance, density)) = lights.emitted(materials, &self.last, &glow.surface, glow.wo) else { return };
+        let before = (self.mis, self.trail, self.depth);
+        if let Some(scattered) = scattered {
+            self.trail.scattered(scattered.lobe);
+        }
+        self.depth = glow.depth;
+        let cos = glow.wo.dot(glow.surface.ng).abs();
+        self.mis = self.mis.arrive(glow.distance * glow.distance, cos).fly(glow.flight);
+        self.run_into(glow.throughput * radiance, glow.depth, glow.surface.p, &density);
+        (self.mis, self.trail, self.depth) = before;
     }
 
     #[inline]

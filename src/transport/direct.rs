@@ -5,6 +5,7 @@
 //! a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the path itself, which
 //! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
 
+use super::glow::glows;
 use super::segment::{End, Start, next_surface, token};
 use super::site::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
@@ -71,7 +72,7 @@ pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f3
 }
 
 #[inline]
-fn second_strategy(scene: &Scene, vertex: &impl ScatterPoint, set: LobeSet) -> Rgb {
+fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> Rgb {
     let draws = vertex.draws();
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
     let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
@@ -79,9 +80,10 @@ fn second_strategy(scene: &Scene, vertex: &impl ScatterPoint, set: LobeSet) -> R
     let (origin, token) = (vertex.spawn(sample.wi), token(scene, draws, Purpose::SecondAlpha));
     let start = Start { origin, direction: sample.wi, interior, leaving: vertex.touching(), token };
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
-    let mut light = Rgb::ZERO;
+    let (mut light, mut reach) = (Rgb::ZERO, f32::INFINITY);
     match next_surface(scene, start) {
         End::Surface(arrival) => {
+            reach = arrival.distance;
             if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), &arrival.surface) {
                 light = radiance * arrival.transmittance * weight(pdf);
             }
@@ -92,5 +94,10 @@ fn second_strategy(scene: &Scene, vertex: &impl ScatterPoint, set: LobeSet) -> R
         }
         End::Medium(_) | End::Lost => {}
     }
+    glows(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
+        if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), surface) {
+            light += radiance * left * weight(pdf);
+        }
+    });
     sample.weight * light
 }

@@ -18,6 +18,7 @@ use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
+use super::glow::Glow;
 use super::segment::{FirstHit, PrecomputedHit, camera_token};
 use super::shares::leads;
 use super::site::ScatterPoint;
@@ -388,6 +389,18 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             self.gather(vertex, broad, onward, survival);
         }
         if self.leads(onward) { Next::Continue(onward) } else { Next::Stop }
+    }
+
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let (lights, materials, before) = (&self.scene.lights, &self.scene.materials, self.sight);
+        let from =
+            if scattered.is_none() { Receiver::anywhere(glow.surface.p + glow.wo * glow.distance) } else { self.last };
+        self.sight = self.arrived(scattered);
+        if let Some((radiance, pdf)) = lights.hit(materials, &from, &glow.surface) {
+            let density = || Some(lights.emitted(materials, &from, &glow.surface, glow.wo)?.1);
+            self.run_into((radiance, glow.throughput), pdf, scattered, density);
+        }
+        self.sight = before;
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {

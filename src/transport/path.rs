@@ -6,6 +6,7 @@
 use super::bidirectional::{Record, Technique};
 use super::bidirectional_eye::{look, look_in_medium};
 use super::eye::{Eye, EyeMeasure};
+use super::glow::Glow;
 use super::segment::token;
 use super::shares::{shares, wanted};
 use super::site::ScatterPoint;
@@ -111,6 +112,18 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.lit(vertex);
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
         self.next()
+    }
+
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let mut trail = self.trail;
+        if let Some(scattered) = scattered {
+            trail.scattered(scattered.lobe);
+        }
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, &glow.surface) {
+            let weight = Self::weight(scattered, pdf);
+            let light = glow.throughput * radiance * weight;
+            self.add(Technique::Hit { eye: glow.depth }, trail.sight.lit(false), light, weight);
+        }
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {

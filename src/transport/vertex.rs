@@ -1,5 +1,6 @@
 //! Vertices of a path, and who receives them.
 
+use super::glow::Glow;
 use super::interior::Interior;
 use super::roulette::survival;
 use super::segment::MediumArrival;
@@ -133,6 +134,11 @@ pub trait Visitor<'a> {
     const SPLITS: bool = false;
     /// A vertex; `scattered` is how the vertex before sent the path here (`None` at the first).
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
+    /// A lamp without a body on the way to the next vertex, of walks from the eye.
+    #[inline]
+    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+        let _ = (glow, scattered);
+    }
     /// As [`Visitor::surface`], in a medium that scatters. A walk that splits goes on whatever the answer.
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let _ = (vertex, scattered);

@@ -2,6 +2,7 @@
 //! [`Visitor`].
 
 use super::flight::{Fly, Split};
+use super::glow::{Glow, glows};
 use super::interior::Interior;
 use super::roulette::late_survival;
 use super::segment::{Arrival, Attenuate, Clear, End, PrecomputedHit, Start, camera_token, next_vertex, token};
@@ -126,6 +127,9 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
             flight = fly.flight;
             end
         };
+        if transport == Transport::Radiance && scene.bodiless.is_some() {
+            show_glows(scene, &start, &end, (in_medium, throughput, depth), scattered, visitor);
+        }
         if BESIDES >= SCATTERING
             && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut scattered)
         {
@@ -256,4 +260,25 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         leaving = Place::touching(surface);
         interior = if sample.transmitted { behind } else { here };
     }
+}
+
+/// Shows a visitor the lamps without a body on a segment that has ended somewhere, which began in a medium or not with some
+/// weight and is the last of so many.
+#[cold]
+#[inline(never)]
+fn show_glows<'a, V: Visitor<'a>>(
+    scene: &Scene,
+    start: &Start,
+    end: &End,
+    (from_medium, throughput, depth): (bool, Rgb, u32),
+    scattered: Option<Scattered>,
+    visitor: &mut V,
+) {
+    // Behind a vertex of a medium there may be more, whose light comes past it.
+    let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
+    glows(scene, start, reach, from_medium, |surface, distance, left, flight| {
+        let (surface, wo, throughput) = (*surface, -start.direction, throughput * left);
+        let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
+        visitor.glow(&Glow { surface, wo, throughput, depth, distance, flight }, scattered);
+    });
 }

@@ -9,6 +9,7 @@ mod lights;
 mod materials;
 mod outside;
 mod scenes;
+mod seen;
 
 use caustique::error::Error;
 use caustique::scene::Description;

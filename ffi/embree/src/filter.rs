@@ -22,8 +22,6 @@ pub struct Candidate {
     pub u: f32,
     /// Barycentric coordinate of the triangle's third corner.
     pub v: f32,
-    /// The ray's direction in the space of the mesh: for a candidate in an instance, before its transform.
-    pub direction: [f32; 3],
     /// The ray's [`token`](crate::Ray::token).
     pub token: u32,
 }
@@ -47,11 +45,10 @@ thread_local! {
 pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
     // SAFETY: Embree passes valid arguments; single rays only are traced, so each pointer is to one item laid
     // out as in `RawRay` and `RawHit` (of which `instance_primitive`, absent in Embree 3, is not read).
-    let (valid, filter, hit, direction, token) = unsafe {
+    let (valid, filter, hit, token) = unsafe {
         let arguments = &*arguments;
         debug_assert_eq!(arguments.count, 1);
-        let (filter, ray) = (&*(arguments.user as *const Filter), &*arguments.ray);
-        (&mut *arguments.valid, filter, arguments.hit, ray.direction, ray.id)
+        (&mut *arguments.valid, &*(arguments.user as *const Filter), arguments.hit, (*arguments.ray).id)
     };
     if *valid == 0 {
         return;
@@ -66,7 +63,6 @@ pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
             primitive: (*hit).primitive,
             u: (*hit).u,
             v: (*hit).v,
-            direction,
             token,
         }
     };

@@ -40,9 +40,9 @@ impl Bounds {
             intensity,
         };
         let bounds = match emitter {
-            Emitter::Triangle { area, two_sided, radiance, plane, corners, .. } => {
+            Emitter::Triangle { area, two_sided, radiance, spread, plane, corners, .. } => {
                 let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
-                let intensity = luminance(*radiance) * area;
+                let intensity = luminance(*radiance) * area * spread.of(1.0);
                 let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
                 Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
             }

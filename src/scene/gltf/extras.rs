@@ -86,7 +86,8 @@ impl Medium {
 pub(super) struct MaterialExtras {
     pub(super) medium: Option<Medium>,
     pub(super) priority: i32,
-    pub(super) backface_culling: bool,
+    pub(super) null_bsdf: bool,
+    pub(super) spread_deg: Option<f32>,
 }
 
 /// Extras of a node with a mesh.
@@ -137,7 +138,7 @@ pub(super) const SCENE: &[&str] = &[
     "film_transparent",
 ];
 pub(super) const MATERIAL: &[&str] =
-    &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "backface_culling"];
+    &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "null_bsdf", "spread_deg"];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
 pub(super) const LIGHT: &[&str] = &["radius", "angle_deg", "blend", "visible", "visible.camera"];
 pub(super) const NODE: &[&str] =

@@ -297,11 +297,16 @@ impl Reader<'_> {
         extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
         let said: MaterialExtras = extras::read(self.raw, self.place)?;
         material.priority = said.priority;
-        material.backface_culling = said.backface_culling && !material.double_sided && material.transmission == 0.0;
-        if said.backface_culling && !material.backface_culling {
-            let why =
-                if material.double_sided { "the material is doubleSided" } else { "it bounds what transmits light" };
-            self.warnings.push(format!("{}: its backface_culling is ignored: {why}", self.place));
+        material.null_bsdf = said.null_bsdf && material.transmission == 0.0;
+        if said.null_bsdf && !material.null_bsdf {
+            self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
+        }
+        if let Some(degrees) = said.spread_deg {
+            if !(0.0..=180.0).contains(&degrees) {
+                let cause = format!("extras.caustique.spread_deg must lie between 0 and 180, it is {degrees}");
+                return Err(fault(self.place, cause));
+            }
+            material.spread = (0.5 * degrees).to_radians();
         }
         if let Some(medium) = said.medium {
             material.medium = Some(medium.parameters(self.place)?);

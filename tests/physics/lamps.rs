@@ -1,4 +1,4 @@
-//! What lets light and sight through: backs that are culled, and what is hidden from cameras. Closed forms, by all methods.
+//! Lamps as Blender has them: without a body, hidden from cameras, shining into a cone. Closed forms, by all methods.
 //!
 //! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks),
 //! and each has to reject a picture that is off by the share it declares.
@@ -6,13 +6,13 @@
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
-use caustique::material::Material;
+use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::render::{Control, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use std::f64::consts::PI;
-use support::scenes::{add, build, cuboid, lit_room, look_at, matte, quad, square};
+use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, mirror, quad, sphere, square};
 use support::stats::{mean_and_error, sidak, t_critical};
 
 const ERROR_RATE: f64 = 1e-3;
@@ -57,27 +57,82 @@ fn check(what: &str, scene: &Scene, expected: f64, bias: f64, told: f64) {
     }
 }
 
-/// A floor under a white sky, and a lamp that hangs over it with its back down.
-fn below_a_lamp(backface_culling: bool) -> Scene {
+/// All methods see what the first of them does, to 1 % and noise, and would tell it from what is off by a fifth.
+fn agree(what: &str, scene: &Scene, methods: &[Method]) {
+    let found: Vec<(f64, f64)> = methods.iter().map(|&method| seen(scene, method)).collect();
+    println!("{what}: {found:?}");
+    let critical = t_critical(sidak(ERROR_RATE, methods.len() - 1), 1, SEEDS as f64 - 1.0);
+    let (expected, own) = found[0];
+    for &(mean, error) in &found[1..] {
+        let passes = |expected: f64| (mean - expected).abs() <= critical * error.hypot(own) + 0.01 * expected.abs();
+        assert!(passes(expected), "{what}: {found:?}");
+        assert!(!passes(0.8 * expected), "{what}: cannot tell 0.2 {found:?}");
+    }
+}
+
+/// A floor under a white sky, which a lamp of radiance 1 hangs over that shines on it or away from it.
+fn below_a_lamp(null_bsdf: bool, toward: bool) -> Scene {
     let mut description = Description { environment: white_sky(), ..Description::default() };
     add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
-    let lamp = quad(Vec3::new(-1.0, 0.6, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
-    add(&mut description, "lamp", lamp, Material { backface_culling, ..matte(0.0, 3.0) });
-    description.cameras.push(look_at(DVec3::new(0.0, 0.45, 1.5), DVec3::ZERO, 8.0));
+    let corner = Vec3::new(-0.5, 0.5, -0.5);
+    let lamp = if toward { quad(corner, Vec3::X, Vec3::Z) } else { quad(corner, Vec3::Z, Vec3::X) };
+    add(&mut description, "lamp", lamp, Material { null_bsdf, ..matte(0.0, 1.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, 0.1, 0.0), DVec3::ZERO, 20.0));
     build(description)
 }
 
-/// A lamp from behind is not there: the floor below reflects half of a white sky.
+/// A lamp without a body takes no light away: the floor reflects half of a white sky, and of what the lamp sends.
 #[test]
-fn culled_backs_let_light_through() {
-    check("back", &below_a_lamp(true), 0.5, 2e-3, 0.05);
+fn lamps_without_a_body_let_light_through() {
+    check("away", &below_a_lamp(true, false), 0.5, 3e-3, 0.1);
+    let lamp = 0.5 / PI * below_a_square(0.5, 0.5);
+    check("toward", &below_a_lamp(true, true), 0.5 + lamp, 3e-3, 0.1);
 }
 
-/// The same lamp with a back takes most of the sky away.
+/// One with a body takes most of the sky away.
 #[test]
-fn backs_that_are_not_culled_block_it() {
-    let (mean, error) = seen(&below_a_lamp(false), Method::Path);
+fn bodies_block_light() {
+    let (mean, error) = seen(&below_a_lamp(false, false), Method::Path);
     assert!(mean + 4.0 * error < 0.4, "{mean} +- {error}");
+}
+
+/// Seen from its front in front of a sky its radiance adds to that, and from behind it is not there.
+#[test]
+fn lamps_without_a_body_are_seen_before_what_is_behind_them() {
+    for (z, expected) in [(1.0, 3.0), (-1.0, 1.0)] {
+        let mut description = Description { environment: white_sky(), ..Description::default() };
+        let lamp = quad(Vec3::new(-0.5, -0.5, 0.0), Vec3::X, Vec3::Y);
+        add(&mut description, "lamp", lamp, Material { null_bsdf: true, ..matte(0.0, 2.0) });
+        description.cameras.push(look_at(DVec3::new(0.0, 0.0, z), DVec3::ZERO, 20.0));
+        let scene = build(description);
+        for method in METHODS {
+            let (mean, _) = seen(&scene, method);
+            assert!((mean - expected).abs() < 1e-5, "{method:?}: {mean}, {expected}");
+        }
+    }
+}
+
+/// In a room with fog, a mirror, glass and a lamp without a body all methods that know fog agree.
+#[test]
+fn all_methods_see_lamps_without_a_body_alike() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    description.materials[1].null_bsdf = true;
+    description.materials[1].double_sided = true;
+    for p in &mut description.meshes[1].positions {
+        p.y -= 0.8;
+    }
+    add(&mut description, "mirror", sphere(Vec3::new(-0.5, 0.4, 0.2), 0.3, 48), mirror());
+    add(&mut description, "glass", sphere(Vec3::new(0.5, 0.4, 0.2), 0.3, 48), glass(1.5));
+    for fog in [false, true] {
+        description.medium = fog.then(|| MediumParameters {
+            sigma_a: Rgb::splat(0.05),
+            sigma_s: Rgb::splat(0.2),
+            ..MediumParameters::default()
+        });
+        let scene = build(description.clone());
+        let methods = if fog { &METHODS[..3] } else { &METHODS[..4] };
+        agree(if fog { "fog" } else { "air" }, &scene, methods);
+    }
 }
 
 /// Irradiance in the middle below a square of radiance 1 and half side a, at height h.
@@ -115,15 +170,7 @@ fn hidden_bodies_send_light_to_all_but_cameras() {
     let hidden = seen(&scene, Method::Path);
     println!("shown {shown:?}, hidden {hidden:?}");
     assert!((shown.0 - hidden.0).abs() > 8.0 * shown.1.hypot(hidden.1), "the box changes the picture");
-    let critical = t_critical(sidak(ERROR_RATE, METHODS.len() - 1), 1, SEEDS as f64 - 1.0);
-    for method in &METHODS[1..] {
-        let (mean, error) = seen(&scene, *method);
-        println!("{method:?}: {mean:.5} +- {error:.5}");
-        let passes =
-            |expected: f64| (mean - expected).abs() <= critical * error.hypot(hidden.1) + 0.01 * expected.abs();
-        assert!(passes(hidden.0), "{method:?}: {mean} +- {error}, {hidden:?}");
-        assert!(!passes(0.8 * hidden.0), "{method:?}: cannot tell 0.2");
-    }
+    agree("hidden", &scene, &METHODS);
 }
 
 /// A sky and the disc of a sun light a floor, and cameras see neither.
@@ -149,4 +196,31 @@ fn cameras_see_no_hidden_light_from_infinity() {
     for method in METHODS {
         assert_eq!(seen(&upward, method).0, 0.0, "{method:?}");
     }
+}
+
+/// Below a small lamp that spreads its light into a cone there is more of it than below a Lambertian one: by
+/// tan h / (tan h - h) on the axis, h the half angle.
+#[test]
+fn spreads_keep_the_flux() {
+    let (half, side, near) = (30f64.to_radians(), 0.04f32, 0.3);
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.5 * side, 1.0, -0.5 * side), Vec3::X * side, Vec3::Z * side);
+    add(&mut description, "lamp", lamp, Material { spread: half as f32, ..matte(0.0, 1000.0) });
+    description.cameras.push(look_at(DVec3::new(0.0, near, 0.0), DVec3::ZERO, 8.0));
+    let on_axis = 0.5 / PI * 1000.0 * f64::from(side).powi(2) * half.tan() / (half.tan() - half);
+    // Points of the view are 0.765 of its half side from its middle on average, and radiance falls with the tangent.
+    let view = near * 4f64.to_radians().tan();
+    let expected = on_axis * (1.0 - 0.765 * view / half.tan());
+    check("spread", &build(description), expected, 6e-3, 0.05);
+}
+
+/// The same light by all methods where a lamp that spreads little is seen in a mirror and through glass.
+#[test]
+fn all_methods_see_spreads_alike() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    description.materials[1].spread = 0.5;
+    add(&mut description, "mirror", sphere(Vec3::new(-0.4, 0.5, 0.0), 0.3, 48), mirror());
+    add(&mut description, "glass", sphere(Vec3::new(0.3, 0.5, 0.0), 0.3, 48), glass(1.5));
+    agree("spread", &build(description), &[Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm]);
 }

@@ -1,0 +1,102 @@
+//! Keys of `extras.caustique` about what is seen and how: visibility, lamps, lens shift, the picture, losses.
+
+use super::glb::Glb;
+use super::{message, read, try_read};
+use caustique::light::SpotEdge;
+use caustique::scene::View;
+use caustique::scene::description::{Picture, PunctualKind, ToneCurve};
+use serde_json::{Value, json};
+
+fn caustique(keys: Value) -> Value {
+    json!({"caustique": keys})
+}
+
+#[test]
+fn what_the_picture_was_made_for() {
+    let mut file = Glb::new();
+    file.json["scenes"][0]["extras"] = caustique(json!({
+        "resolution": [640, 200], "exposure": -1.5, "tonemap": "filmic", "crop": [0, 0, 0.5, 1], "film_transparent": true,
+        "losses": ["object \"Hair\": it is gone", "object \"Hair\": it is gone"],
+        "environment": {"color": [1, 1, 1], "visible": {"camera": false}},
+    }));
+    let description = read(&file);
+    let (exposure, tonemap) = (Some(-1.5), Some(ToneCurve::Filmic));
+    assert_eq!(description.picture, Picture { resolution: Some([640, 200]), exposure, tonemap });
+    assert!(description.environment_hidden_from_camera);
+    let said = |what: &str| description.warnings.iter().filter(|warning| warning.contains(what)).count();
+    assert_eq!((said("Hair"), said("crop is ignored"), said("film_transparent is ignored")), (1, 1, 1));
+    let scene = caustique::scene::Scene::build(description, 1).expect("a scene");
+    let size = |width, height| scene.camera(&View { camera: None, width, height }).expect("a camera").size();
+    assert_eq!(size(None, None), (640, 200));
+    assert_eq!(size(Some(320), None), (320, 100));
+    assert_eq!(size(None, Some(50)), (160, 50));
+    assert_eq!(size(Some(10), Some(10)), (10, 10));
+}
+
+#[test]
+fn wrong_values_are_errors() {
+    for (keys, what) in [
+        (json!({"resolution": [0, 200]}), "two numbers above zero"),
+        (json!({"resolution": [200]}), "invalid length 1"),
+        (json!({"tonemap": "sepia"}), "unknown variant `sepia`"),
+        (json!({"losses": "all"}), "expected a sequence"),
+    ] {
+        let mut file = Glb::new();
+        file.json["scenes"][0]["extras"] = caustique(keys);
+        let error = message(&try_read(&file).expect_err("refused"));
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+#[test]
+fn lamps_as_blender_has_them() {
+    let spot = json!({"KHR_lights_punctual": {"light": 0}});
+    let file = |blend: Value| {
+        let mut file = Glb::new();
+        let cone = json!({"type": "spot", "spot": {"innerConeAngle": 0.7, "outerConeAngle": 0.8}});
+        file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [cone]}});
+        let keys = caustique(json!({"blend": blend, "radius": 0.25, "visible": {"camera": false}}));
+        file.node(json!({"name": "spot", "extensions": spot, "extras": keys}));
+        file
+    };
+    for (blend, share) in [(0.0, 1.0), (0.25, 0.75), (1.0, 0.0)] {
+        let light = read(&file(json!(blend))).lights.remove(0);
+        let PunctualKind::Spot { inner, outer, edge } = light.kind else { panic!("{:?}", light.kind) };
+        assert_eq!((outer, edge, light.radius, light.hidden_from_camera), (0.8, SpotEdge::Smooth, 0.25, true));
+        let expected = (1.0 - share * (1.0 - 0.8f32.cos())).acos();
+        assert!((inner - expected).abs() < 1e-3, "{blend}: {inner}, {expected}");
+    }
+    assert!(message(&try_read(&file(json!(1.5))).expect_err("refused")).contains("blend must lie between 0 and 1"));
+}
+
+#[test]
+fn surfaces_without_a_body_and_objects_that_hide() {
+    let mut file = Glb::new();
+    let mesh = file.cube("lamp", Some(0));
+    file.node(json!({"mesh": mesh, "extras": caustique(json!({"visible": {"camera": false}}))}));
+    file.json["materials"] = json!([{"name": "lamp", "emissiveFactor": [1, 1, 1],
+        "extras": {"caustique": {"null_bsdf": true, "spread_deg": 90}}}]);
+    let description = read(&file);
+    assert!(description.instances[0].hidden_from_camera);
+    let lamp = &description.materials[description.instances[0].material as usize];
+    assert!(lamp.null_bsdf && (lamp.spread - std::f32::consts::FRAC_PI_4).abs() < 1e-6);
+    file.json["materials"][0]["extensions"] = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
+    let description = read(&file);
+    assert!(!description.materials[description.instances[0].material as usize].null_bsdf);
+    let warning = "material \"lamp\": its null_bsdf is ignored: it transmits light by itself";
+    assert!(description.warnings.iter().any(|other| other == warning), "{:?}", description.warnings);
+    file.json["materials"][0]["extras"]["caustique"]["spread_deg"] = json!(181);
+    assert!(message(&try_read(&file).expect_err("refused")).contains("spread_deg must lie between 0 and 180"));
+}
+
+/// A shift of half a width puts what is straight ahead on the picture's border.
+#[test]
+fn lens_shift() {
+    let mut file = Glb::new();
+    file.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 1, "aspectRatio": 2, "znear": 0.1}}]);
+    file.node(json!({"camera": 0, "extras": {"caustique": {"shift": [0.5, -0.25]}}}));
+    let scene = caustique::scene::Scene::build(read(&file), 1).expect("a scene");
+    let camera = scene.camera(&View { camera: None, width: Some(200), height: Some(100) }).expect("a camera");
+    let ray = camera.ray([0.0, 25.0].into(), [0.5; 2].into());
+    assert!((ray.direction - camera.forward()).length() < 1e-5, "{:?}", ray.direction);
+}
