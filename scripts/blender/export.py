@@ -17,6 +17,7 @@ What glTF cannot say stands in `extras.caustique` (docs/scene-format.md). Lights
 (lm/W 683). Whatever cannot be carried is named in a warning on stderr and in the file.
 """
 
+import argparse
 import contextlib
 import os
 import re
@@ -33,9 +34,6 @@ import objects  # noqa: E402
 import shading  # noqa: E402
 import sky  # noqa: E402
 import world  # noqa: E402
-
-_USAGE = """usage: export.py IN.blend OUT.glb [--frames A-B]
-       blender -b IN.blend --python export.py -- OUT.glb [--frames A-B]"""
 
 
 def write(path, scene=None):
@@ -215,35 +213,46 @@ def _active_camera_first(document, scene):
 
 
 def main(arguments):
-    """Command line: [IN.blend] OUT.glb [--frames A-B]; the exit code."""
-    frames = None
-    if "--frames" in arguments:
-        at = arguments.index("--frames")
-        frames = re.fullmatch(r"(-?\d+)-(-?\d+)", "".join(arguments[at + 1:at + 2]))
-        arguments = arguments[:at] + arguments[at + 2:]
-        if frames is None or int(frames[1]) > int(frames[2]) or "#" not in arguments[-1:][0]:
-            print("error: --frames: give the first and last frame, as in --frames 1-24, and a name with ####, "
-                  "as in shot.####.glb", file=sys.stderr)
-            return 2
-    if not 1 <= len(arguments) <= 2 or not arguments[-1].endswith(".glb"):
-        print(_USAGE, file=sys.stderr)
-        return 2
+    """Command line: [IN.blend] OUT.glb; the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="export.py", usage="export.py [options] IN.blend OUT.glb\n       "
+        "blender -b IN.blend --python export.py -- [options] OUT.glb")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="[IN.blend] OUT.glb")
+    parser.add_argument("--frames", type=_frames, metavar="A-B",
+                        help="a file for each frame from A to B; #### in OUT.glb becomes its number")
+    given = parser.parse_args(arguments)
+    if len(given.files) > 2 or not given.files[-1].endswith(".glb"):
+        parser.error("OUT.glb has to end in .glb, with at most one IN.blend before it")
+    if given.frames and "#" not in given.files[-1]:
+        parser.error("--frames: OUT.glb has to have a place for the frame's number, as in shot.####.glb")
     try:
-        if len(arguments) == 2:
-            bpy.ops.wm.open_mainfile(filepath=os.path.abspath(arguments[0]), load_ui=False, use_scripts=False)
-        if frames is not None:
-            write_frames(arguments[-1], int(frames[1]), int(frames[2]))
+        if len(given.files) == 2:
+            source = os.path.abspath(given.files[0])
+            bpy.ops.wm.open_mainfile(filepath=source, load_ui=False, use_scripts=False)
+        if given.frames:
+            write_frames(given.files[-1], *given.frames)
         else:
-            write(arguments[-1])
+            write(given.files[-1])
     except Exception as error:  # whatever Blender raises: a message and a code, never a hanging process
-        print(f"error: {arguments[0]}: {error}".strip(), file=sys.stderr)
+        print(f"error: {given.files[0]}: {error}".strip(), file=sys.stderr)
         return 1
     return 0
 
 
+def _frames(text):
+    """The first and last frame of A-B."""
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
+    if match is None or int(match[1]) > int(match[2]):
+        raise argparse.ArgumentTypeError("give the first and the last frame, as in 1-24")
+    return int(match[1]), int(match[2])
+
+
 if __name__ == "__main__":
     given = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
-    code = main(given)
+    try:
+        code = main(given)
+    except SystemExit as stopped:  # help, or a command line that is wrong
+        code = stopped.code
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)  # Blender as a module may hang while it shuts down

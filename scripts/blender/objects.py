@@ -103,8 +103,6 @@ class Flat:
             if slot.link == "OBJECT" and index < len(mesh.materials):
                 mesh.materials[index] = slot.material and slot.material.original
         self._meshes[key] = mesh if mesh.polygons else None
-        if not mesh.polygons and mesh.vertices:
-            self._warn(f'object "{thing.name}"', "it has no faces: edges and points alone are not seen")
         return self._meshes[key]
 
     def _put(self, original, data, matrix, hidden):

@@ -1,5 +1,7 @@
 """What the exporter makes of whole scenes, rendered by caustique beside Cycles. Needs bpy and the program."""
 
+import contextlib
+import io
 import math
 import os
 import tempfile
@@ -161,6 +163,7 @@ class Geometry(Scene):
         self.instance_on_points(raw, None, glow("made by nodes", (1, 1, 0)))
         self.look(7)
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
+        self.assertEqual(self.warnings, [])
         document = glb.read(self.path)[0]
         uses = [node["mesh"] for node in document["nodes"] if node["name"] == "plant"]
         self.assertEqual((len(uses), len(set(uses))), (3, 1), "instances share their mesh")
@@ -430,7 +433,10 @@ class Pictures(Scene):
         self.assertEqual(self.scene.frame_current, 1)
         places = [glb.read(os.path.join(self.folder, f"shot.00{n}.glb"))[0]["nodes"][0]["translation"][0] for n in (2, 3)]
         numpy.testing.assert_allclose(places, (1, 2), atol=0.3)
-        self.assertEqual(export.main(["out.glb", "--frames", "1-2"]), 2)
+        for wrong in (["out.glb", "--frames", "1-2"], ["o.##.glb", "--frames", "2-1"], ["o.##.glb", "--frames", "two"]):
+            with self.assertRaises(SystemExit) as stopped, contextlib.redirect_stderr(io.StringIO()):
+                export.main(wrong)
+            self.assertEqual(stopped.exception.code, 2)
 
 
 del Scene  # the tests above have it; by itself it has none
