@@ -49,8 +49,10 @@ def warn_of_clipping(thing, flat, warn):
         if hit and not camera.clip_start <= depth <= camera.clip_end:
             found.setdefault(depth < camera.clip_start, body)
     for near, body in found.items():
-        what = f"before its clip start of {camera.clip_start:g}" if near else f"beyond its clip end of {camera.clip_end:g}"
-        warn(flat.where(thing), f"clipping is not carried: {flat.where(body)} is seen, also {what} m")
+        plane = f"before its clip start of {camera.clip_start:g} m"
+        if not near:
+            plane = f"beyond its clip end of {camera.clip_end:g} m"
+        warn(flat.where(thing), f"clipping is not carried: {flat.where(body)} is seen, also {plane}")
 
 
 def picture(scene, warn):

@@ -1,9 +1,9 @@
 """Turn a .blend into a .glb that caustique renders as Cycles would see it.
 
-    python3 scripts/blender/export.py IN.blend OUT.glb               with bpy from PyPI (4.5 on Python 3.11, 5.2 on 3.13)
+    python3 scripts/blender/export.py IN.blend OUT.glb              with bpy from PyPI (4.5 on Python 3.11, 5.2 on 3.13)
     blender -b IN.blend --python scripts/blender/export.py -- OUT.glb
-    ... OUT.####.glb --frames 1-24                                   a file for each frame
-    import export; export.write("OUT.glb")                           the scene that is open in bpy
+    ... OUT.####.glb --frames 1-24                                  a file for each frame
+    import export; export.write("OUT.glb")                          the scene that is open in bpy
 
 Blender's own glTF exporter writes the file, of a scene that `objects` has evaluated as a render would. Around it:
 
@@ -37,7 +37,7 @@ import world  # noqa: E402
 
 
 def write(path, scene=None):
-    """Export the open scene (or `scene`) at its current frame to the .glb at `path`; return the warnings, a list of strings.
+    """Export the open scene (or `scene`) at its current frame to the .glb at `path`; return the warnings, texts.
 
     They stand in the file, too, as the scene's `losses`. The scene is left as it was found.
     """
@@ -88,7 +88,7 @@ def write(path, scene=None):
 
 
 def write_frames(path, first, last):
-    """Export frames `first` to `last` of the open scene, one .glb each; `####` in `path` becomes the number of the frame."""
+    """Export frames `first` to `last` of the open scene, a .glb each; `####` in `path` becomes the frame's number."""
     scene, warnings = bpy.context.scene, []
     before = scene.frame_current, scene.frame_subframe
     try:

@@ -75,7 +75,8 @@ def hang(flat, undo, warn):
     """Until `undo` closes, make the lamps of a flat scene ready for the glTF exporter: area lamps become meshes."""
     for thing in [t for t in flat.things if t.type == "LIGHT"]:
         light, where = thing.data, flat.where(thing)
-        if light.type == "AREA" and light.cycles.is_portal:  # it gives no light: it tells Cycles where the sky is
+        if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
+            # It gives no light: it tells Cycles where the sky is.
             flat.remove(thing)
             continue
         _warn_of(thing, where, warn)
@@ -143,7 +144,7 @@ def _warn_of(thing, where, warn):
 
 
 def warn_of_soft_falloff(flat, warn):
-    """Names lamps whose soft falloff would show: it dims light within some radii of a point lamp, which here is a sphere."""
+    """Names lamps whose soft falloff would show: it dims light within some radii of a lamp, which here is a sphere."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     bodies = [thing for thing in flat.things if thing.type == "MESH"]
     for thing in flat.things:
@@ -153,8 +154,8 @@ def warn_of_soft_falloff(flat, warn):
         reach = _SOFT * light.shadow_soft_size
         near = next((body for body in bodies if _within(body, thing.matrix_world.translation, reach, depsgraph)), None)
         if near is not None:
-            warn(flat.where(thing), f"its soft falloff is not carried: {flat.where(near)} is within {reach:.3g} m of it "
-                 "and gets more light than in Cycles (where Soft Falloff off shows the same)")
+            warn(flat.where(thing), f"its soft falloff is not carried: {flat.where(near)} is within {reach:.3g} m of "
+                 "it and gets more light than in Cycles (where Soft Falloff off shows the same)")
 
 
 def _within(body, point, reach, depsgraph):

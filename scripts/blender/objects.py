@@ -15,7 +15,8 @@ _UNSEEN = {"EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
 _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
          "POINTCLOUD": "point clouds are not carried: convert them to meshes",
-         "GREASEPENCIL": "grease pencil is not carried: " + _PATHS, "GPENCIL": "grease pencil is not carried: " + _PATHS}
+         "GREASEPENCIL": "grease pencil is not carried: " + _PATHS,
+         "GPENCIL": "grease pencil is not carried: " + _PATHS}
 
 
 class Flat:
@@ -44,7 +45,8 @@ class Flat:
             concerned.add(instance.object.original)
             found.append(self._take(instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
-            place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()  # looked through, although it is not shown
+            # It is looked through, although it is not shown.
+            place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
             found.append((scene.camera, scene.camera.data, place, []))
         for taken in filter(None, found):
             self._put(*taken)
@@ -68,7 +70,7 @@ class Flat:
         return block
 
     def _take(self, instance, depsgraph):
-        """The object, data and place (world matrix) of an instance, and what does not see it; None of what is not seen."""
+        """The object, data and place (world matrix) of an instance, and what does not see it; None if nothing does."""
         thing = instance.object
         if not (instance.is_instance or instance.show_self) or thing.type in _UNSEEN or _is_pattern(instance):
             return None
@@ -93,8 +95,9 @@ class Flat:
         if key in self._meshes:
             return self._meshes[key]
         name = thing.original.data.name
-        if instance.is_instance and thing.type == "MESH" and instance.instance_object.original == instance.parent.original:
-            mesh = thing.data.copy()  # geometry that nodes have made; it is of no object
+        by_nodes = instance.is_instance and instance.instance_object.original == instance.parent.original
+        if by_nodes and thing.type == "MESH":
+            mesh = thing.data.copy()  # it is of no object
         else:
             mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
         self._undo.callback(bpy.data.meshes.remove, mesh)

@@ -68,7 +68,7 @@ def _light_from(scene, toward, angle):
 
 
 def baked(scene, path, width=1024):
-    """Renders the world alone with a panoramic Cycles camera to an .exr beside the .glb; the key `environment` of it."""
+    """Renders the world alone with a panoramic Cycles camera to an .exr beside the .glb; its key `environment`."""
     name = os.path.splitext(os.path.basename(path))[0] + ".environment.exr"
     with _stage(scene) as (stage, eye):
         # Looking along +X with +Z up puts the directions where an equirectangular texture expects them.

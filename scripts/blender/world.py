@@ -45,7 +45,8 @@ def extras(scene, path, warn):
 def _say_visibility(world, environment, where, warn):
     rays = {"camera": "camera", "diffuse": "diffuse", "glossy": "glossy", "transmission": "transmission",
             "scatter": "volume scatter"}
-    hidden = [name for name in rays if not getattr(world.cycles_visibility, name, True)]
+    shown = getattr(world, "cycles_visibility", None)
+    hidden = [name for name in rays if not getattr(shown, name, True)]
     if "camera" in hidden:
         environment["visible"] = {"camera": False}
         hidden.remove("camera")
@@ -82,7 +83,8 @@ def _turn(socket):
     rotation = constant(node.inputs["Rotation"])
     scale = constant(node.inputs["Scale"])
     shift = constant(node.inputs["Location"]) if "Location" in node.inputs else [0, 0, 0]
-    if rotation is None or scale != [1, 1, 1] or any(rotation[:2]) or (node.vector_type in {"POINT", "TEXTURE"} and shift != [0, 0, 0]):
+    moved = node.vector_type in {"POINT", "TEXTURE"} and shift != [0, 0, 0]
+    if rotation is None or scale != [1, 1, 1] or any(rotation[:2]) or moved:
         return None
     before = _turn(node.inputs["Vector"])
     # A point mapping turns the direction that looks the image up, so the image turns the other way.

@@ -1,0 +1,121 @@
+"""Lamps and skies as the exporter carries them. Beside Cycles."""
+
+import math
+import unittest
+
+import beside  # first: it finds the scripts
+import bpy
+import export
+import glb
+from beside import eye, lamp, shared, square
+
+
+class Lamps(beside.Beside):
+    def test_area_lamps_hide_and_let_light_through(self):
+        """A camera above an area lamp sees the floor below, which a sky lights past the lamp; and so does one below."""
+        self.floor()
+        lamp("AREA", (0, 0, 1), 20, size=2.0)
+        world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+        background.inputs["Color"].default_value = (1, 0.5, 0.2, 1)
+        self.scene.world = world
+        for at in ((0.3, 0.2, 3), (0.4, 2.0, 0.5)):
+            eye(at, (0, 0, 0), lens=40)
+            theirs = self.cycles()
+            self.alike(self.caustique(), theirs)
+            self.assertEqual(self.warnings, [])
+
+    def test_area_lamps_spread(self):
+        self.floor()
+        eye((0, -2.5, 2.5), (0, 0, 0), lens=35)
+        for degrees in (20, 60, 120):
+            body = lamp("AREA", (0.3, 0, 2), 100, size=0.5, spread=math.radians(degrees))
+            self.alike(self.caustique(), self.cycles())
+            self.assertEqual(self.warnings, [])
+            bpy.data.objects.remove(body)
+
+    def test_spots_have_blenders_edge_and_size(self):
+        self.floor()
+        for blend, radius in ((0.0, 0.0), (1.0, 0.0), (0.5, 0.2)):
+            body = lamp("SPOT", (0.3, 0, 2), 100, spot_size=1.2, spot_blend=blend, shadow_soft_size=radius)
+            screen = shared.place("screen", square(bpy.data.materials["grey"], 0.25), (0.5, 0, 1))
+            eye((0, -2.5, 2.5), (0.3, 0, 0), lens=45)
+            theirs = self.cycles()
+            ours = self.caustique()
+            self.alike(ours, theirs, parts=1)
+            for thing in (body, screen):
+                bpy.data.objects.remove(thing)
+
+    def test_lamps_of_all_colours(self):
+        """Blackbody nodes, temperatures, exposures and plain colours of points and suns."""
+        self.floor()
+        eye((0, -3, 3), (0, 0, 0), lens=35)
+        body = lamp("POINT", (0, 0, 2), 50, shadow_soft_size=0.1, use_soft_falloff=False)
+        light = body.data
+        if bpy.app.version < (5, 0, 0):
+            light.use_nodes = True
+        tree = light.node_tree
+        node = next((n for n in tree.nodes if n.type == "EMISSION"), None)
+        warm = tree.nodes.new("ShaderNodeBlackbody")
+        warm.inputs["Temperature"].default_value = 2700
+        tree.links.new(warm.outputs[0], node.inputs["Color"])
+        self.alike(self.caustique(), self.cycles(), parts=1)
+        self.assertEqual(self.warnings, [])
+        tree.links.remove(node.inputs["Color"].links[0])
+        light.use_temperature, light.temperature, light.exposure = True, 9000, 1.0
+        self.alike(self.caustique(), self.cycles(), parts=1)
+        bpy.data.objects.remove(body)
+        body = lamp("SUN", (0, 0, 2), 2.0, angle=0.3, color=(1, 0.5, 0.25))
+        body.rotation_euler = (0.5, 0.2, 0)
+        self.alike(self.caustique(), self.cycles(), parts=1)
+
+    def test_a_sun_in_the_sky_is_a_lamp(self):
+        self.floor()
+        world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        tree = world.node_tree
+        sky = tree.nodes.new("ShaderNodeTexSky")
+        if bpy.app.version < (5, 0, 0):
+            sky.sky_type = "NISHITA"
+        sky.sun_elevation, sky.sun_rotation, sky.sun_size = 0.6, 2.0, math.radians(2)
+        background = next(n for n in tree.nodes if n.type == "BACKGROUND")
+        background.inputs["Strength"].default_value = 0.3
+        tree.links.new(sky.outputs[0], background.inputs["Color"])
+        self.scene.world = world
+        shared.place("post", square(bpy.data.materials["grey"], 0.3), (0, 0, 0.5))
+        eye((0, -3, 3), (0, 0, 0), lens=45)
+        theirs = self.cycles()
+        self.alike(self.caustique(), theirs)
+        self.assertTrue(sky.sun_disc)
+        document = glb.read(self.path)[0]
+        node = next(node for node in document["nodes"] if node["name"] == "sky's sun")
+        self.assertAlmostEqual(node["extras"]["caustique"]["angle_deg"], 2, 4)
+
+    def test_losses_of_lamps_are_named(self):
+        self.floor()
+        eye((0, -3, 3), (0, 0, 0))
+        lamp("POINT", (0, 0, 0.5), 10, shadow_soft_size=0.2)
+        lamp("AREA", (1, 0, 1), 10).visible_glossy = False
+        spot = lamp("SPOT", (0, 1, 9), 10, shadow_soft_size=0.0)
+        spot.scale = (2, 1, 1)
+        if bpy.app.version < (5, 0, 0):
+            spot.data.use_nodes = True
+        tree = spot.data.node_tree
+        profile = tree.nodes.new("ShaderNodeTexIES")
+        node = next(n for n in tree.nodes if n.type == "EMISSION")
+        tree.links.new(profile.outputs[0], node.inputs["Strength"])
+        warnings = "\n".join(export.write(self.path))
+        for what in ('light "point": its soft falloff is not carried', 'light "area": it is hidden from glossy rays',
+                     'light "spot": a spot\'s uneven scale', 'its IES profile'):
+            self.assertIn(what, warnings)
+        lamp("AREA", (0, 0, 2), 1000).data.cycles.is_portal = True
+        export.write(self.path)
+        made = [material["name"] for material in glb.read(self.path)[0]["materials"]]
+        self.assertEqual(sum("area light" in name for name in made), 1, "portals are dark")
+
+
+if __name__ == "__main__":
+    unittest.main()

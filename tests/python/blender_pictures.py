@@ -1,0 +1,97 @@
+"""Cameras, pictures, what is hidden from cameras, frames, and losses that travel. Beside Cycles."""
+
+import contextlib
+import io
+import os
+import unittest
+
+import beside  # first: it finds the scripts
+import bpy
+import export
+import glb
+import numpy
+import support
+from beside import eye, glow, lamp, shared, square
+
+
+class Pictures(beside.Beside):
+    def test_shift_and_size(self):
+        """Lens shift of wide and tall, perspective and orthographic pictures, at the size of the scene."""
+        for x in range(-3, 4):
+            for y in range(-3, 4):
+                body = shared.place("tile", square(glow("tile", (0.5 + x / 8, 0.5 + y / 8, 0.5)), 0.4), (x, y, 0))
+                body.rotation_euler = (0, 0, 0.1 * x)
+        for kind, width, height in (("PERSP", 96, 48), ("PERSP", 48, 96), ("ORTHO", 96, 48)):
+            self.scene.render.resolution_x, self.scene.render.resolution_y = width, height
+            self.scene.render.resolution_percentage = 50
+            eye((0.3, 0.2, 5), (0.3, 0.2, 0), type=kind, lens=50, ortho_scale=4, shift_x=0.2, shift_y=-0.1)
+            ours, theirs = self.caustique(16), self.cycles(16)
+            self.assertEqual(ours.shape, (height // 2, width // 2, 3))
+            self.silhouettes_agree(ours, theirs)
+
+    def test_the_picture_is_told(self):
+        self.floor()
+        eye((0, -3, 3), (0, 0, 0), clip_start=1.0, clip_end=4.0)
+        scene = self.scene
+        scene.render.use_border, scene.render.border_min_x, scene.render.border_max_y = True, 0.25, 0.5
+        scene.render.film_transparent, scene.cycles.film_exposure = True, 4.0
+        scene.view_settings.view_transform, scene.view_settings.exposure = "Standard", -1.0
+        warnings = "\n".join(export.write(self.path))
+        said = glb.read(self.path)[0]["scenes"][0]["extras"]["caustique"]
+        self.assertEqual(said["resolution"], [32, 32])
+        numpy.testing.assert_allclose(said["crop"], (0.25, 0.5, 0.75, 0.5), atol=1e-6)
+        self.assertEqual((said["exposure"], said["tonemap"], said["film_transparent"]), (1.0, "srgb", True))
+        self.assertIn('object "floor" is seen, also beyond its clip end of 4 m', warnings)
+        self.assertNotIn("clip start", warnings)
+        self.assertIn("film exposure of 4", warnings)
+
+    def test_losses_travel(self):
+        """What the exporter names is repeated by info, plan, render and the picture, and --strict stops at it."""
+        self.floor().visible_shadow = False
+        lamp("POINT", (0, 0, 2), 10, shadow_soft_size=0.0)
+        eye((0, -3, 3), (0, 0, 0))
+        lost = export.write(self.path)
+        self.assertEqual(len(lost), 1)
+        self.assertIn("hidden from shadow rays", lost[0])
+        out = os.path.join(self.folder, "out.exr")
+        for command in (["info", self.path], ["plan", self.path], ["render", self.path, "-o", out, "--iterations", 1],
+                        ["info", out]):
+            done = support.run(command, check=0)
+            self.assertIn(lost[0], done.stdout + done.stderr, command)
+        done = support.run(["render", self.path, "-o", out, "--iterations", 1, "--strict"], check=1)
+        self.assertIn(lost[0], done.stderr)
+
+    def test_objects_hidden_from_cameras(self):
+        """They light the scene and cast shadows, and cameras look through them; so do what is indirect only."""
+        self.floor()
+        shared.place("shown", square(glow("white", (3, 3, 3)), 0.5), (1.2, 0, 0.6))
+        hidden = shared.place("hidden", square(glow("red", (9, 1, 1)), 0.5), (-0.5, 0, 0.6))
+        hidden.visible_camera = False
+        collection = bpy.data.collections.new("indirect")
+        self.scene.collection.children.link(collection)
+        body = bpy.data.objects.new("indirect", square(glow("blue", (1, 1, 9)), 0.4))
+        collection.objects.link(body)
+        body.location = (0, 1, 0.8)
+        bpy.context.view_layer.layer_collection.children["indirect"].indirect_only = True
+        eye((0, 0, 4), (0, 0, 0), lens=40)
+        self.alike(self.caustique(256), self.cycles(512))
+        self.assertEqual(self.warnings, [])
+
+    def test_frames(self):
+        body = self.floor()
+        for frame, x in ((1, 0.0), (3, 2.0)):
+            body.location.x = x
+            body.keyframe_insert("location", frame=frame)
+        self.scene.frame_set(1)
+        export.write_frames(os.path.join(self.folder, "shot.###.glb"), 2, 3)
+        self.assertEqual(self.scene.frame_current, 1)
+        files = [glb.read(os.path.join(self.folder, f"shot.00{frame}.glb"))[0] for frame in (2, 3)]
+        numpy.testing.assert_allclose([f["nodes"][0]["translation"][0] for f in files], (1, 2), atol=0.3)
+        for wrong in (["out.glb", "--frames", "1-2"], ["o.##.glb", "--frames", "2-1"], ["o.##.glb", "--frames", "two"]):
+            with self.assertRaises(SystemExit) as stopped, contextlib.redirect_stderr(io.StringIO()):
+                export.main(wrong)
+            self.assertEqual(stopped.exception.code, 2)
+
+
+if __name__ == "__main__":
+    unittest.main()
