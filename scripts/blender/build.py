@@ -364,6 +364,7 @@ def point(name, at, watts, color=(1, 1, 1), radius=0.01):
     """A lamp that gives off `watts` all round."""
     body = _lamp(name, "POINT", color, watts)
     body.location, body.data.shadow_soft_size = at, radius
+    body.data.use_soft_falloff = False  # a sphere that glows, to Cycles as to us
     return body
 
 

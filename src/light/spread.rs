@@ -19,8 +19,8 @@ pub struct Spread {
 impl Spread {
     /// The same radiance in all directions.
     pub const LAMBERTIAN: Spread = Spread { tan: f32::INFINITY, scale: 0.0, sin2: 1.0 };
-    /// Half angles below this (rad) are taken for it: the tangent less the angle would have no digits left.
-    const LEAST: f32 = 1e-3;
+    /// Half angles below this (rad) are taken for it, as in Cycles: cosines of less have few digits left.
+    const LEAST: f32 = 0.5 * std::f32::consts::PI / 180.0;
 
     /// Into a cone of this half angle (rad); a right angle and more is Lambertian.
     pub fn new(half: f32) -> Spread {
@@ -73,7 +73,7 @@ mod tests {
     /// Flux by the closed form and by the samples' weights is that of a Lambertian emitter, whatever the angle.
     #[test]
     fn all_flux_leaves() {
-        for degrees in [0.2f32, 1.0, 10.0, 60.0, 89.0, 90.0] {
+        for degrees in [0.1f32, 0.5, 1.0, 10.0, 60.0, 89.0, 90.0] {
             let spread = Spread::new(degrees.to_radians());
             let (n, mut mean) = (400, 0.0);
             for i in 0..n * n {

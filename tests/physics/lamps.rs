@@ -202,16 +202,17 @@ fn cameras_see_no_hidden_light_from_infinity() {
 /// tan h / (tan h - h) on the axis, h the half angle.
 #[test]
 fn spreads_keep_the_flux() {
-    let (half, side, near) = (30f64.to_radians(), 0.04f32, 0.3);
+    let (half, near) = (30f64.to_radians(), 0.3);
+    // The view is as large as the lamp.
+    let side = (2.0 * near * 4f64.to_radians().tan()) as f32;
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
     let lamp = quad(Vec3::new(-0.5 * side, 1.0, -0.5 * side), Vec3::X * side, Vec3::Z * side);
     add(&mut description, "lamp", lamp, Material { spread: half as f32, ..matte(0.0, 1000.0) });
     description.cameras.push(look_at(DVec3::new(0.0, near, 0.0), DVec3::ZERO, 8.0));
     let on_axis = 0.5 / PI * 1000.0 * f64::from(side).powi(2) * half.tan() / (half.tan() - half);
-    // Points of the view are 0.765 of its half side from its middle on average, and radiance falls with the tangent.
-    let view = near * 4f64.to_radians().tan();
-    let expected = on_axis * (1.0 - 0.765 * view / half.tan());
+    // Two points of a square are 0.5214 of its side apart on average, and radiance falls with the tangent.
+    let expected = on_axis * (1.0 - 0.5214 * f64::from(side) / half.tan());
     check("spread", &build(description), expected, 6e-3, 0.05);
 }
 
