@@ -106,9 +106,10 @@ def _numbered(path, frame):
 
 def _look_at(scene, undo):
     """Until `undo` closes, makes `scene` the one that is open."""
-    window, before = bpy.context.window, bpy.context.window.scene
-    if before != scene:
-        undo.callback(setattr, window, "scene", before)
+    window = bpy.context.window
+    if window.scene != scene:
+        undo.callback(setattr, window, "view_layer", window.view_layer)  # last, for a scene comes with its first
+        undo.callback(setattr, window, "scene", window.scene)
         window.scene = scene
 
 

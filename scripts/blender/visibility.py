@@ -60,12 +60,13 @@ def as_rendered(scene, undo, warn):
 
 
 def _layer(scene, warn):
-    """The view layer that is rendered: the first that is switched on."""
+    """The view layer that is rendered: of those that are switched on the current one, else the first."""
     rendered = [layer for layer in scene.view_layers if layer.use] or [scene.view_layers[0]]
-    if len(rendered) > 1:
-        rest = ", ".join(f'"{layer.name}"' for layer in rendered[1:])
-        warn(f'scene "{scene.name}"', f'of its view layers only "{rendered[0].name}" is exported, not {rest}')
-    layer = rendered[0]
+    current = bpy.context.window.view_layer
+    layer = current if current in rendered else rendered[0]
+    rest = ", ".join(f'"{other.name}"' for other in rendered if other != layer)
+    if rest:
+        warn(f'scene "{scene.name}"', f'of its view layers only "{layer.name}" is exported, not {rest}')
     if layer.material_override is not None:
         warn(f'view layer "{layer.name}"', "its material override is not carried: objects keep their own materials")
     return layer

@@ -77,6 +77,20 @@ class Pictures(beside.Beside):
         self.alike(self.caustique(256), self.cycles(512))
         self.assertEqual(self.warnings, [])
 
+    def test_view_layers(self):
+        """The current one of those that are rendered is exported, and the others are named."""
+        self.floor()
+        for name in ("second", "third"):
+            self.scene.view_layers.new(name)
+        bpy.context.window.view_layer = self.scene.view_layers["second"]
+        self.scene.view_layers["third"].use = False
+        first = self.scene.view_layers[0]
+        said = 'scene "Scene": of its view layers only "{}" is exported, not "{}"'
+        self.assertEqual(export.write(self.path), [said.format("second", first.name)])
+        self.scene.view_layers["second"].use = False
+        self.assertEqual(export.write(self.path), [])
+        self.assertEqual(bpy.context.window.view_layer.name, "second")
+
     def test_frames(self):
         body = self.floor()
         for frame, x in ((1, 0.0), (3, 2.0)):
