@@ -68,7 +68,7 @@ def write(path, scene=None):
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.hang(flat, undo, warn)
         if sun is not None:
-            sky.hang(sun, flat, undo)
+            sky.hang(sun, flat, undo, ["camera"] if "visible" in said["environment"] else [])
         bodies = _bodies(flat.things)
         bpy.context.view_layer.update()
         _run_exporter(path)

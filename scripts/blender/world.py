@@ -36,7 +36,7 @@ def extras(scene, path, warn):
             disc = sky.sun(scene, undo, where, warn)
             said["environment"] = sky.baked(scene, path)
         warn(where, f"its nodes are baked to {said['environment']['file']}")
-        if any(node.type == "LIGHT_PATH" for node in output.id_data.nodes):
+        if any(n.type == "LIGHT_PATH" and any(s.is_linked for s in n.outputs) for n in output.id_data.nodes):
             warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too")
     _say_visibility(world, said["environment"], where, warn)
     return said, disc

@@ -169,6 +169,26 @@ class Geometry(beside.Beside):
         self.look(5)
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
 
+    def test_losses_are_named(self):
+        """Hair, holdouts, light linking, and what nodes do in the viewport alone."""
+        hair = bpy.data.hair_curves.new("hair")
+        hair.add_curves([4])
+        self.put("hair", 0, 0, None, hair)
+        linked = self.put("linked", 1, 0, (1, 0, 0))
+        linked.light_linking.receiver_collection = self.collection("receivers")
+        self.put("out", 2, 0, (1, 0, 0)).is_holdout = True
+        nodes = self.put("nodes", 3, 0, (0, 0, 0))
+        self.instance_on_points(nodes, None, glow("made by nodes", (1, 1, 0)))
+        nodes.modifiers[0].node_group.nodes.new("GeometryNodeIsViewport")
+        gone = self.put("hidden hair", 4, 0, None, hair)
+        gone.hide_render = True
+        self.look(6)
+        warnings = export.write(self.path)
+        self.assertEqual(len(warnings), 4, warnings)
+        for what, said in zip(('"hair": hair curves are', '"linked": light linking', '"nodes": its modifier "nodes" has an '
+                               'Is Viewport node', '"out": it is a holdout'), sorted(warnings)):
+            self.assertIn("object " + what, said)
+
     def test_nothing_is_left_behind(self):
         self.test_instances()
         blocks = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "scenes", "materials", "lights",

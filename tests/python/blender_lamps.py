@@ -94,6 +94,28 @@ class Lamps(beside.Beside):
         node = next(node for node in document["nodes"] if node["name"] == "sky's sun")
         self.assertAlmostEqual(node["extras"]["caustique"]["angle_deg"], 2, 4)
 
+    def test_a_world_hidden_from_cameras(self):
+        """It lights the floor, and black is seen in its place; what else is hidden from it is named."""
+        self.floor(1.0)
+        world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+        background.inputs["Color"].default_value = (1, 0.5, 0.2, 1)
+        self.scene.world = world
+        world.cycles_visibility.camera = False
+        eye((0, -3, 3), (0, 0, 0), lens=45)
+        self.alike(self.caustique(), self.cycles())
+        self.assertEqual(self.warnings, [])
+        world.cycles_visibility.glossy = False
+        self.assertIn("hidden from glossy rays", export.write(self.path)[0])
+        paths, mix = (world.node_tree.nodes.new("ShaderNode" + kind) for kind in ("LightPath", "MixShader"))
+        output = next(n for n in world.node_tree.nodes if n.type == "OUTPUT_WORLD")
+        for socket, end in ((paths.outputs["Is Camera Ray"], mix.inputs[0]), (background.outputs[0], mix.inputs[2]),
+                            (mix.outputs[0], output.inputs["Surface"])):
+            world.node_tree.links.new(socket, end)
+        self.assertIn("Light Path node", "\n".join(export.write(self.path)))
+
     def test_losses_of_lamps_are_named(self):
         self.floor()
         eye((0, -3, 3), (0, 0, 0))
