@@ -123,7 +123,7 @@ impl Watch for Telling<'_> {
             say(&format!("method: {why}"));
         }
         self.reporter = Some(Reporter::new(self.args.progress, settings));
-        self.preview = Preview::of(self.args);
+        self.preview = Preview::of(self.args, self.made_for);
         tell_plan(&self.args.job.scene.path, &plan.warnings);
     }
 

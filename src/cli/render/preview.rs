@@ -7,6 +7,7 @@ use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, Attributes, Compression};
 use caustique::image::png;
 use caustique::render::Clock;
+use caustique::scene::description::Picture;
 use serde::Serialize;
 use std::net::TcpStream;
 use std::path::PathBuf;
@@ -68,6 +69,8 @@ impl Target {
 pub struct Preview<'a> {
     args: &'a RenderArgs,
     target: &'a Target,
+    /// The picture that the scene was made for.
+    made_for: Picture,
     clock: Clock,
     /// When the next picture is due, and since when the current one is made (seconds).
     next: f64,
@@ -79,9 +82,9 @@ pub struct Preview<'a> {
 
 impl<'a> Preview<'a> {
     /// Of a render that asks for one.
-    pub fn of(args: &'a RenderArgs) -> Option<Preview<'a>> {
+    pub fn of(args: &'a RenderArgs, made_for: Picture) -> Option<Preview<'a>> {
         let target = args.preview.as_ref()?;
-        Some(Preview { args, target, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false })
+        Some(Preview { args, target, made_for, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false })
     }
 
     /// Whether a picture is due.
@@ -103,8 +106,7 @@ impl<'a> Preview<'a> {
     fn write(&mut self, set: &LayerSet) -> Result<()> {
         match self.target {
             Target::Png(path) => {
-                let picture = &self.args.picture;
-                let (exposure, curve) = (picture.exposure as f32, picture.tonemap.into());
+                let (exposure, curve) = self.args.picture.look(&self.made_for);
                 png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, curve)
             }
             Target::Exr(path) => {
