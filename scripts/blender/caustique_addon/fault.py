@@ -1,0 +1,24 @@
+"""What goes wrong, in the words that Blender shows."""
+
+
+class Fault(Exception):
+    """A fault that the user can do something about: what it is, and the remedy."""
+
+    def __init__(self, what, remedy=""):
+        self.what, self.remedy = what, remedy
+        super().__init__(f"{what}. Remedy: {remedy}" if remedy else what)
+
+
+class Cancelled(Exception):
+    """The user has stopped the work."""
+
+
+def of_program(lines, code):
+    """The Fault that the program tells of: its lines on stderr (what, then `hint: ` and the remedy), its exit code."""
+    what, remedy = [], []
+    for line in lines:
+        (remedy if line.startswith("hint: ") or remedy else what).append(line)
+    if not what:
+        ended = f"by signal {-code}" if code < 0 else f"with code {code}"
+        return Fault(f"caustique ended {ended} and said nothing", "report it with the scene")
+    return Fault("; ".join(what), " ".join(remedy).replace("hint: ", "", 1))
