@@ -80,8 +80,8 @@ def _run_exporter(path):
     bpy.ops.export_scene.gltf(
         filepath=path, export_format="GLB", export_import_convert_lighting_mode="SPEC", export_yup=True,
         export_apply=True, export_cameras=True, export_lights=True, export_extras=True, use_renderable=True,
-        use_active_scene=True, export_current_frame=True, export_animations=False, export_skins=False, export_morph=False,
-        export_tangents=False, export_image_format="AUTO")
+        use_active_scene=True, export_current_frame=True, export_animations=False, export_skins=False,
+        export_morph=False, export_tangents=False, export_image_format="AUTO")
 
 
 def _render_level(thing, undo, warn):

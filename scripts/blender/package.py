@@ -5,6 +5,7 @@
 The zip holds one folder: the add-on, the exporter that it runs in a Blender of its own, and the licences.
 """
 
+import modulefinder
 import os
 import sys
 import zipfile
@@ -12,23 +13,25 @@ import zipfile
 _HERE = os.path.dirname(os.path.abspath(__file__))
 _ROOT = os.path.dirname(os.path.dirname(_HERE))
 _NAME = "caustique"
-#: Scripts beside the exporter that it does not import.
-_NOT_EXPORTER = {"build.py", "package.py"}
 _DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can name: the same files give the same zip
 
 
 def contents():
     """What the zip holds: names in it, and the files they come from."""
-    files = {}
-    for folder, names, inside in (
-        (os.path.join(_HERE, "caustique_addon"), None, ""),
-        (_HERE, None, "exporter"),
-        (_ROOT, ("LICENSE-MIT", "LICENSE-APACHE"), ""),
-    ):
-        for name in sorted(names or os.listdir(folder)):
-            if names or name.endswith((".py", ".toml")) and name not in _NOT_EXPORTER:
-                files["/".join(filter(None, (_NAME, inside, name)))] = os.path.join(folder, name)
-    return files
+    addon = os.path.join(_HERE, "caustique_addon")
+    files = {name: os.path.join(addon, name) for name in os.listdir(addon) if name.endswith((".py", ".toml"))}
+    files.update((f"exporter/{os.path.basename(source)}", source) for source in _exporter())
+    files.update((name, os.path.join(_ROOT, name)) for name in ("LICENSE-MIT", "LICENSE-APACHE"))
+    return {f"{_NAME}/{name}": files[name] for name in sorted(files)}
+
+
+def _exporter():
+    """export.py and the scripts beside it that it imports, whether at once or later."""
+    script = os.path.join(_HERE, "export.py")
+    finder = modulefinder.ModuleFinder([_HERE])
+    finder.run_script(script)
+    beside = (found.__file__ for found in finder.modules.values())
+    return {script, *(source for source in beside if source is not None)}  # modules of Python itself have no file
 
 
 def build(path):

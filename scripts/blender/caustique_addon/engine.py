@@ -115,7 +115,7 @@ class Engine(bpy.types.RenderEngine):
         """Hand the finished picture and its passes to Blender."""
         with self._result(layer, part) as result:
             black = passes.fill(result.layers[0], picture, part)
-            passes.stamp(result, picture, layer)
+        passes.stamp(self.get_result(), picture, layer)
         if black:
             self._warn(scene, [f"{', '.join(black)}: this method does not make these passes, and they are black: choose "
                                "another method, or switch them off"])
