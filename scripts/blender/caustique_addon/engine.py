@@ -57,8 +57,8 @@ class Engine(bpy.types.RenderEngine):
         self.update_stats("", "Exporting")
         frame = scene.frame_current + scene.frame_subframe
         job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)
-        self._warn(scene, handoff.in_main_thread(job.copy, self.test_break))
-        self._warn(scene, job.run(self.test_break))
+        self._warn(scene, handoff.in_main_thread(job.copy, self._stopped))
+        self._warn(scene, job.run(self._stopped))
 
         output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
         words = [path, "render", handoff.GLB, "-o", output, "--exr-naming", "blender", "--compression", "none",
@@ -79,12 +79,16 @@ class Engine(bpy.types.RenderEngine):
             raise Cancelled()
         self._deliver(exr.Picture(output), scene, view_layer.name, part)
 
+    def _stopped(self):
+        """Whether the user has pressed Esc."""
+        return self.test_break()
+
     def _watch(self, work, preview, layer, part):
         """Show how far the program is, and its picture so far, until it ends."""
         self.update_stats("", "Rendering")
         shown = None
         while work.working():
-            if self.test_break():
+            if self._stopped():
                 self.update_stats("", "Stopping after this iteration")
                 work.stop()
             elif work.progress is not None:

@@ -27,14 +27,14 @@ class Run:
         self._listener.start()
 
     def _listen(self):
-        for line in self._process.stderr:
-            line = line.rstrip()
-            if line.startswith("{"):
-                self._heard(json.loads(line))
-            elif line.startswith("warning: "):
-                self.warnings.append(line[len("warning: "):])
-            elif line:
-                self._rest.append(line)
+        with self._process.stderr as told:
+            for line in map(str.rstrip, told):
+                if line.startswith("{"):
+                    self._heard(json.loads(line))
+                elif line.startswith("warning: "):
+                    self.warnings.append(line[len("warning: "):])
+                elif line:
+                    self._rest.append(line)
 
     def _heard(self, progress):
         before = self.progress["seconds"] if self.progress else 0.0
@@ -59,11 +59,12 @@ class Run:
         """End it at once, if it still runs."""
         self._process.kill()
         self._process.wait()
+        self._listener.join()
 
     def finish(self):
         """Raise a Fault if it has failed."""
         code = self._process.wait()
-        self._listener.join()
+        self._listener.join()  # it may not have heard the last words yet
         if code not in (0, _INTERRUPTED):
             raise fault.of_program(self._rest, code)
 
