@@ -36,21 +36,21 @@ class Engine(bpy.types.RenderEngine):
 
     def render(self, depsgraph):
         """Render one view layer of one frame."""
-        scene = depsgraph.scene
-        session.warnings[scene.name] = []
         folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
         try:
             self._render(depsgraph, folder)
         except Cancelled:
             pass
         except Fault as fault:
-            self.report({"ERROR"}, str(fault))
-            self.error_set(str(fault))
+            self.report({"ERROR"}, str(fault))  # which ends an animation, too; `error_set` would not
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
     def _render(self, depsgraph, folder):
         scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+        part = _part(scene.render, self.resolution_x, self.resolution_y)
+        with self._result(view_layer.name, part):
+            pass  # black: Blender crashes where it writes a picture that nobody has begun
         chosen = preferences.get(bpy.context)
         path = program.find(chosen.program)
         self._warn(scene, limits.ignored(scene))
@@ -67,7 +67,6 @@ class Engine(bpy.types.RenderEngine):
                  *command.method(scene.caustique_render)]
         if _PREVIEW in program.options(path):
             words += [_PREVIEW, preview]
-        part = _part(scene.render, self.resolution_x, self.resolution_y)
         work = run.Run(words, folder)
         try:
             self._watch(work, preview, view_layer.name, part)
@@ -85,15 +84,19 @@ class Engine(bpy.types.RenderEngine):
 
     def _watch(self, work, preview, layer, part):
         """Show how far the program is, and its picture so far, until it ends."""
-        self.update_stats("", "Rendering")
-        shown = None
+        said, shown = None, None
         while work.working():
             if self._stopped():
-                self.update_stats("", "Stopping after this iteration")
                 work.stop()
-            elif work.progress is not None:
+                text = "Stopping after this iteration"
+            elif work.progress is None:
+                text = "Rendering the first iteration"
+            else:
+                text = run.sentence(work.progress)
                 self.update_progress(run.fraction(work.progress))
-                self.update_stats("", run.sentence(work.progress))
+            if text != said:
+                said = text
+                self.update_stats("", text)
             written = os.stat(preview).st_mtime_ns if os.path.isfile(preview) else None
             if written != shown:
                 shown = written
@@ -125,9 +128,11 @@ class Engine(bpy.types.RenderEngine):
                                "another method, or switch them off"])
 
     def _warn(self, scene, lines):
+        known = session.warnings.setdefault(scene.name, [])
         for line in lines:
-            session.warnings[scene.name].append(line)
-            self.report({"WARNING"}, line)
+            if line not in known:  # frames and view layers share most of them
+                known.append(line)
+                self.report({"WARNING"}, line)
 
 
 def _part(render, width, height):
@@ -141,12 +146,20 @@ def _part(render, width, height):
     return left, height - top, right - left, top - bottom
 
 
+@bpy.app.handlers.persistent
+def _forget(scene, *_):
+    """Warnings are those of the last render, which may be of many frames."""
+    session.warnings.pop(scene.name, None)
+
+
 def register():
     """Offer the engine."""
     bpy.utils.register_class(Engine)
+    bpy.app.handlers.render_init.append(_forget)
 
 
 def unregister():
     """Withdraw it, and forget what it has said."""
+    bpy.app.handlers.render_init.remove(_forget)
     bpy.utils.unregister_class(Engine)
     session.clear()

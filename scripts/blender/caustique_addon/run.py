@@ -82,6 +82,8 @@ def fraction(progress):
 
 def sentence(progress):
     """A line of progress in words."""
+    if progress["iteration"] == progress["iterations"]:
+        return "Finishing"
     text = f"Iteration {progress['iteration']}"
     if progress["iterations"]:
         text += f" of {progress['iterations']}"
