@@ -91,7 +91,7 @@ class Diagnose(bpy.types.Operator):
             return {"CANCELLED"}
         session.plans[context.scene.name] = self._plan
         if self._plan.fault is not None:
-            self.report({"ERROR"}, str(self._plan.fault))
+            self.report({"ERROR"}, self._plan.fault.message())
             return {"CANCELLED"}
         if self.select:
             _select(context, asking.named(context.scene, self._plan.warnings))

@@ -42,7 +42,8 @@ class Engine(bpy.types.RenderEngine):
         except Cancelled:
             pass
         except Fault as fault:
-            self.report({"ERROR"}, str(fault))  # which ends an animation, too; `error_set` would not
+            session.faults[depsgraph.scene.name] = fault
+            self.report({"ERROR"}, fault.message())  # which ends an animation, too; `error_set` would not
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -148,8 +149,9 @@ def _part(render, width, height):
 
 @bpy.app.handlers.persistent
 def _forget(scene, *_):
-    """Warnings are those of the last render, which may be of many frames."""
+    """What is shown is of the last render, which may be of many frames."""
     session.warnings.pop(scene.name, None)
+    session.faults.pop(scene.name, None)
 
 
 def register():

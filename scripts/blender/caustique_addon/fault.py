@@ -1,12 +1,20 @@
 """What goes wrong, in the words that Blender shows."""
 
+import textwrap
+
+_WIDTH = 100  # letters of a line of Blender's messages, which do not wrap by themselves
+
 
 class Fault(Exception):
     """A fault that the user can do something about: what it is, and the remedy."""
 
     def __init__(self, what, remedy=""):
         self.what, self.remedy = what, remedy
-        super().__init__(f"{what}. Remedy: {remedy}" if remedy else what)
+        super().__init__(f"{what}\nRemedy: {remedy}" if remedy else what)
+
+    def message(self):
+        """The text with lines short enough for a message of Blender's."""
+        return "\n".join(textwrap.fill(line, _WIDTH) for line in str(self).splitlines())
 
 
 class Cancelled(Exception):

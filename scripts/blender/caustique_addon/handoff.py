@@ -18,6 +18,7 @@ from .fault import Cancelled, Fault
 
 GLB = "scene.glb"
 _HERE = os.path.dirname(os.path.abspath(__file__))
+_OLDEST = (4, 2, 0)  # the first Blender whose materials and glTF exporter hold what export.py reads
 _PAUSE = 0.02  # seconds between two looks at the other Blender
 
 
@@ -26,6 +27,10 @@ class Job:
 
     def __init__(self, scene, view_layer, frame, folder, blender):
         """Of `scene` at `frame` (a float), into the empty `folder`; `blender` is another program to export with, or ""."""
+        if not blender and bpy.app.version < _OLDEST:
+            raise Fault(f"Blender {bpy.app.version_string} cannot export what caustique needs",
+                        "choose in the add-on's preferences, as Exporter, a Blender of 4.2 or newer, or the Python of a "
+                        "virtual environment in which 'pip install bpy' has been run")
         self.folder = folder
         self._blender = os.path.expanduser(blender)
         self._blend = os.path.join(folder, "scene.blend")

@@ -14,3 +14,11 @@ def draw(layout, context, text, icon="NONE"):
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, room) or [""]):
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
+
+
+def draw_fault(layout, context, fault):
+    """Write what is wrong, and below it the remedy."""
+    box = layout.box()
+    draw(box, context, fault.what, "ERROR")
+    if fault.remedy:
+        draw(box, context, fault.remedy, "TOOL_SETTINGS")

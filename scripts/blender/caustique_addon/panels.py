@@ -121,8 +121,7 @@ class DiagnosisPanel(_Panel, bpy.types.Panel):
         if plan is None:
             return
         if plan.fault is not None:
-            lines.draw(layout, context, plan.fault.what, "ERROR")
-            lines.draw(layout, context, plan.fault.remedy, "TOOL_SETTINGS")
+            lines.draw_fault(layout, context, plan.fault)
             return
         lines.draw(layout, context, plan.headline, "INFO")
         for reason in asking.reasons(plan.said):
@@ -131,17 +130,21 @@ class DiagnosisPanel(_Panel, bpy.types.Panel):
 
 
 class MessagesPanel(_Panel, bpy.types.Panel):
-    """What the last render has warned of."""
+    """What the last render has warned of, and the fault it has ended with."""
 
     bl_idname = "CAUSTIQUE_PT_messages"
-    bl_label = "Warnings of the Last Render"
+    bl_label = "Messages of the Last Render"
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and bool(session.warnings.get(context.scene.name))
+        name = context.scene.name
+        return super().poll(context) and (name in session.faults or bool(session.warnings.get(name)))
 
     def draw(self, context):
-        _messages(self.layout, context, session.warnings[context.scene.name])
+        name = context.scene.name
+        if name in session.faults:
+            lines.draw_fault(self.layout, context, session.faults[name])
+        _messages(self.layout, context, session.warnings.get(name, []))
 
 
 def _messages(layout, context, messages):

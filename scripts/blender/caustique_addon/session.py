@@ -3,6 +3,9 @@
 #: Lines that the last render of each scene has warned of, by the scene's name.
 warnings = {}
 
+#: The fault that the last render of each scene has ended with, by the scene's name.
+faults = {}
+
 #: The last plan of each scene, as `diagnosis` leaves it, by the scene's name.
 plans = {}
 
@@ -10,4 +13,5 @@ plans = {}
 def clear():
     """Forget all."""
     warnings.clear()
+    faults.clear()
     plans.clear()
