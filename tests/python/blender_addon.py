@@ -265,6 +265,23 @@ class Renders(Installed):
         self.assertIn("Shot.CryptoObject", said)
         self.assertIn('"ball":', said)
 
+    def test_the_picture_so_far_is_shown(self):
+        self.stage()
+        self.settings.iterations = 60
+        engine, shown = part_of_addon("engine"), []
+        show = engine.Engine._show
+
+        def watched(self, picture, *where):
+            shown.append({name: plane.copy() for name, plane in picture.channels.items()})
+            show(self, picture, *where)
+
+        # The finished picture is withheld, so what Blender has is the last one before it.
+        with mock.patch.multiple(engine.Engine, _show=watched, _deliver=lambda *_: None):
+            found = self.render()
+        for channel in "RGBA":
+            self.assertEqual(found[f"Combined.{channel}"].tobytes(), shown[-1][channel].tobytes())
+        numpy.testing.assert_allclose(shown[0]["G"].mean(), self.by_hand()["Combined.G"].mean(), rtol=0.2)
+
     def test_nothing_is_left_in_the_temporary_folder(self):
         self.stage()
         self.render()

@@ -60,7 +60,6 @@ class EffectsPanel(_Panel, bpy.types.Panel):
 
     bl_idname = "CAUSTIQUE_PT_effects"
     bl_label = "Effects"
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         layout, settings = self.layout, context.scene.caustique_render
@@ -207,7 +206,7 @@ class LightPanel(_Panel, bpy.types.Panel):
                 column.prop(light, name)
 
 
-_KINDS = (MethodPanel, StopPanel, FinishPanel, EffectsPanel, DiagnosisPanel, MessagesPanel, PassesPanel, LightPanel)
+_KINDS = (MethodPanel, StopPanel, FinishPanel, DiagnosisPanel, MessagesPanel, EffectsPanel, PassesPanel, LightPanel)
 
 
 def register():
