@@ -10,7 +10,7 @@ import os
 import sys
 import zipfile
 
-_HERE = os.path.dirname(os.path.abspath(__file__))
+_HERE = os.path.dirname(os.path.realpath(__file__))
 _ROOT = os.path.dirname(os.path.dirname(_HERE))
 _NAME = "caustique"
 _DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can name: the same files give the same zip

@@ -15,7 +15,7 @@ import traceback
 import bpy
 
 _WIDE = 0.6  # of the big area, what the picture keeps beside the panels
-_PATIENCE = 60  # seconds for a render to begin or to end
+_PATIENCE = 120  # seconds for a picture to improve, or a render to end
 
 
 def install(archive):
@@ -93,6 +93,7 @@ def story(archive, folder):
     name, preferences = install(archive)
     stage()
     scene, session = bpy.context.scene, sys.modules[f"{name}.session"]
+    shown = count(sys.modules[f"{name}.engine"].Engine)
     left, panels = split(window)
     yield 1
     panels.spaces.active.context = "RENDER"
@@ -100,15 +101,13 @@ def story(archive, folder):
     left.type = "IMAGE_EDITOR"
     render(window)
     left.spaces.active.image = bpy.data.images["Render Result"]
-    for shot, wait in (("improves-1", 8), ("improves-2", 12)):
-        yield wait
-        take(window, folder, shot)
+    for number in (1, 4):
+        yield from wait(lambda: len(shown) >= number, "the picture does not improve")
+        yield 0.5
+        take(window, folder, f"improves-{number}")
     press_escape()
     pressed = time.monotonic()
-    while bpy.app.is_job_running("RENDER"):
-        if time.monotonic() - pressed > _PATIENCE:
-            raise RuntimeError("Esc does not stop the render")
-        yield 0.2
+    yield from wait(lambda: not bpy.app.is_job_running("RENDER"), "Esc does not stop the render")
     print(f"stopped {time.monotonic() - pressed:.1f} s after Esc")
     yield 1
     take(window, folder, "stopped")
@@ -120,8 +119,11 @@ def story(archive, folder):
     scene.caustique_render.iterations = 64
     with bpy.context.temp_override(window=window):
         bpy.ops.caustique.diagnose()
-    yield 2
+    yield 10  # EEVEE compiles shaders
     take(window, folder, "diagnosis")
+    scroll(window, panels)
+    yield 1
+    take(window, folder, "effects")
     panels.spaces.active.context = "VIEW_LAYER"
     yield 1
     take(window, folder, "passes")
@@ -133,6 +135,27 @@ def story(archive, folder):
     yield 1.5
     take(window, folder, "error")
     assert session.faults
+
+
+def wait(condition, otherwise):
+    """Wait until `condition()` holds; an error where it does not in time."""
+    end = time.monotonic() + _PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            raise RuntimeError(otherwise)
+        yield 0.1
+
+
+def count(engine):
+    """A list that grows with every picture that the engine shows while it renders."""
+    shown, show = [], engine._show
+
+    def counted(self, *arguments):
+        show(self, *arguments)
+        shown.append(True)
+
+    engine._show = counted
+    return shown
 
 
 def split(window):
@@ -155,7 +178,14 @@ def render(window):
 
 def press_escape():
     """As the user does: Blender stops a render for keys of the display, and not for simulated events."""
-    subprocess.run("xdotool search --class Blender windowfocus mousemove 640 5 key Escape", shell=True, check=True)
+    subprocess.run("xdotool search --class Blender windowfocus mousemove 300 700 key Escape", shell=True, check=True)
+
+
+def scroll(window, area):
+    """Show what stands below in an area."""
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.view2d.scroll_down(deltay=400)
 
 
 def take(window, folder, name):

@@ -4,7 +4,7 @@ import json
 import re
 import subprocess
 
-from . import fault
+from . import fault, handoff
 
 _PATIENCE = 0.1  # seconds between two questions whether to give up
 _CAUSTICS = ("caustic", "sds")
@@ -24,7 +24,7 @@ def plan(words, folder, stopped):
                 process.communicate()
                 raise fault.Cancelled() from None
     if process.returncode != 0:
-        lines = [line for line in told.splitlines() if not line.startswith("warning: ")]
+        lines = [handoff.without_file(line) for line in told.splitlines() if not line.startswith("warning: ")]
         raise fault.of_program(lines, process.returncode)
     return json.loads(said)
 

@@ -89,6 +89,11 @@ class Job:
         return report["warnings"]
 
 
+def without_file(line):
+    """What the program says of the exported file, without its name: the user has never seen it."""
+    return line.replace(f"{GLB}: ", "", 1)
+
+
 def in_main_thread(work, stopped):
     """Call `work` in Blender's main thread and return what it returns; a render runs in another one."""
     if threading.current_thread() is threading.main_thread():

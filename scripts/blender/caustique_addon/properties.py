@@ -18,20 +18,20 @@ FINISHES = (
     ("off", "Off", "The estimate itself, with its noise"),
 )
 
-#: Effects by the names that the program gives them; `use_NAME` is the switch.
+#: Effects by the names that the program gives them, `use_NAME` is the switch: what they are called here, and what they are.
 EFFECTS = {
-    "emission": "Lamps and sky as the camera sees them",
-    "direct": "Light after one bounce",
-    "indirect": "Light after several bounces",
-    "glossy": "Shine and rough reflections",
-    "caustic": "Light that mirrors or glass focus on a surface",
-    "sds": "Caustics seen in mirrors, through glass or under water",
-    "volume": "Light in media",
-    "dispersion": "Colours of the spectrum",
-    "depth_of_field": "The lens",
-    "environment": "Light of the world",
-    "alpha": "Cut-outs",
-    "textures": "Images on surfaces",
+    "emission": ("Emission", "Lamps and sky as the camera sees them"),
+    "direct": ("Direct", "Light after one bounce"),
+    "indirect": ("Indirect", "Light after several bounces"),
+    "glossy": ("Glossy", "Shine and rough reflections"),
+    "caustic": ("Caustics", "Light that mirrors or glass focus on a surface"),
+    "sds": ("Seen Caustics", "Caustics seen in mirrors, through glass or under water"),
+    "volume": ("Volumes", "Light in media"),
+    "dispersion": ("Dispersion", "Colours of the spectrum"),
+    "depth_of_field": ("Depth of Field", "The lens"),
+    "environment": ("Environment", "Light of the world"),
+    "alpha": ("Cut-outs", "Surfaces that are partly not there"),
+    "textures": ("Textures", "Images on surfaces"),
 }
 
 
@@ -64,9 +64,9 @@ class Settings(bpy.types.PropertyGroup):
                                       "they hold against the settings above")
 
 
-for _name, _about in EFFECTS.items():
+for _name, (_label, _about) in EFFECTS.items():
     Settings.__annotations__[f"use_{_name}"] = bpy.props.BoolProperty(
-        name=_name.replace("_", " ").capitalize(), default=True,
+        name=_label, default=True,
         description=f"{_about}. Simulated where the scene calls for it; switch it off to leave it out")
 
 

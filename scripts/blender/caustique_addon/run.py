@@ -6,10 +6,10 @@ import subprocess
 import threading
 import time
 
-from . import fault
+from . import fault, handoff
 
 _INTERRUPTED = 130  # exit code of a program that was asked to stop and has written what was done
-_LEAST_GRACE = 5  # seconds
+_LEAST_GRACE = 20  # seconds: finishing a large picture takes some
 
 
 class Run:
@@ -32,9 +32,9 @@ class Run:
                 if line.startswith("{"):
                     self._heard(json.loads(line))
                 elif line.startswith("warning: "):
-                    self.warnings.append(line[len("warning: "):])
+                    self.warnings.append(handoff.without_file(line[len("warning: "):]))
                 elif line:
-                    self._rest.append(line)
+                    self._rest.append(handoff.without_file(line))
 
     def _heard(self, progress):
         before = self.progress["seconds"] if self.progress else 0.0
@@ -90,5 +90,13 @@ def sentence(progress):
     if progress["error"] is not None:
         text += f", error {100 * progress['error']:.2g} %"
     if progress["remaining"] is not None:
-        text += f", {progress['remaining']:.0f} s left"
+        text += f", {duration(progress['remaining'])} left"
     return text
+
+
+def duration(seconds):
+    """Seconds as people say them."""
+    minutes, hours = seconds / 60, seconds / 3600
+    if hours >= 2:
+        return f"{hours:.0f} h"
+    return f"{minutes:.0f} min" if minutes >= 2 else f"{seconds:.0f} s"
