@@ -118,7 +118,8 @@ def story(archive, folder):
     left.spaces.active.shading.type = "MATERIAL"
     scene.caustique_render.iterations = 64
     with bpy.context.temp_override(window=window):
-        bpy.ops.caustique.diagnose()
+        bpy.ops.caustique.diagnose("INVOKE_DEFAULT")
+    yield from wait(lambda: session.plans, "the program does not answer")
     yield 10  # EEVEE compiles shaders
     take(window, folder, "diagnosis")
     scroll(window, panels)
