@@ -15,6 +15,7 @@ import traceback
 import bpy
 
 _WIDE = 0.6  # of the big area, what the picture keeps beside the panels
+_NOTCHES = 12  # of the wheel, to scroll past the diagnosis
 _PATIENCE = 120  # seconds for a picture to improve, or a render to end
 
 
@@ -120,7 +121,7 @@ def story(archive, folder):
     with bpy.context.temp_override(window=window):
         bpy.ops.caustique.diagnose("INVOKE_DEFAULT")
     yield from wait(lambda: session.plans, "the program does not answer")
-    yield 10  # EEVEE compiles shaders
+    yield 15  # EEVEE compiles shaders
     take(window, folder, "diagnosis")
     scroll(window, panels)
     yield 1
@@ -186,7 +187,8 @@ def scroll(window, area):
     """Show what stands below in an area."""
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.view2d.scroll_down(deltay=400)
+        for _ in range(_NOTCHES):
+            bpy.ops.view2d.scroll_down()
 
 
 def take(window, folder, name):

@@ -3,6 +3,8 @@
 #
 #   scripts/blender/screenshots.sh FOLDER
 #
+# FOLDER/blender-render.png and FOLDER/blender-diagnosis.png are small enough for docs/.
+#
 # Needs what `scripts/setup.sh test` installs and a release build (or CAUSTIQUE_BIN); Blender, Xvfb and a renderer for
 # OpenGL are installed here. Ends with an error where a render cannot be stopped by Esc.
 
@@ -28,3 +30,17 @@ BLENDER_USER_RESOURCES=$scratch/user LIBGL_ALWAYS_SOFTWARE=1 CAUSTIQUE_EXPORTER=
     timeout 300 xvfb-run -a -s '-screen 0 1280x800x24' \
     blender --factory-startup --window-geometry 0 0 1280 800 \
     --python "$ROOT/scripts/blender/screenshots.py" -- "$scratch/caustique.zip" "$folder"
+
+# Without the timeline and what stands beside the panels, in 256 colours.
+"$ROOT/.venv/bin/python" - "$folder" <<'PYTHON'
+import pathlib
+import sys
+
+from PIL import Image
+
+folder = pathlib.Path(sys.argv[1])
+for shot, name in (("improves-4", "blender-render"), ("diagnosis", "blender-diagnosis")):
+    picture = Image.open(folder / f"{shot}.png").convert("RGB").crop((0, 24, 1057, 724))
+    colours = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=3)
+    picture.quantize(palette=colours, dither=Image.Dither.FLOYDSTEINBERG).save(folder / f"{name}.png", optimize=True)
+PYTHON

@@ -74,19 +74,21 @@ class EffectsPanel(_Panel, bpy.types.Panel):
             cells = _cells(effect) if effect else ()
             self._row(table, "prop", name, cells, settings, active=not effect or effect["present"])
         if plan and plan.said:
-            lines.draw(layout, context, f"{plan.said['method']}: {plan.said['because']}", "INFO")
+            lines.draw(layout, context, plan.said["because"], "INFO")
 
     @staticmethod
     def _row(table, kind, name, cells, settings=None, active=True):
-        row = table.split(factor=0.4)
+        row = table.split(factor=0.32)
         row.active = active
         if kind == "prop":
             row.prop(settings, f"use_{name}")
         else:
             row.label(text=name)
-        rest = row.row()
-        for cell in cells:
+        rest = row.split(factor=0.55) if len(cells) > 1 else row
+        for number, cell in enumerate(cells):
             rest.label(text=cell)
+            if number == 0:
+                rest = rest.row()
 
 
 def _cells(effect):
