@@ -1,4 +1,4 @@
-"""Build the add-on for Blender: one zip for 3.4 (Preferences > Add-ons > Install) and for 4.2 and newer (Install from Disk).
+"""Build the add-on for Blender, one zip for all: 3.4 takes it as an add-on, 4.2 and newer as an extension.
 
     python3 scripts/blender/package.py OUT.zip
 

@@ -4,9 +4,11 @@ The zip is installed as a user would install it, into a repository of extensions
 """
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+from unittest import mock
 
 import bmesh
 import bpy
@@ -15,7 +17,6 @@ import numpy
 import support
 
 sys.path.insert(0, str(support.ROOT / "scripts" / "blender"))
-import export  # noqa: E402
 import package  # noqa: E402
 
 _REPOSITORY = "caustique_test"
@@ -77,13 +78,13 @@ class Installed(support.Scratch):
     def registered(self):
         """All that an add-on may leave behind in Blender."""
         kinds = {name for name in dir(bpy.types)}
-        of_data = {kind: set(dir(getattr(bpy.types, kind))) for kind in ("Scene", "ViewLayer", "WindowManager", "Object")}
+        of_data = {kind: set(dir(getattr(bpy.types, kind))) for kind in ("Scene", "ViewLayer", "WindowManager")}
         handlers = {name: list(getattr(bpy.app.handlers, name)) for name in dir(bpy.app.handlers)
                     if isinstance(getattr(bpy.app.handlers, name), list)}
         operators = set(dir(bpy.ops.caustique))
         engines = {panel.__name__: frozenset(panel.COMPAT_ENGINES) for panel in bpy.types.Panel.__subclasses__()
                    if hasattr(panel, "COMPAT_ENGINES")}
-        files = sorted(path.name for path in self.repository.rglob("*") if path.is_file()) if self.repository.exists() else []
+        files = sorted(path.name for path in self.repository.rglob("*") if path.is_file())
         return kinds, of_data, handlers, operators, engines, files
 
     def material(self, name, **inputs):
@@ -159,10 +160,21 @@ class Installed(support.Scratch):
     def read(self, path):
         return {name.split(".", 1)[1]: pixels for name, pixels in channels(path).items()}
 
+    def render_and_keep(self):
+        """Render, and keep the exported file for `by_hand`."""
+        run = part_of_addon("run")
+
+        def kept(process, command, folder):
+            shutil.copytree(folder, self.dir / "export", dirs_exist_ok=True)
+            begin(process, command, folder)
+
+        begin = run.Run.__init__
+        with mock.patch.object(run.Run, "__init__", kept):
+            return self.render()
+
     def by_hand(self, *arguments):
-        """The same by the exporter and the command line, in the program's own axes."""
-        glb, picture = self.dir / "by-hand.glb", self.dir / "by-hand.exr"
-        export.write(str(glb))
+        """What the command line makes of the exported file, in the program's own axes."""
+        glb, picture = self.dir / "export" / "scene.glb", self.dir / "by-hand.exr"
         support.run(["render", glb, "-o", picture, "--width", self.scene.render.resolution_x, "--height",
                      self.scene.render.resolution_y, "--exr-naming", "blender", "--progress", "none", "--iterations",
                      self.settings.iterations, "--method", self.settings.method, *arguments], check=0)

@@ -18,7 +18,7 @@ class Renders(Installed):
         self.layer.name = "Shot 7"
         self.passes("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_cryptomatte_object",
                     "use_pass_cryptomatte_material", "albedo", "parts", "noisy", "noisy_parts", "error", "levels")
-        found, expected = self.render(), self.by_hand()
+        found, expected = self.render_and_keep(), self.by_hand()
         for name in ("Position", "Normal"):  # glTF's y is up, Blender's z
             expected[f"{name}.Y"], expected[f"{name}.Z"] = -expected[f"{name}.Z"], expected[f"{name}.Y"]
         expected = {re.sub(r"(Crypto\w+)\.(\w)", lambda m: f"{m[1]}.{m[2].upper()}", name): pixels
@@ -94,7 +94,7 @@ class Renders(Installed):
         self.stage()
         self.settings.seed, self.settings.finish, self.settings.use_caustic = 7, "off", False
         self.settings.arguments = "--max-depth 5"
-        found = self.render()
+        found = self.render_and_keep()
         expected = self.by_hand("--seed", 7, "--no-combine", "--effects=-caustic", "--max-depth", 5)
         self.assertEqual(found["Combined.G"].tobytes(), expected["Combined.G"].tobytes())
         other = self.by_hand("--seed", 8, "--no-combine", "--effects=-caustic", "--max-depth", 5)
@@ -158,7 +158,7 @@ class Renders(Installed):
 
         # The finished picture is withheld, so what Blender has is the last one before it.
         with mock.patch.multiple(engine.Engine, _show=watched, _deliver=lambda *_: None):
-            found = self.render()
+            found = self.render_and_keep()
         for channel in "RGBA":
             self.assertEqual(found[f"Combined.{channel}"].tobytes(), shown[-1][channel].tobytes())
         numpy.testing.assert_allclose(shown[0]["G"].mean(), self.by_hand()["Combined.G"].mean(), rtol=0.2)

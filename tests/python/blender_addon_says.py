@@ -75,8 +75,8 @@ class Tells(Installed):
         self.settings.arguments = "--compression zip"
         self.assertIn("is compressed Remedy: render with '--compression none'", self.fault())
         picture = self.dir / "part.exr"
-        support.run(["render", support.scene("cornell"), "-o", picture, "--width", 8, "--iterations", 1, "--compression",
-                     "none", "--progress", "none"], check=0)
+        support.run(["render", support.scene("cornell"), "-o", picture, "--width", 8, "--iterations", 1,
+                     "--compression", "none", "--progress", "none"], check=0)
         whole = picture.read_bytes()
         for data, told in ((whole[:-1], "is not complete"), (b"P6 8 8 255\n" + bytes(192), "is not an EXR file")):
             picture.write_bytes(data)
@@ -192,7 +192,8 @@ class Diagnoses(Installed):
     def test_names_in_lines(self):
         self.stage()
         named = part_of_addon("asking").named
-        for line, names in (('object "ball": no light', ["ball"]), ('material "ball glass" on "x" and 2 more', ["ball"]),
+        for line, names in (('object "ball": no light', ["ball"]),
+                            ('material "ball glass" on "x" and 2 more', ["ball"]),
                             ('light "sun": all its light stays within "plane"', ["sun", "plane"]),
                             ('world "plane": its nodes', []), ("nothing", [])):
             self.assertEqual([thing.name for thing in named(self.scene, [line])], names, line)

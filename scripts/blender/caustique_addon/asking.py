@@ -12,8 +12,8 @@ _CAUSTICS = ("caustic", "sds")
 
 def plan(words, folder, stopped):
     """The object that a command line with --json prints in a folder. `stopped` is asked whether to give up."""
-    process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                               text=True, errors="replace")
+    process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True, errors="replace")
     while True:
         try:
             said, told = process.communicate(timeout=_PATIENCE)

@@ -125,8 +125,8 @@ class Engine(bpy.types.RenderEngine):
             black = passes.fill(result.layers[0], picture, part)
         passes.stamp(self.get_result(), picture, layer)
         if black:
-            self._warn(scene, [f"{', '.join(black)}: this method does not make these passes, and they are black: choose "
-                               "another method, or switch them off"])
+            self._warn(scene, [f"{', '.join(black)}: this method does not make these passes, and they are black: "
+                               "choose another method, or switch them off"])
 
     def _warn(self, scene, lines):
         known = session.warnings.setdefault(scene.name, [])

@@ -1,7 +1,7 @@
 """Export one frame of one scene, in a Blender of its own: `blender -b --python export_job.py -- JOB.json`.
 
-The job is an object: `blend` (the file), `scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python in
-the file may run), `exporter` (the folder of export.py), `glb` (the file to write) and `report` (the file for what is
+The job is an object: `blend` (the file), `scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python
+in the file may run), `exporter` (the folder of export.py), `glb` (the file to write) and `report` (the file for what is
 left to say: {"warnings": [..]}, or {"error": ".."}).
 """
 

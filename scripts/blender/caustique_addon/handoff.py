@@ -23,14 +23,14 @@ _PAUSE = 0.02  # seconds between two looks at the other Blender
 
 
 class Job:
-    """An export: the file `GLB` is in the folder after `run`, which may be called from any thread."""
+    """An export. After `run`, which may be called from any thread, the file `GLB` is in the folder."""
 
     def __init__(self, scene, view_layer, frame, folder, blender):
-        """Of `scene` at `frame` (a float), into the empty `folder`; `blender` is another program to export with, or ""."""
+        """Of `scene` at `frame` (a float), into the empty `folder`; `blender` is another program to export with."""
         if not blender and bpy.app.version < _OLDEST:
             raise Fault(f"Blender {bpy.app.version_string} cannot export what caustique needs",
-                        "choose in the add-on's preferences, as Exporter, a Blender of 4.2 or newer, or the Python of a "
-                        "virtual environment in which 'pip install bpy' has been run")
+                        "choose in the add-on's preferences, as Exporter, a Blender of 4.2 or newer, or the Python of "
+                        "a virtual environment in which 'pip install bpy' has been run")
         self.folder = folder
         self._blender = os.path.expanduser(blender)
         self._blend = os.path.join(folder, "scene.blend")
@@ -38,7 +38,8 @@ class Job:
             "blend": self._blend, "scene": scene.name, "view_layer": view_layer, "frame": frame,
             # What may run here may run there; where something was kept from running, nothing may.
             "scripts": not bpy.app.autoexec_fail,
-            "exporter": os.path.join(_HERE, "exporter"), "glb": os.path.join(folder, GLB), "report": os.path.join(folder, "report.json"),
+            "exporter": os.path.join(_HERE, "exporter"), "glb": os.path.join(folder, GLB),
+            "report": os.path.join(folder, "report.json"),
         }
         self._scene = scene
 

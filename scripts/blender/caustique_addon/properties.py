@@ -18,7 +18,7 @@ FINISHES = (
     ("off", "Off", "The estimate itself, with its noise"),
 )
 
-#: Effects by the names that the program gives them, `use_NAME` is the switch: what they are called here, and what they are.
+#: Effects by the names that the program gives them (`use_NAME` is the switch): their names here, and what they are.
 EFFECTS = {
     "emission": ("Emission", "Lamps and sky as the camera sees them"),
     "direct": ("Direct", "Light after one bounce"),

@@ -13,7 +13,7 @@ _LEAST_GRACE = 20  # seconds: finishing a large picture takes some
 
 
 class Run:
-    """`command` (a list) as a process in a folder. `progress` is its last line of progress, or None; `warnings` a list."""
+    """`command` (a list) as a process in a folder. `progress` is its last line of progress, or None."""
 
     def __init__(self, command, folder):
         self.progress, self.warnings = None, []
