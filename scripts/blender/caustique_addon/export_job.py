@@ -16,9 +16,11 @@ def export(job):
     """Do the job; the exporter's warnings."""
     bpy.ops.wm.open_mainfile(filepath=job["blend"], load_ui=False, use_scripts=job["scripts"])
     scene = bpy.data.scenes[job["scene"]]
-    window = bpy.context.window
-    window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
+    bpy.context.window.scene = scene
+    for layer in [layer for layer in scene.view_layers if layer.name != job["view_layer"]]:
+        scene.view_layers.remove(layer)
     scene.render.engine = "CYCLES"  # the add-on is not here, and the exporter reads the scene as Cycles would
+    scene.render.use_border = False  # the add-on cuts the picture itself
     whole = int(job["frame"] // 1)
     scene.frame_set(whole, subframe=job["frame"] - whole)
     sys.path.insert(0, job["exporter"])
