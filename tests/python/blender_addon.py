@@ -67,6 +67,38 @@ class Renders(Installed):
             columns = numpy.flatnonzero((found["Depth.Z"] < 9.95).any(0))
             self.assertEqual((columns[0], columns[-1]), ((at + 2) * 8, (at + 2.5) * 8 - 1))
 
+    def test_files_beside_the_scene_are_found(self):
+        """An image and a library, both with relative paths, of a scene with changes that are not saved."""
+        picture = bpy.data.images.new("paint", 4, 4)
+        picture.generated_color = (1, 0.25, 0, 1)
+        picture.filepath_raw, picture.file_format = str(self.dir / "paint.png"), "PNG"
+        picture.save()
+        tile = bpy.data.meshes.new("tile")
+        tile.from_pydata([(-1, -1, 3), (1, -1, 3), (1, 1, 3), (-1, 1, 3)], [], [(0, 1, 2, 3)])
+        tile.uv_layers.new()
+        tile.materials.append(self.material("painted", Roughness=1.0, Specular_IOR_Level=0.0))
+        tree = tile.materials[0].node_tree
+        paint = tree.nodes.new("ShaderNodeTexImage")
+        paint.image = picture
+        shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        tree.links.new(paint.outputs["Color"], shader.inputs["Base Color"])
+        bpy.data.libraries.write(str(self.dir / "tile.blend"), {bpy.data.objects.new("tile", tile)}, path_remap="RELATIVE")
+        bpy.data.meshes.remove(tile)
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.dir / "scene.blend"))
+        with bpy.data.libraries.load("//tile.blend", link=True) as (_, wanted):
+            wanted.objects = ["tile"]
+        self.scene.collection.objects.link(wanted.objects[0])
+        self.plane()
+        self.sun(math.pi)
+        self.eye()
+        self.passes("use_pass_z")
+        self.settings.method, self.settings.finish = "path", "off"
+        found = self.render()
+        self.assertAlmostEqual(float(found["Depth.Z"][12, 16]), 7, 4)
+        # pi W/m2 on a Lambertian surface: its reflectance. The image holds sRGB values of eight bits.
+        for channel, value in zip("RGB", (1, ((64 / 255 + 0.055) / 1.055) ** 2.4, 0)):
+            self.assertAlmostEqual(float(found[f"Combined.{channel}"][12, 16]), value, 4)
+
     def test_view_layers_have_passes_of_their_own(self):
         self.stage()
         self.passes("use_pass_z")

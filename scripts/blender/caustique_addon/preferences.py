@@ -12,7 +12,7 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     program: bpy.props.StringProperty(
-        name="Program", subtype="FILE_PATH",
+        name="Program", subtype="FILE_PATH", update=lambda _self, _context: program.ask_again(),
         description="The program caustique; where nothing is chosen, the one on the PATH")
     exporter: bpy.props.StringProperty(
         name="Exporter", subtype="FILE_PATH",

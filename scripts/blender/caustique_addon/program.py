@@ -56,6 +56,11 @@ def missing_libraries(path):
             if isinstance(found, dict) and not found["found"]]
 
 
+def ask_again():
+    """Forget the answers: a library may have been installed since."""
+    _answer.cache_clear()
+
+
 def _ask(path, *arguments):
     """The answer of the program; asked again only where the file has changed."""
     return _answer(path, os.stat(path).st_mtime_ns, arguments)
