@@ -95,6 +95,10 @@ class Tells(Installed):
         self.stage()
         self.preferences.exporter = "/bin/false"
         self.assertIn("the scene could not be exported", self.fault())
+        self.preferences.exporter = "/nowhere/blender"
+        self.assertIn("/nowhere/blender does not run: No such file or directory Remedy: choose", self.fault())
+        with self.assertRaisesRegex(RuntimeError, "/nowhere/blender does not run"):
+            bpy.ops.caustique.diagnose()
         self.assertEqual(self.temporary(), [])
 
     def test_libraries_that_are_missing(self):

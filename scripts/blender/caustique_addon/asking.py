@@ -26,7 +26,10 @@ def plan(words, folder, stopped):
     if process.returncode != 0:
         lines = [handoff.without_file(line) for line in told.splitlines() if not line.startswith("warning: ")]
         raise fault.of_program(lines, process.returncode)
-    return json.loads(said)
+    try:
+        return json.loads(said)
+    except ValueError as error:
+        raise fault.Fault("the program's plan cannot be read", "update the program and the add-on together") from error
 
 
 def headline(said):

@@ -56,9 +56,14 @@ class Job:
         with open(path, "w", encoding="utf-8") as file:
             json.dump(self._job, file)
         log = os.path.join(self.folder, "export.log")
+        command = self._command(path)
         with open(log, "wb") as output:
-            worker = subprocess.Popen(self._command(path), stdin=subprocess.DEVNULL, stdout=output, stderr=output,
-                                      start_new_session=True)
+            try:
+                worker = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output,
+                                          start_new_session=True)
+            except OSError as error:
+                raise Fault(f"{command[0]} does not run: {error.strerror}",
+                            "choose another Exporter in the add-on's preferences, or none") from error
         try:
             while worker.poll() is None:
                 if stopped():
