@@ -101,6 +101,12 @@ class Tells(Installed):
             bpy.ops.caustique.diagnose()
         self.assertEqual(self.temporary(), [])
 
+    def test_what_nobody_has_foreseen(self):
+        self.stage()
+        with mock.patch.object(part_of_addon("program"), "find", lambda _: 1 / 0):
+            told = self.fault()
+        self.assertIn("the add-on has failed: ZeroDivisionError: division by zero Remedy: report it", told)
+
     def test_libraries_that_are_missing(self):
         with mock.patch.dict(os.environ, CAUSTIQUE_OIDN="/nowhere/libOpenImageDenoise.so"):
             faults = part_of_addon("program").missing_libraries(str(support.binary()))

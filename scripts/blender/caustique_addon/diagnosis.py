@@ -8,7 +8,7 @@ from collections import namedtuple
 import bpy
 
 from . import asking, command, handoff, limits, preferences, program, session
-from .fault import Cancelled, Fault
+from .fault import Cancelled, Fault, of_error
 
 #: What a plan says: a headline about caustics, the plan's own object (see `caustique plan --json`), all warnings, and
 #: the fault in whose place all this would stand, or None.
@@ -82,8 +82,8 @@ class Diagnose(bpy.types.Operator):
             self._plan = Plan(asking.headline(said), said, list(dict.fromkeys(warnings + said["warnings"])), None)
         except Cancelled:
             pass
-        except Fault as fault:
-            self._plan = Plan("", None, [], fault)
+        except Exception as error:  # in a thread, where it would be lost
+            self._plan = Plan("", None, [], of_error(error))
 
     def _end(self, context):
         shutil.rmtree(self._folder, ignore_errors=True)

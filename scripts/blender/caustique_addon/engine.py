@@ -13,7 +13,7 @@ import bpy
 import numpy
 
 from . import command, exr, handoff, limits, passes, preferences, program, run, session
-from .fault import Cancelled, Fault
+from .fault import Cancelled, of_error
 
 _PAUSE = 0.1  # seconds between two looks at the program
 _PREVIEW = "--preview"
@@ -41,7 +41,8 @@ class Engine(bpy.types.RenderEngine):
             self._render(depsgraph, folder)
         except Cancelled:
             pass
-        except Fault as fault:
+        except Exception as error:
+            fault = of_error(error)
             session.faults[depsgraph.scene.name] = fault
             self.report({"ERROR"}, fault.message())  # which ends an animation, too; `error_set` would not
         finally:

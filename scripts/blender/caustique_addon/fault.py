@@ -1,6 +1,7 @@
 """What goes wrong, in the words that Blender shows."""
 
 import textwrap
+import traceback
 
 _WIDTH = 100  # letters of a line of Blender's messages, which do not wrap by themselves
 
@@ -19,6 +20,15 @@ class Fault(Exception):
 
 class Cancelled(Exception):
     """The user has stopped the work."""
+
+
+def of_error(error):
+    """Any exception as a Fault. One that nobody foresaw is printed, too, for whoever mends it."""
+    if isinstance(error, Fault):
+        return error
+    traceback.print_exception(type(error), error, error.__traceback__)
+    return Fault(f"the add-on has failed: {type(error).__name__}: {error}",
+                 "report it with the scene, and with what Blender has printed to its console")
 
 
 def of_program(lines, code):
