@@ -52,7 +52,7 @@ class Diagnose(bpy.types.Operator):
         return self._end(context)
 
     def _begin(self, context):
-        self._stopped, self._plan = False, None
+        self._stopped, self._plan = False, None  # the plan stays None where the user gives up
         self._folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
         self._worker = threading.Thread(target=self._ask, args=self._question(context), daemon=True)
         self._worker.start()
