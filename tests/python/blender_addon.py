@@ -82,7 +82,8 @@ class Renders(Installed):
         paint.image = picture
         shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
         tree.links.new(paint.outputs["Color"], shader.inputs["Base Color"])
-        bpy.data.libraries.write(str(self.dir / "tile.blend"), {bpy.data.objects.new("tile", tile)}, path_remap="RELATIVE")
+        body = bpy.data.objects.new("tile", tile)
+        bpy.data.libraries.write(str(self.dir / "tile.blend"), {body}, path_remap="RELATIVE")
         bpy.data.meshes.remove(tile)
         bpy.ops.wm.save_as_mainfile(filepath=str(self.dir / "scene.blend"))
         with bpy.data.libraries.load("//tile.blend", link=True) as (_, wanted):

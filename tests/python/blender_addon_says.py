@@ -132,6 +132,14 @@ class Tells(Installed):
         self.assertEqual(len(lines), 5)
         self.assertTrue(all(": " in line for line in lines))
 
+    def test_simulations_are_named(self):
+        self.stage()
+        bpy.data.objects["plane"].modifiers.new("Flag", "CLOTH")
+        bpy.data.objects["ball"].modifiers.new("Smooth", "SUBSURF")
+        said = part_of_addon("limits").ignored(self.scene)
+        self.assertEqual(len(said), 1)
+        self.assertIn('object "plane": its modifier Flag is not simulated for the render: apply it', said[0])
+
     def test_passes_that_a_method_does_not_make(self):
         self.stage()
         self.settings.method = "path"

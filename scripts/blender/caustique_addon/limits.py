@@ -1,5 +1,7 @@
 """Settings of Blender that a render with caustique leaves aside, each with what to do instead."""
 
+_SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT"}
+
 
 def ignored(scene):
     """A line for each such setting that is in use in `scene`."""
@@ -12,4 +14,16 @@ def ignored(scene):
         (render.pixel_aspect_x != render.pixel_aspect_y, "pixels are rendered as squares: set both pixel aspects to 1"),
         (render.use_freestyle, "Freestyle's lines are not drawn over the picture: render them with Cycles"),
     ]
-    return [line for there, line in found if there]
+    return [line for there, line in found if there] + list(_simulations(scene))
+
+
+def _simulations(scene):
+    """A line for each simulation: the copy of the scene that is exported has no caches, baked ones included."""
+    world = scene.rigidbody_world
+    if world is not None and world.enabled:
+        yield f'scene "{scene.name}": its rigid bodies are not simulated for the render: bake them to keyframes'
+    for thing in scene.objects:
+        for modifier in thing.modifiers:
+            if modifier.type in _SIMULATED or getattr(modifier, "bakes", ()):
+                yield (f'object "{thing.name}": its modifier {modifier.name} is not simulated for the render: '
+                       "apply it, or put a mesh cache (Alembic) in its place")
