@@ -1,0 +1,136 @@
+"""What the program would do with the scene, and why there is no caustic: `caustique plan`, read into the interface."""
+
+import shutil
+import tempfile
+import threading
+from collections import namedtuple
+
+import bpy
+
+from . import asking, command, handoff, limits, preferences, program, session
+from .fault import Cancelled, Fault, of_error
+
+#: What a plan says: a headline about caustics, the plan's own object (see `caustique plan --json`), all warnings, and
+#: the fault in whose place all this would stand, or None.
+Plan = namedtuple("Plan", "headline said warnings fault")
+
+_LOOK_EVERY = 0.1  # seconds
+
+
+class Diagnose(bpy.types.Operator):
+    """Ask the program what the scene calls for and what looks like a mistake in it; nothing is rendered"""
+
+    bl_idname = "caustique.diagnose"
+    bl_label = "Why is there no caustic?"
+
+    select: bpy.props.BoolProperty(name="Select", default=True, description="Select the objects that are named")
+
+    def invoke(self, context, _event):
+        """From a button: the interface goes on meanwhile."""
+        self._begin(context)
+        self._timer = context.window_manager.event_timer_add(_LOOK_EVERY, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        context.workspace.status_text_set("caustique reads the scene. Esc: stop")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Wait for the answer, or for the user to give up."""
+        if event.type == "ESC":
+            self._stopped = True
+        if event.type != "TIMER" or self._worker.is_alive():
+            return {"PASS_THROUGH"}
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+        for area in context.screen.areas:
+            area.tag_redraw()
+        return self._end(context)
+
+    def execute(self, context):
+        """From a script: wait for the answer."""
+        self._begin(context)
+        self._worker.join()
+        return self._end(context)
+
+    def _begin(self, context):
+        self._stopped, self._plan = False, None  # the plan stays None where the user gives up
+        self._folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
+        self._worker = threading.Thread(target=self._ask, args=self._question(context), daemon=True)
+        self._worker.start()
+
+    def _question(self, context):
+        """All that Blender has to say, for a thread that must not ask it."""
+        scene, chosen = context.scene, preferences.get(context)
+        try:
+            path = program.find(chosen.program)
+            frame = scene.frame_current + scene.frame_subframe
+            job = handoff.Job(scene, context.view_layer.name, frame, self._folder, chosen.exporter)
+            warnings = limits.ignored(scene) + job.copy()
+            scale = scene.render.resolution_percentage
+            size = (side * scale // 100 for side in (scene.render.resolution_x, scene.render.resolution_y))
+            words = [path, "plan", handoff.GLB, "--json", *command.size(*size), *command.threads(scene.render),
+                     *command.method(scene.caustique_render)]
+            return job, words, warnings, None
+        except Fault as fault:
+            return None, [], [], fault
+
+    def _ask(self, job, words, warnings, fault):
+        try:
+            if fault is not None:
+                raise fault
+            warnings = warnings + job.run(lambda: self._stopped)
+            said = asking.plan(words, self._folder, lambda: self._stopped)
+            self._plan = Plan(asking.headline(said), said, list(dict.fromkeys(warnings + said["warnings"])), None)
+        except Cancelled:
+            pass
+        except Exception as error:  # in a thread, where it would be lost
+            self._plan = Plan("", None, [], of_error(error))
+
+    def _end(self, context):
+        shutil.rmtree(self._folder, ignore_errors=True)
+        if self._plan is None:
+            return {"CANCELLED"}
+        session.plans[context.scene.name] = self._plan
+        if self._plan.fault is not None:
+            self.report({"ERROR"}, self._plan.fault.message())
+            return {"CANCELLED"}
+        if self.select:
+            _select(context, asking.named(context.scene, self._plan.warnings))
+        self.report({"INFO"}, self._plan.headline)
+        return {"FINISHED"}
+
+
+class Select(bpy.types.Operator):
+    """Select the objects that this line names"""
+
+    bl_idname = "caustique.select"
+    bl_label = "Select"
+    bl_options = {"UNDO"}
+
+    line: bpy.props.StringProperty(options={"HIDDEN"})
+
+    def execute(self, context):
+        """Select them, and nothing else."""
+        _select(context, asking.named(context.scene, [self.line]))
+        return {"FINISHED"}
+
+
+def _select(context, things):
+    for thing in context.view_layer.objects:
+        thing.select_set(False)
+    here = [thing for thing in things if thing.name in context.view_layer.objects]
+    for thing in here:
+        thing.select_set(True)
+    if here:
+        context.view_layer.objects.active = here[0]
+
+
+def register():
+    """Offer the operators."""
+    for kind in (Diagnose, Select):
+        bpy.utils.register_class(kind)
+
+
+def unregister():
+    """Withdraw them."""
+    for kind in (Select, Diagnose):
+        bpy.utils.unregister_class(kind)

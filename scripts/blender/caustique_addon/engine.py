@@ -1,0 +1,168 @@
+"""The render engine: F12 and animations.
+
+Blender calls `render` for every view layer of every frame, beside the interface, in a thread of its own.
+"""
+
+import contextlib
+import os
+import shutil
+import tempfile
+import time
+
+import bpy
+import numpy
+
+from . import command, exr, handoff, limits, passes, preferences, program, run, session
+from .fault import Cancelled, of_error
+
+_PAUSE = 0.1  # seconds between two looks at the program
+_PREVIEW = "--preview"
+
+
+class Engine(bpy.types.RenderEngine):
+    """caustique among Blender's render engines."""
+
+    bl_idname = "CAUSTIQUE"
+    bl_label = "caustique"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        """Tell Blender of the passes that the view layer asks for."""
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for one in passes.wanted(renderlayer):
+            self.register_pass(scene, renderlayer, one.name, len(one.components), one.components, one.kind)
+
+    def render(self, depsgraph):
+        """Render one view layer of one frame."""
+        folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
+        try:
+            self._render(depsgraph, folder)
+        except Cancelled:
+            pass
+        except Exception as error:
+            fault = of_error(error)
+            session.faults[depsgraph.scene.name] = fault
+            self.report({"ERROR"}, fault.message())  # which ends an animation, too; `error_set` would not
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _render(self, depsgraph, folder):
+        scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+        part = _part(scene.render, self.resolution_x, self.resolution_y)
+        with self._result(view_layer.name, part):
+            pass  # black: Blender crashes where it writes a picture that nobody has begun
+        chosen = preferences.get(bpy.context)
+        path = program.find(chosen.program)
+        self._warn(scene, limits.ignored(scene))
+        self.update_stats("", "Exporting")
+        frame = scene.frame_current + scene.frame_subframe
+        job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)
+        self._warn(scene, handoff.in_main_thread(job.copy, self._stopped))
+        self._warn(scene, job.run(self._stopped))
+
+        output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
+        words = [path, "render", handoff.GLB, "-o", output, "--exr-naming", "blender", "--compression", "none",
+                 "--layers", passes.layers(passes.wanted(view_layer)), "--progress", "json",
+                 *command.size(self.resolution_x, self.resolution_y), *command.threads(scene.render),
+                 *command.method(scene.caustique_render)]
+        if _PREVIEW in program.options(path):
+            words += [_PREVIEW, preview]
+        work = run.Run(words, folder)
+        try:
+            self._watch(work, preview, view_layer.name, part)
+            work.finish()
+        finally:
+            work.kill()
+        self._warn(scene, work.warnings)
+        if not os.path.isfile(output):  # stopped before the first iteration
+            raise Cancelled()
+        self._deliver(exr.Picture(output), scene, view_layer.name, part)
+
+    def _stopped(self):
+        """Whether the user has pressed Esc."""
+        return self.test_break()
+
+    def _watch(self, work, preview, layer, part):
+        """Show how far the program is, and its picture so far, until it ends."""
+        said, shown = None, None
+        while work.working():
+            if self._stopped():
+                work.stop()
+                text = "Stopping after this iteration"
+            elif work.progress is None:
+                text = "Rendering the first iteration"
+            else:
+                text = run.sentence(work.progress)
+                self.update_progress(run.fraction(work.progress))
+            if text != said:
+                said = text
+                self.update_stats("", text)
+            written = os.stat(preview).st_mtime_ns if os.path.isfile(preview) else None
+            if written != shown:
+                shown = written
+                self._show(exr.Picture(preview), layer, part)
+            time.sleep(_PAUSE)
+
+    @contextlib.contextmanager
+    def _result(self, layer, part):
+        """Blender's picture of a view layer, to be filled. Blender crashes where one is begun and not ended."""
+        _, _, width, height = part
+        result = self.begin_result(0, 0, width, height, layer=layer)
+        try:
+            yield result
+        finally:
+            self.end_result(result)
+
+    def _show(self, picture, layer, part):
+        """Put the picture so far into Blender's."""
+        with self._result(layer, part) as result:
+            passes.fill_combined(result.layers[0], picture, part)
+
+    def _deliver(self, picture, scene, layer, part):
+        """Hand the finished picture and its passes to Blender."""
+        with self._result(layer, part) as result:
+            black = passes.fill(result.layers[0], picture, part)
+        passes.stamp(self.get_result(), picture, layer)
+        if black:
+            self._warn(scene, [f"{', '.join(black)}: this method does not make these passes, and they are black: "
+                               "choose another method, or switch them off"])
+
+    def _warn(self, scene, lines):
+        known = session.warnings.setdefault(scene.name, [])
+        for line in lines:
+            if line not in known:  # frames and view layers share most of them
+                known.append(line)
+                self.report({"WARNING"}, line)
+
+
+def _part(render, width, height):
+    """The part of a picture that Blender renders: x, y (from the top left), width and height, in pixels."""
+    if not render.use_border:
+        return 0, 0, width, height
+    # In single precision, and cut off as Blender does it.
+    left, right, bottom, top = (int(numpy.float32(share) * numpy.float32(side)) for share, side in (
+        (render.border_min_x, width), (render.border_max_x, width), (render.border_min_y, height),
+        (render.border_max_y, height)))
+    return left, height - top, right - left, top - bottom
+
+
+@bpy.app.handlers.persistent
+def _forget(scene, *_):
+    """What is shown is of the last render, which may be of many frames."""
+    session.warnings.pop(scene.name, None)
+    session.faults.pop(scene.name, None)
+
+
+def register():
+    """Offer the engine."""
+    bpy.utils.register_class(Engine)
+    bpy.app.handlers.render_init.append(_forget)
+
+
+def unregister():
+    """Withdraw it, and forget what it has said."""
+    bpy.app.handlers.render_init.remove(_forget)
+    bpy.utils.unregister_class(Engine)
+    session.clear()

@@ -1,0 +1,126 @@
+"""From the scene in this Blender to a .glb for the program.
+
+Exporting changes the scene for a while and runs operators. A render must do neither: it runs beside the interface, in a
+thread of its own. So the scene is copied to a file, and a second Blender exports the copy. That Blender sees nothing of
+the user's settings and starts in a second; this one stays responsive, and an export can be stopped.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import bpy
+
+from .fault import Cancelled, Fault
+
+GLB = "scene.glb"
+_HERE = os.path.dirname(os.path.abspath(__file__))
+_OLDEST = (4, 2, 0)  # the first Blender whose materials and glTF exporter hold what export.py reads
+_PAUSE = 0.02  # seconds between two looks at the other Blender
+
+
+class Job:
+    """An export. After `run`, which may be called from any thread, the file `GLB` is in the folder."""
+
+    def __init__(self, scene, view_layer, frame, folder, blender):
+        """Of `scene` at `frame` (a float), into the empty `folder`; `blender` is another program to export with."""
+        if not blender and bpy.app.version < _OLDEST:
+            raise Fault(f"Blender {bpy.app.version_string} cannot export what caustique needs",
+                        "choose in the add-on's preferences, as Exporter, a Blender of 4.2 or newer, or the Python of "
+                        "a virtual environment in which 'pip install bpy' has been run")
+        self.folder = folder
+        self._blender = os.path.expanduser(blender)
+        self._blend = os.path.join(folder, "scene.blend")
+        self._job = {
+            "blend": self._blend, "scene": scene.name, "view_layer": view_layer, "frame": frame,
+            # What may run here may run there; where something was kept from running, nothing may.
+            "scripts": not bpy.app.autoexec_fail,
+            "exporter": os.path.join(_HERE, "exporter"), "glb": os.path.join(folder, GLB),
+            "report": os.path.join(folder, "report.json"),
+        }
+        self._scene = scene
+
+    def copy(self):
+        """Write the scene, and all it needs, to a file: in Blender's main thread. Returns warnings."""
+        # Not as the user saves a file: that would draw a picture of it and call handlers.
+        bpy.data.libraries.write(self._blend, {self._scene}, path_remap="ABSOLUTE")
+        return [f'image "{image.name}": its changes are not saved, and the render does not see them: save or pack it'
+                for image in bpy.data.images if image.is_dirty and image.packed_file is None and image.users]
+
+    def run(self, stopped):
+        """Export the copy; the exporter's warnings. `stopped` is asked now and then whether to give up."""
+        path = os.path.join(self.folder, "job.json")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(self._job, file)
+        log = os.path.join(self.folder, "export.log")
+        command = self._command(path)
+        with open(log, "wb") as output:
+            try:
+                worker = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output,
+                                          start_new_session=True)
+            except OSError as error:
+                raise Fault(f"{command[0]} does not run: {error.strerror}",
+                            "choose another Exporter in the add-on's preferences, or none") from error
+        try:
+            while worker.poll() is None:
+                if stopped():
+                    raise Cancelled()
+                time.sleep(_PAUSE)
+        finally:
+            worker.kill()
+            worker.wait()
+        return self._report(log)
+
+    def _command(self, job):
+        script = os.path.join(_HERE, "export_job.py")
+        program = self._blender or bpy.app.binary_path
+        if not program or os.path.basename(program).startswith("python"):  # Blender as a module of Python
+            return [program or sys.executable, script, job]
+        return [program, "-b", "--factory-startup", "-noaudio", "--python", script, "--", job]
+
+    def _report(self, log):
+        try:
+            with open(self._job["report"], encoding="utf-8") as file:
+                report = json.load(file)
+        except (OSError, ValueError):
+            with open(log, encoding="utf-8", errors="replace") as file:
+                last = (file.read().strip().splitlines() or ["it said nothing"])[-1]
+            report = {"error": last}
+        if "error" in report:
+            raise Fault(f"the scene could not be exported: {report['error']}",
+                        "try File > Export > glTF 2.0, which shows what it stumbles over")
+        return report["warnings"]
+
+
+def without_file(line):
+    """What the program says of the exported file, without its name: the user has never seen it."""
+    return line.replace(f"{GLB}: ", "", 1)
+
+
+def in_main_thread(work, stopped):
+    """Call `work` in Blender's main thread and return what it returns; a render runs in another one."""
+    if threading.current_thread() is threading.main_thread():
+        return work()
+    done, outcome = threading.Event(), {}
+
+    def task():
+        if not stopped():
+            try:
+                outcome["value"] = work()
+            except Exception as error:  # it belongs to the thread that waits
+                outcome["error"] = error
+        done.set()
+
+    bpy.app.timers.register(task)
+    # Blender waits for a render that is being stopped, and its timers wait with it.
+    while not done.wait(_PAUSE):
+        if stopped():
+            raise Cancelled()
+    if "error" in outcome:
+        raise outcome["error"]
+    if "value" not in outcome:
+        raise Cancelled()
+    return outcome["value"]

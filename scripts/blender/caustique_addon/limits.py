@@ -1,0 +1,29 @@
+"""Settings of Blender that a render with caustique leaves aside, each with what to do instead."""
+
+_SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT"}
+
+
+def ignored(scene):
+    """A line for each such setting that is in use in `scene`."""
+    render = scene.render
+    found = [
+        (render.use_motion_blur, "motion blur is not rendered: add it in the compositor, or render with Cycles"),
+        (render.use_multiview, "stereoscopy is not rendered, and both eyes see the same: render from two cameras"),
+        (render.film_transparent, "the film is not transparent where the world is lit: key with a cryptomatte, or make "
+                                  "the world black"),
+        (render.pixel_aspect_x != render.pixel_aspect_y, "pixels are rendered as squares: set both pixel aspects to 1"),
+        (render.use_freestyle, "Freestyle's lines are not drawn over the picture: render them with Cycles"),
+    ]
+    return [line for there, line in found if there] + list(_simulations(scene))
+
+
+def _simulations(scene):
+    """A line for each simulation: the copy of the scene that is exported has no caches, baked ones included."""
+    world = scene.rigidbody_world
+    if world is not None and world.enabled:
+        yield f'scene "{scene.name}": its rigid bodies are not simulated for the render: bake them to keyframes'
+    for thing in scene.objects:
+        for modifier in thing.modifiers:
+            if modifier.type in _SIMULATED or getattr(modifier, "bakes", ()):
+                yield (f'object "{thing.name}": its modifier {modifier.name} is not simulated for the render: '
+                       "apply it, or put a mesh cache (Alembic) in its place")

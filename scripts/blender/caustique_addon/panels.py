@@ -1,0 +1,223 @@
+"""The panels: method, when to stop, effects with the plan's table, finish, messages, the diagnosis, lights, passes."""
+
+import bpy
+
+from . import asking, lines, properties, session
+from .diagnosis import Diagnose, Select
+from .engine import Engine
+
+_STOPS = ("iterations", "time", "error")
+
+
+class _Panel:
+    """What the panels have in common: they show only while caustique renders the scene."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine == Engine.bl_idname
+
+    def _column(self):
+        self.layout.use_property_split, self.layout.use_property_decorate = True, False
+        return self.layout.column()
+
+
+class MethodPanel(_Panel, bpy.types.Panel):
+    """How light is found."""
+
+    bl_idname = "CAUSTIQUE_PT_method"
+    bl_label = "Method"
+
+    def draw(self, context):
+        column, settings = self._column(), context.scene.caustique_render
+        for name in ("method", "seed", "arguments"):
+            column.prop(settings, name)
+
+
+class StopPanel(_Panel, bpy.types.Panel):
+    """When a render ends."""
+
+    bl_idname = "CAUSTIQUE_PT_stop"
+    bl_label = "Stop"
+
+    def draw(self, context):
+        column, settings = self._column(), context.scene.caustique_render
+        for name in _STOPS:
+            row = column.row(heading=name.capitalize())
+            row.prop(settings, f"use_{name}", text="")
+            value = row.row()
+            value.active = getattr(settings, f"use_{name}")
+            value.prop(settings, name, text="")
+        if not any(getattr(settings, f"use_{name}") for name in _STOPS):
+            lines.draw(column, context, "Nothing is chosen: a render stops after 64 iterations", "INFO")
+
+
+class EffectsPanel(_Panel, bpy.types.Panel):
+    """What is simulated, and what the plan says of it."""
+
+    bl_idname = "CAUSTIQUE_PT_effects"
+    bl_label = "Effects"
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.caustique_render
+        layout.operator(Diagnose.bl_idname, text="Read the Plan", icon="PRESET").select = False
+        plan = session.plans.get(context.scene.name)
+        said = {effect["name"]: effect for effect in plan.said["effects"]} if plan and plan.said else {}
+        table = layout.column(align=True)
+        if said:
+            self._row(table, "label", "Effect", ("simulated by", "of light", "off costs"))
+        for name in properties.EFFECTS:
+            effect = said.get(name)
+            cells = _cells(effect) if effect else ()
+            self._row(table, "prop", name, cells, settings, active=not effect or effect["present"])
+        if plan and plan.said:
+            lines.draw(layout, context, plan.said["because"], "INFO")
+
+    @staticmethod
+    def _row(table, kind, name, cells, settings=None, active=True):
+        row = table.split(factor=0.32)
+        row.active = active
+        if kind == "prop":
+            row.prop(settings, f"use_{name}")
+        else:
+            row.label(text=name)
+        rest = row.split(factor=0.55) if len(cells) > 1 else row
+        for number, cell in enumerate(cells):
+            rest.label(text=cell)
+            if number == 0:
+                rest = rest.row()
+
+
+def _cells(effect):
+    """A row of the plan's table: who simulates the effect, its share of the light, the error without it."""
+    if not effect["present"]:
+        return ("not in the scene",)
+    shares = (effect.get("energy"), effect.get("error_if_off"))
+    return (effect["by"] or "left out", *("-" if share is None else f"{100 * share:.2g} %" for share in shares))
+
+
+class FinishPanel(_Panel, bpy.types.Panel):
+    """What cleans the picture."""
+
+    bl_idname = "CAUSTIQUE_PT_finish"
+    bl_label = "Finish"
+
+    def draw(self, context):
+        self._column().prop(context.scene.caustique_render, "finish", text="Denoiser")
+
+
+class DiagnosisPanel(_Panel, bpy.types.Panel):
+    """Why there is no caustic, or what looks like a mistake."""
+
+    bl_idname = "CAUSTIQUE_PT_diagnosis"
+    bl_label = "Caustics"
+
+    def draw(self, context):
+        layout, scene = self.layout, context.scene
+        layout.operator(Diagnose.bl_idname, icon="VIEWZOOM")
+        plan = session.plans.get(scene.name)
+        if plan is None:
+            return
+        if plan.fault is not None:
+            lines.draw_fault(layout, context, plan.fault)
+            return
+        lines.draw(layout, context, plan.headline, "INFO")
+        for reason in asking.reasons(plan.said):
+            lines.draw(layout, context, reason, "DOT")
+        _messages(layout, context, plan.warnings)
+
+
+class MessagesPanel(_Panel, bpy.types.Panel):
+    """What the last render has warned of, and the fault it has ended with."""
+
+    bl_idname = "CAUSTIQUE_PT_messages"
+    bl_label = "Messages of the Last Render"
+
+    @classmethod
+    def poll(cls, context):
+        name = context.scene.name
+        return super().poll(context) and (name in session.faults or bool(session.warnings.get(name)))
+
+    def draw(self, context):
+        name = context.scene.name
+        if name in session.faults:
+            lines.draw_fault(self.layout, context, session.faults[name])
+        _messages(self.layout, context, session.warnings.get(name, []))
+
+
+def _messages(layout, context, messages):
+    """Lines, each with a button that selects the objects it names."""
+    for line in messages:
+        row = layout.box().row()
+        lines.draw(row, context, line, "ERROR")
+        if asking.named(context.scene, [line]):
+            row.operator(Select.bl_idname, text="", icon="RESTRICT_SELECT_OFF").line = line
+
+
+class PassesPanel(_Panel, bpy.types.Panel):
+    """The passes of a view layer."""
+
+    bl_idname = "CAUSTIQUE_PT_passes"
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context):
+        layer = context.view_layer
+        groups = (
+            ("Data", layer, ("use_pass_z", "use_pass_position", "use_pass_normal")),
+            ("", layer.caustique, ("albedo",)),
+            ("Light", layer.caustique, ("parts", "noisy_parts", "noisy")),
+            ("Noise", layer.caustique, ("error", "levels")),
+            ("Cryptomatte", layer, ("use_pass_cryptomatte_object", "use_pass_cryptomatte_material")),
+        )
+        for heading, owner, names in groups:
+            column = self._column()
+            if heading:
+                column = self.layout.column(heading=heading)
+            for name in names:
+                column.prop(owner, name)
+
+
+class LightPanel(_Panel, bpy.types.Panel):
+    """What of a light is carried: Cycles' own panel shows more."""
+
+    bl_idname = "CAUSTIQUE_PT_light"
+    bl_label = "Light"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light is not None
+
+    def draw(self, context):
+        light = context.light
+        self.layout.row().prop(light, "type", expand=True)
+        column = self._column()
+        names = ["color", "use_temperature", "temperature", "energy", "exposure", "normalize"]
+        if light.type == "SUN":
+            names.append("angle")
+        elif light.type == "AREA":
+            names += ["shape", "size"] + ["size_y"] * (light.shape in {"RECTANGLE", "ELLIPSE"})
+        else:
+            names.append("shadow_soft_size")
+        for name in names:
+            if hasattr(light, name):  # some came with Blender 4.5
+                column.prop(light, name)
+
+
+_KINDS = (MethodPanel, StopPanel, FinishPanel, DiagnosisPanel, MessagesPanel, EffectsPanel, PassesPanel, LightPanel)
+
+
+def register():
+    """Show the panels."""
+    for kind in _KINDS:
+        bpy.utils.register_class(kind)
+
+
+def unregister():
+    """Take them away."""
+    for kind in reversed(_KINDS):
+        bpy.utils.unregister_class(kind)

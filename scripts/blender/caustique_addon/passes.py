@@ -1,0 +1,107 @@
+"""Which layers of the program become which passes of Blender, and how they get there."""
+
+from collections import namedtuple
+
+import numpy
+
+#: A pass: its name in Blender (and in the EXR under `--exr-naming blender`), its components, what Blender's compositor
+#: takes it for, its name in `--layers`, the switch of the view layer that asks for it, and whether every scene has it.
+Pass = namedtuple("Pass", "name components kind layer switch always")
+
+_COMBINED = "Combined"
+_PARTS = ("Direct", "Indirect", "Caustic", "Emission", "Volume")
+_BANDWIDTHS = 5
+_CRYPTOMATTES = 3  # layers of two ranks each
+#: Switches that Blender itself has; the others are in `properties.Passes`.
+_BLENDERS = {"use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_cryptomatte_object",
+             "use_pass_cryptomatte_material"}
+
+PASSES = (
+    Pass("Depth", "Z", "VALUE", "Z", "use_pass_z", True),
+    Pass("Position", "XYZ", "VECTOR", "P", "use_pass_position", True),
+    Pass("Normal", "XYZ", "VECTOR", "normal", "use_pass_normal", True),
+    *(Pass(f"CryptoObject{n:02}", "RGBA", "COLOR", "CryptoObject", "use_pass_cryptomatte_object", True)
+      for n in range(_CRYPTOMATTES)),
+    *(Pass(f"CryptoMaterial{n:02}", "RGBA", "COLOR", "CryptoMaterial", "use_pass_cryptomatte_material", True)
+      for n in range(_CRYPTOMATTES)),
+    Pass("Denoising Albedo", "RGB", "COLOR", "albedo", "albedo", True),
+    *(Pass(f"Combined{part}", "RGB", "COLOR", f"Combined{part}", "parts", False) for part in _PARTS),
+    Pass("Noisy", "RGB", "COLOR", "Noisy", "noisy", True),
+    *(Pass(part, "RGB", "COLOR", part, "noisy_parts", False) for part in _PARTS),
+    Pass("Error", "RGB", "COLOR", "Error", "error", True),
+    *(Pass(f"{name}{n}", "RGB", "COLOR", f"{name}{n}", "levels", False)
+      for name in ("Level", "Variance") for n in range(1, _BANDWIDTHS + 1)),
+)
+
+
+def wanted(view_layer):
+    """The passes that a view layer asks for, besides the picture."""
+    def asked(switch):
+        return getattr(view_layer if switch in _BLENDERS else view_layer.caustique, switch)
+
+    return [one for one in PASSES if asked(one.switch)]
+
+
+def layers(chosen):
+    """What `--layers` has to say for these passes: the program refuses names that the scene cannot have."""
+    if not all(one.always for one in chosen):
+        return "all"
+    return ",".join(dict.fromkeys(["beauty", *(one.layer for one in chosen)]))
+
+
+def fill(render_layer, picture, frame=None):
+    """Put the channels of an `exr.Picture` into the passes of Blender's `render_layer`.
+
+    `frame` is x, y (from the top left), width and height of the part that Blender renders, in pixels of the whole
+    picture; without it everything. Returns the names of the passes that stay black because the program has not made
+    them. Parts are not among these: where one is absent, the scene has no such light, and black is right.
+    """
+    missing = []
+    for one in render_layer.passes:
+        planes = _planes(picture, one.name, one.channel_id)
+        if planes is None:
+            if one.name.replace(_COMBINED, "", 1) not in _PARTS:
+                missing.append(one.name)
+            continue
+        if one.name in {"Position", "Normal"}:
+            x, y, z = planes
+            planes = [x, -z, y]  # glTF's y is up, Blender's z
+        put(one, planes, picture, frame)
+    return missing
+
+
+def fill_combined(render_layer, picture, frame=None):
+    """Put the picture so far, with channels R G B A, into the pass that Blender shows."""
+    for one in render_layer.passes:
+        if one.name == _COMBINED:
+            put(one, [picture.channels[name] for name in "RGBA"], picture, frame)
+
+
+def put(one, planes, picture, frame=None):
+    """Put planes (height, width), the first row on top, into a pass, whose first row is at the bottom."""
+    if frame is not None:
+        x, y, width, height = frame
+        left, top = x - picture.window[0], y - picture.window[1]
+        planes = [plane[top:top + height, left:left + width] for plane in planes]
+    pixels = numpy.ascontiguousarray(numpy.stack(planes, -1)[::-1], numpy.float32).reshape(-1, len(planes))
+    try:
+        one.rect.foreach_set(pixels.ravel())
+    except TypeError:  # Blender 3 wants as many elements as there are pixels, and takes all their components
+        one.rect.foreach_set(pixels)
+
+
+def _planes(picture, name, components):
+    """The channels of a pass, or None. Cryptomattes have components of lower case."""
+    for spelt in (components, components.lower()):
+        names = [f"ViewLayer.{name}.{component}" for component in spelt]
+        if all(name in picture.channels for name in names):
+            return [picture.channels[name] for name in names]
+    return None
+
+
+def stamp(result, picture, view_layer):
+    """Give Blender's result the manifests of the cryptomattes, under the name of its own view layer."""
+    for name, value in picture.text.items():
+        if name.startswith("cryptomatte/"):
+            result.stamp_data_add_field(name, value.replace("ViewLayer.", f"{view_layer}.", 1)
+                                        if name.endswith("/name") else value)

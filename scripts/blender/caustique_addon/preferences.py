@@ -1,0 +1,48 @@
+"""Where the program is: the add-on's preferences, which also say what is wrong with it."""
+
+import bpy
+
+from . import lines, program
+from .fault import Fault
+
+
+class Preferences(bpy.types.AddonPreferences):
+    """Edit > Preferences > Add-ons > caustique."""
+
+    bl_idname = __package__
+
+    program: bpy.props.StringProperty(
+        name="Program", subtype="FILE_PATH", update=lambda _self, _context: program.ask_again(),
+        description="The program caustique; where nothing is chosen, the one on the PATH")
+    exporter: bpy.props.StringProperty(
+        name="Exporter", subtype="FILE_PATH",
+        description="Another Blender, or a Python that has bpy, to export the scene with; where nothing is chosen, "
+                    "this Blender")
+
+    def draw(self, context):
+        """The paths, and what was found there."""
+        layout = self.layout
+        layout.prop(self, "program")
+        try:
+            path = program.find(self.program)
+            layout.label(text=f"{path}, version {program.dotted(program.version(path))}", icon="CHECKMARK")
+            for fault in program.missing_libraries(path):
+                lines.draw_fault(layout, context, fault)
+        except Fault as fault:
+            lines.draw_fault(layout, context, fault)
+        layout.prop(self, "exporter")
+
+
+def get(context):
+    """The add-on's preferences."""
+    return context.preferences.addons[__package__].preferences
+
+
+def register():
+    """Show them."""
+    bpy.utils.register_class(Preferences)
+
+
+def unregister():
+    """Take them away."""
+    bpy.utils.unregister_class(Preferences)

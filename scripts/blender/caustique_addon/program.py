@@ -1,0 +1,75 @@
+"""The program: where it is, whether it is new enough, what it can do, and what it lacks."""
+
+import functools
+import json
+import os
+import re
+import shutil
+import subprocess
+
+from .fault import Fault
+
+#: The oldest version whose command line the add-on speaks.
+OLDEST = (0, 1, 0)
+HOW_TO_GET_IT = ("clone the repository of caustique, run ./scripts/demo.sh there, "
+                 "and choose target/release/caustique in the add-on's preferences")
+_PATIENCE = 60  # seconds; a program that says less in this time does not work
+
+
+def find(chosen):
+    """The path of the program: the one `chosen` in the preferences, else `caustique` on the PATH. It is new enough."""
+    path = os.path.expanduser(chosen) if chosen else shutil.which("caustique")
+    if path is None:
+        raise Fault("the program caustique is not on the PATH", HOW_TO_GET_IT)
+    if not os.path.isfile(path) or not os.access(path, os.X_OK):
+        raise Fault(f"{path} is not a program", HOW_TO_GET_IT)
+    found = version(path)
+    if found < OLDEST:
+        raise Fault(f"{path} is version {dotted(found)}, and the add-on needs {dotted(OLDEST)} or newer",
+                    "update the repository, build it with 'cargo build --release', and choose the new program")
+    return path
+
+
+def dotted(numbers):
+    """A version as people write it."""
+    return ".".join(map(str, numbers))
+
+
+def version(path):
+    """The version of the program at `path`, three numbers."""
+    said = _ask(path, "--version").stdout
+    numbers = re.fullmatch(r"caustique (\d+)\.(\d+)\.(\d+)\S*\s*", said)
+    if numbers is None:
+        raise Fault(f"{path} does not answer as caustique does", HOW_TO_GET_IT)
+    return tuple(map(int, numbers.groups()))
+
+
+def options(path):
+    """The options of its `render` command, such as "--preview"."""
+    return set(re.findall(r"--[a-z][a-z-]*", _ask(path, "render", "--help").stdout))
+
+
+def missing_libraries(path):
+    """A Fault for each library that the program cannot load."""
+    said = json.loads(_ask(path, "doctor", "--json").stdout)
+    return [Fault(f"{name}: {found['cause']}", found.get("hint") or "") for name, found in said.items()
+            if isinstance(found, dict) and not found["found"]]
+
+
+def ask_again():
+    """Forget the answers: a library may have been installed since."""
+    _answer.cache_clear()
+
+
+def _ask(path, *arguments):
+    """The answer of the program; asked again only where the file has changed."""
+    return _answer(path, os.stat(path).st_mtime_ns, arguments)
+
+
+@functools.lru_cache(maxsize=16)
+def _answer(path, _changed, arguments):
+    try:
+        return subprocess.run([path, *arguments], capture_output=True, text=True, timeout=_PATIENCE, check=False,
+                              stdin=subprocess.DEVNULL)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise Fault(f"{path} does not run: {error}", HOW_TO_GET_IT) from error

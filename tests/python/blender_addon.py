@@ -1,0 +1,246 @@
+"""Rendering through the add-on's engine, against the command line and against numbers. Needs bpy."""
+
+import math
+import re
+import time
+import unittest
+from unittest import mock
+
+import bpy
+import numpy
+
+from addon import Installed, channels, part_of_addon
+
+
+class Renders(Installed):
+    def test_passes_are_the_command_lines_to_the_last_bit(self):
+        self.stage()
+        self.layer.name = "Shot 7"
+        self.passes("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_cryptomatte_object",
+                    "use_pass_cryptomatte_material", "albedo", "parts", "noisy", "noisy_parts", "error", "levels")
+        found, expected = self.render_and_keep(), self.by_hand()
+        for name in ("Position", "Normal"):  # glTF's y is up, Blender's z
+            expected[f"{name}.Y"], expected[f"{name}.Z"] = -expected[f"{name}.Z"], expected[f"{name}.Y"]
+        expected = {re.sub(r"(Crypto\w+)\.(\w)", lambda m: f"{m[1]}.{m[2].upper()}", name): pixels
+                    for name, pixels in expected.items()}
+        for name, pixels in found.items():
+            if name in expected:
+                self.assertEqual(pixels.tobytes(), expected[name].tobytes(), name)
+            else:
+                self.assertIn(name.split(".")[0], ("Volume", "CombinedVolume"))
+                self.assertFalse(pixels.any(), name)
+        self.assertEqual(len(found), 4 + 1 + 3 + 3 + 6 * 4 + 3 + 5 * 3 + 3 + 5 * 3 + 3 + 10 * 3)
+        self.assertGreater(found["CombinedCaustic.G"].max(), 0)
+
+    def test_numbers_of_a_lit_plane(self):
+        slope = math.atan(0.75)
+        self.plane(at=(0, 0, 1), turn=(slope, 0, 0))
+        self.sun(math.pi)
+        self.eye(height=10, width=4)
+        self.passes("use_pass_z", "use_pass_position", "use_pass_normal")
+        self.settings.method, self.settings.finish = "path", "off"
+        found = self.render()
+        # The plane rises towards +y, and the sun stands straight above: pi W/m2 times the cosine, half of it reflected.
+        x, y = (numpy.arange(32) + 0.5) / 8 - 2, (11.5 - numpy.arange(24)) / 8
+        numpy.testing.assert_allclose(found["Combined.G"], 0.5 * 0.8, rtol=1e-3)
+        numpy.testing.assert_allclose(found["Combined.A"], 1, rtol=1e-5)
+        numpy.testing.assert_allclose(found["Position.X"], numpy.tile(x, (24, 1)), atol=0.5 / 8 + 1e-4)
+        numpy.testing.assert_allclose(found["Position.Y"], numpy.tile(y[:, None], (1, 32)), atol=0.5 / 8 + 1e-4)
+        numpy.testing.assert_allclose(found["Position.Z"], 1 + 0.75 * found["Position.Y"], atol=1e-4)
+        numpy.testing.assert_allclose(found["Depth.Z"], 10 - found["Position.Z"], atol=1e-4)
+        for axis, value in zip("XYZ", (0, -0.6, 0.8)):
+            numpy.testing.assert_allclose(found[f"Normal.{axis}"], value, atol=1e-4)
+
+    def test_three_frames_move_as_they_are_animated(self):
+        self.plane()
+        self.sun(3)
+        self.eye()
+        cube = bpy.data.meshes.new("cube")
+        cube.from_pydata([(x, y, 0.1) for x, y in ((0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5))], [], [(0, 1, 2, 3)])
+        body = self.put("tile", cube)
+        for frame, at in ((1, -1.5), (2, 0), (3, 1)):
+            body.location.x = at
+            body.keyframe_insert("location", index=0, frame=frame)
+        self.scene.frame_start, self.scene.frame_end = 1, 3
+        self.passes("use_pass_z")
+        for at, found in zip((-1.5, 0, 1), self.render("frame", animation=True)):
+            columns = numpy.flatnonzero((found["Depth.Z"] < 9.95).any(0))
+            self.assertEqual((columns[0], columns[-1]), ((at + 2) * 8, (at + 2.5) * 8 - 1))
+
+    def test_files_beside_the_scene_are_found(self):
+        """An image and a library, both with relative paths, of a scene with changes that are not saved."""
+        picture = bpy.data.images.new("paint", 4, 4)
+        picture.generated_color = (1, 0.25, 0, 1)
+        picture.filepath_raw, picture.file_format = str(self.dir / "paint.png"), "PNG"
+        picture.save()
+        tile = bpy.data.meshes.new("tile")
+        tile.from_pydata([(-1, -1, 3), (1, -1, 3), (1, 1, 3), (-1, 1, 3)], [], [(0, 1, 2, 3)])
+        tile.uv_layers.new()
+        tile.materials.append(self.material("painted", Roughness=1.0, Specular_IOR_Level=0.0))
+        tree = tile.materials[0].node_tree
+        paint = tree.nodes.new("ShaderNodeTexImage")
+        paint.image = picture
+        shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        tree.links.new(paint.outputs["Color"], shader.inputs["Base Color"])
+        body = bpy.data.objects.new("tile", tile)
+        bpy.data.libraries.write(str(self.dir / "tile.blend"), {body}, path_remap="RELATIVE")
+        bpy.data.meshes.remove(tile)
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.dir / "scene.blend"))
+        with bpy.data.libraries.load("//tile.blend", link=True) as (_, wanted):
+            wanted.objects = ["tile"]
+        self.scene.collection.objects.link(wanted.objects[0])
+        self.plane()
+        self.sun(math.pi)
+        self.eye()
+        self.passes("use_pass_z")
+        self.settings.method, self.settings.finish = "path", "off"
+        found = self.render()
+        self.assertAlmostEqual(float(found["Depth.Z"][12, 16]), 7, 4)
+        # pi W/m2 on a Lambertian surface: its reflectance. The image holds sRGB values of eight bits.
+        for channel, value in zip("RGB", (1, ((64 / 255 + 0.055) / 1.055) ** 2.4, 0)):
+            self.assertAlmostEqual(float(found[f"Combined.{channel}"][12, 16]), value, 4)
+
+    def test_view_layers_have_passes_of_their_own(self):
+        self.stage()
+        self.passes("use_pass_z")
+        second = self.scene.view_layers.new("second")
+        second.use_pass_z, second.caustique.noisy = False, True
+        self.render()
+        found = channels(self.dir / "render.exr")
+        self.assertEqual({name.rsplit(".", 1)[0] for name in found if not name.startswith("Composite")},
+                         {"ViewLayer.Combined", "ViewLayer.Depth", "second.Combined", "second.Noisy"})
+        self.assertEqual(found["ViewLayer.Combined.G"].tobytes(), found["second.Combined.G"].tobytes())
+
+    def test_a_border_is_a_part_of_the_whole(self):
+        self.stage()
+        self.passes("use_pass_z")
+        whole = self.render("whole")
+        render = self.scene.render
+        render.use_border = render.use_crop_to_border = True
+        render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.5, 1.0
+        part = self.render("part")
+        for name in ("Combined.R", "Depth.Z"):
+            self.assertEqual(part[name].shape, (12, 16))
+            self.assertTrue(numpy.array_equal(part[name], whole[name][:12, 8:24]), name)
+
+    def test_settings_reach_the_program(self):
+        self.stage()
+        self.settings.seed, self.settings.finish, self.settings.use_caustic = 7, "off", False
+        self.settings.arguments = "--max-depth 5"
+        found = self.render_and_keep()
+        expected = self.by_hand("--seed", 7, "--no-combine", "--effects=-caustic", "--max-depth", 5)
+        self.assertEqual(found["Combined.G"].tobytes(), expected["Combined.G"].tobytes())
+        other = self.by_hand("--seed", 8, "--no-combine", "--effects=-caustic", "--max-depth", 5)
+        self.assertNotEqual(found["Combined.G"].tobytes(), other["Combined.G"].tobytes())
+
+    def composite(self, output):
+        """Render, and let the compositor show `output(tree, layers)`: a socket, made from the Render Layers node.
+
+        Returns the green of what it shows, and the passes.
+        """
+        if bpy.app.version >= (5, 0, 0):
+            tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
+            self.scene.compositing_node_group = tree
+            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+            shown = tree.nodes.new("NodeGroupOutput")
+        else:
+            self.scene.use_nodes = True
+            tree = self.scene.node_tree
+            tree.nodes.clear()
+            shown = tree.nodes.new("CompositorNodeComposite")
+        layers = tree.nodes.new("CompositorNodeRLayers")
+        layers.scene, layers.layer = self.scene, self.layer.name
+        tree.links.new(output(tree, layers), shown.inputs[0])
+        found = self.render()
+        return channels(self.dir / "render.exr")["Composite.Combined.G"], found
+
+    def test_the_compositor_has_every_pass_as_an_output(self):
+        self.stage()
+        self.layer.name = "Shot"
+        self.passes("parts", "use_pass_z")
+        shown, found = self.composite(lambda _, layers: layers.outputs["CombinedCaustic"])
+        self.assertGreater(shown.max(), 0)
+        numpy.testing.assert_array_equal(shown, found["CombinedCaustic.G"])
+
+    def test_the_compositor_picks_objects_by_cryptomatte(self):
+        self.stage()
+        self.layer.name = "Shot"
+        self.passes("use_pass_cryptomatte_object", "use_pass_z")
+
+        def matte(tree, _):
+            node = tree.nodes.new("CompositorNodeCryptomatteV2")
+            node.source, node.scene = "RENDER", self.scene
+            node.layer_name = "Shot.CryptoObject"
+            node.matte_id = "ball"
+            return node.outputs["Matte"]
+
+        shown, found = self.composite(matte)
+        ball = found["Depth.Z"] < 9.9  # of one sample a pixel, at the first hit, which is the ball's or the table's
+        self.assertTrue((shown[ball] > 0).all())
+        self.assertAlmostEqual(float(shown.sum()), math.pi * (0.7 * 8) ** 2, delta=3)
+
+    def test_the_picture_so_far_is_shown(self):
+        self.stage()
+        self.settings.iterations = 60
+        engine, shown = part_of_addon("engine"), []
+        show = engine.Engine._show
+
+        def watched(self, picture, *where):
+            shown.append({name: plane.copy() for name, plane in picture.channels.items()})
+            show(self, picture, *where)
+
+        # The finished picture is withheld, so what Blender has is the last one before it.
+        with mock.patch.multiple(engine.Engine, _show=watched, _deliver=lambda *_: None):
+            found = self.render_and_keep()
+        for channel in "RGBA":
+            self.assertEqual(found[f"Combined.{channel}"].tobytes(), shown[-1][channel].tobytes())
+        numpy.testing.assert_allclose(shown[0]["G"].mean(), self.by_hand()["Combined.G"].mean(), rtol=0.2)
+
+    def test_nothing_is_left_in_the_temporary_folder(self):
+        self.stage()
+        self.render()
+        self.assertEqual(self.temporary(), [])
+
+
+class Stops(Installed):
+    def setUp(self):
+        super().setUp()
+        self.stage()
+        self.settings.iterations = 100_000
+
+    def stop_when(self, condition):
+        """Render until `condition(run)` holds, then as if the user had pressed Esc; seconds from then to the end."""
+        engine, runs, pressed = part_of_addon("engine"), [], []
+        begin = part_of_addon("run").Run
+
+        def watched(*arguments):
+            runs.append(begin(*arguments))
+            return runs[-1]
+
+        def esc(_engine):
+            if not pressed and condition(runs[-1] if runs else None):
+                pressed.append(time.monotonic())
+            return bool(pressed)
+
+        with mock.patch.object(engine.run, "Run", watched), mock.patch.object(engine.Engine, "_stopped", esc):
+            found = self.render()
+        self.assertFalse(runs and runs[-1].working())
+        return found, time.monotonic() - pressed[0]
+
+    def test_in_the_middle_the_picture_so_far_is_kept(self):
+        self.passes("use_pass_z", "noisy")
+        found, seconds = self.stop_when(lambda run: run and run.progress and run.progress["iteration"] >= 3)
+        self.assertLess(seconds, 5)
+        self.assertGreater(found["Combined.G"].mean(), 0.1)
+        self.assertGreater(found["Noisy.G"].mean(), 0.1)
+        self.assertAlmostEqual(float(numpy.median(found["Depth.Z"])), 10, 3)
+        self.assertEqual(self.temporary(), [])
+
+    def test_during_the_export(self):
+        _, seconds = self.stop_when(lambda run: not run)
+        self.assertLess(seconds, 2)
+        self.assertEqual(self.temporary(), [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,221 @@
+"""What the add-on says: faults with their remedy, warnings, and the diagnosis. Needs bpy."""
+
+import os
+import unittest
+from unittest import mock
+
+import bmesh
+import bpy
+
+import support
+from addon import Installed, part_of_addon
+
+
+class Tells(Installed):
+    """What goes wrong, and what is left aside, is said where the user looks."""
+
+    def fault(self):
+        """The error that a render ends with, as Blender shows it."""
+        with self.assertRaises(RuntimeError) as raised:
+            self.render()
+        self.assertFalse((self.dir / "render.exr").exists())
+        return " ".join(str(raised.exception).split())
+
+    def said(self):
+        return part_of_addon("session").warnings.get(self.scene.name, [])
+
+    def program(self, text):
+        """A stand-in for the program: a shell script."""
+        path = self.dir / "stand-in"
+        path.write_text(f"#!/bin/sh\n{text}\n")
+        path.chmod(0o755)
+        self.preferences.program = str(path)
+
+    def test_a_program_that_is_not_there(self):
+        self.stage()
+        self.preferences.program = str(self.dir / "nowhere")
+        told = self.fault()
+        self.assertIn("nowhere is not a program", told)
+        self.assertIn("Remedy: clone the repository", told)
+        self.assertIn("nowhere", part_of_addon("session").faults[self.scene.name].what)
+
+    def test_a_program_that_is_not_on_the_path(self):
+        self.stage()
+        self.preferences.program = ""
+        with mock.patch.dict(os.environ, PATH=str(self.dir)):
+            self.assertIn("the program caustique is not on the PATH Remedy: ", self.fault())
+        with mock.patch.dict(os.environ, PATH=f"{support.binary().parent}:{os.environ['PATH']}"):
+            self.assertTrue(self.render())
+
+    def test_a_program_that_is_too_old(self):
+        self.stage()
+        self.program("echo caustique 0.0.9")
+        self.assertIn("is version 0.0.9, and the add-on needs 0.1.0 or newer Remedy: update", self.fault())
+
+    def test_a_program_that_is_another(self):
+        self.stage()
+        self.program("echo something else 1.2.3")
+        self.assertIn("does not answer as caustique does", self.fault())
+
+    def test_a_program_that_dies(self):
+        self.stage()
+        self.program('[ "$1" = --version ] && echo caustique 9.9.9 && exit; [ "$2" = --help ] && exit; kill -9 $$')
+        self.assertIn("caustique ended by signal 9", self.fault())
+
+    def test_what_the_program_says_and_its_remedy(self):
+        self.stage()
+        self.settings.arguments = "--layers Nope"
+        told = self.fault()
+        self.assertIn('--layers: no layer "Nope" Remedy: there are beauty,', told)
+        self.settings.arguments = "--seed 'open"
+        self.assertIn("close every quotation mark", self.fault())
+
+    def test_pictures_that_cannot_be_read(self):
+        self.stage()
+        self.settings.arguments = "--compression zip"
+        self.assertIn("is compressed Remedy: render with '--compression none'", self.fault())
+        picture = self.dir / "part.exr"
+        support.run(["render", support.scene("cornell"), "-o", picture, "--width", 8, "--iterations", 1,
+                     "--compression", "none", "--progress", "none"], check=0)
+        whole = picture.read_bytes()
+        for data, told in ((whole[:-1], "is not complete"), (b"P6 8 8 255\n" + bytes(192), "is not an EXR file")):
+            picture.write_bytes(data)
+            with self.assertRaisesRegex(part_of_addon("fault").Fault, told):
+                part_of_addon("exr").Picture(str(picture))
+
+    def test_an_animation_ends_at_the_first_fault(self):
+        self.stage()
+        self.settings.arguments = "--layers Nope"
+        self.scene.frame_end = 3
+        with self.assertRaises(RuntimeError):
+            self.render("frame", animation=True)
+        self.assertEqual(list(self.dir.glob("frame-*")), [])
+
+    def test_an_exporter_that_is_none(self):
+        self.stage()
+        self.preferences.exporter = "/bin/false"
+        self.assertIn("the scene could not be exported", self.fault())
+        self.preferences.exporter = "/nowhere/blender"
+        self.assertIn("/nowhere/blender does not run: No such file or directory Remedy: choose", self.fault())
+        with self.assertRaisesRegex(RuntimeError, "/nowhere/blender does not run"):
+            bpy.ops.caustique.diagnose()
+        self.assertEqual(self.temporary(), [])
+
+    def test_what_nobody_has_foreseen(self):
+        self.stage()
+        with mock.patch.object(part_of_addon("program"), "find", lambda _: 1 / 0):
+            told = self.fault()
+        self.assertIn("the add-on has failed: ZeroDivisionError: division by zero Remedy: report it", told)
+
+    def test_libraries_that_are_missing(self):
+        with mock.patch.dict(os.environ, CAUSTIQUE_OIDN="/nowhere/libOpenImageDenoise.so"):
+            faults = part_of_addon("program").missing_libraries(str(support.binary()))
+        self.assertEqual([fault.what.split(":")[0] for fault in faults], ["oidn"])
+        self.assertTrue(faults[0].remedy)
+
+    def test_warnings_of_the_exporter_and_of_the_program(self):
+        self.stage()
+        self.ball("bowl", at=(1, 1, 1), closed=False)
+        self.render()
+        self.assertTrue([line for line in self.said() if line.startswith('material "bowl glass": ')], self.said())
+        self.settings.use_caustic = False
+        self.render()
+        self.assertTrue([line for line in self.said() if "left out, though called for" in line], self.said())
+
+    def test_settings_of_blender_that_are_left_aside(self):
+        limits, render = part_of_addon("limits"), self.scene.render
+        self.assertEqual(limits.ignored(self.scene), [])
+        for name in ("use_motion_blur", "use_multiview", "film_transparent", "use_freestyle"):
+            setattr(render, name, True)
+        render.pixel_aspect_x = 2
+        lines = limits.ignored(self.scene)
+        self.assertEqual(len(lines), 5)
+        self.assertTrue(all(": " in line for line in lines))
+
+    def test_simulations_are_named(self):
+        self.stage()
+        bpy.data.objects["plane"].modifiers.new("Flag", "CLOTH")
+        bpy.data.objects["ball"].modifiers.new("Smooth", "SUBSURF")
+        said = part_of_addon("limits").ignored(self.scene)
+        self.assertEqual(len(said), 1)
+        self.assertIn('object "plane": its modifier Flag is not simulated for the render: apply it', said[0])
+
+    def test_passes_that_a_method_does_not_make(self):
+        self.stage()
+        self.settings.method = "path"
+        self.passes("levels")
+        found = self.render()
+        self.assertFalse(found["Level5.G"].any())
+        self.assertTrue([line for line in self.said() if "Level5" in line and "choose another method" in line])
+
+    def test_an_image_with_changes_that_are_not_saved(self):
+        self.stage()
+        picture = bpy.data.images.new("paint", 4, 4)
+        picture.pixels[0] = 0.5
+        picture.use_fake_user = True
+        self.render()
+        self.assertTrue([line for line in self.said() if line.startswith('image "paint": ')], self.said())
+
+
+class Diagnoses(Installed):
+    def ask(self):
+        bpy.ops.caustique.diagnose()
+        return part_of_addon("session").plans[self.scene.name]
+
+    def test_glass_that_is_a_thin_wall(self):
+        self.plane()
+        self.sun(3)
+        self.eye()
+        self.ball("bowl", closed=False)
+        self.ball("ball", at=(1, 1, 1))
+        plan = self.ask()
+        self.assertTrue([line for line in plan.warnings if '"bowl"' in line and "thin wall" in line], plan.warnings)
+        self.assertEqual([thing.name for thing in self.scene.objects if thing.select_get()], ["bowl"])
+        self.assertEqual(bpy.context.view_layer.objects.active.name, "bowl")
+        self.assertEqual(set(part_of_addon("properties").EFFECTS), {effect["name"] for effect in plan.said["effects"]})
+
+    def test_a_lamp_in_a_box_names_the_box(self):
+        self.plane()
+        self.eye()
+        self.ball()
+        shape = bmesh.new()
+        bmesh.ops.create_cube(shape, size=0.5)
+        mesh = bpy.data.meshes.new("casing")
+        shape.to_mesh(mesh)
+        shape.free()
+        mesh.materials.append(self.material("iron", Roughness=1.0))
+        self.put("casing", mesh, (0, 1, 3))
+        lamp = bpy.data.lights.new("lamp", "POINT")
+        self.put("lamp", lamp, (0, 1, 3))
+        self.ask()
+        self.assertIn("casing", [thing.name for thing in self.scene.objects if thing.select_get()])
+
+    def test_headlines(self):
+        self.plane()
+        self.sun(3)
+        self.eye()
+        self.assertIn("Nothing in the scene casts a caustic", self.ask().headline)
+        self.ball()
+        self.assertIn("Caustics are rendered, by photons", self.ask().headline)
+        self.settings.use_caustic = self.settings.use_sds = False
+        self.assertIn("they are left out", self.ask().headline)
+
+    def test_a_fault(self):
+        self.stage()
+        self.preferences.program = "/nowhere"
+        with self.assertRaises(RuntimeError):
+            bpy.ops.caustique.diagnose()
+        self.assertIn("Remedy", str(part_of_addon("session").plans[self.scene.name].fault))
+
+    def test_names_in_lines(self):
+        self.stage()
+        named = part_of_addon("asking").named
+        for line, names in (('object "ball": no light', ["ball"]),
+                            ('material "ball glass" on "x" and 2 more', ["ball"]),
+                            ('light "sun": all its light stays within "plane"', ["sun", "plane"]),
+                            ('world "plane": its nodes', []), ("nothing", [])):
+            self.assertEqual([thing.name for thing in named(self.scene, [line])], names, line)
+
+
+if __name__ == "__main__":
+    unittest.main()
