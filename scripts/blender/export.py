@@ -26,17 +26,19 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import bpy  # noqa: E402
 
+import bake  # noqa: E402
 import glb  # noqa: E402
 import lighting  # noqa: E402
 import shading  # noqa: E402
+import surfaces  # noqa: E402
 
 _CARRIED = {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY", "LIGHT", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER"}
 
 
-def write(path, scene=None):
+def write(path, scene=None, bake_size=bake.SIZE):
     """Export the open scene (or `scene`) to the .glb at `path`; return the warnings, a list of strings.
 
-    The scene is left as it was found.
+    `bake_size`: texels a side of the images into which materials are baked, 0 bakes none and names what is lost. The scene is left as it was found.
     """
     path = os.path.abspath(path)
     if scene is not None and scene != bpy.context.window.scene:
@@ -54,8 +56,7 @@ def write(path, scene=None):
     with contextlib.ExitStack() as undo:
         for thing in shown:
             _render_level(thing, undo, warn)
-        for material in _worn(shown):
-            shading.principled(material, undo, warn)
+        worn = surfaces.Surfaces(_with_instanced(shown), _worn(shown), undo, warn, bake_size)
         for thing in shown:
             if thing.type == "LIGHT" and thing.data.type == "AREA":
                 lighting.area_mesh(thing, undo, warn)
@@ -63,7 +64,7 @@ def write(path, scene=None):
         bodies = _bodies()
         _run_exporter(path)
     document, buffer = glb.read(path)
-    _finish_materials(document, bodies, warn)
+    buffer = worn.finish(document, buffer, bodies)
     _finish_nodes(document, scene, warn)
     _finish_lamps(document)
     said = lighting.world_extras(scene, path, warn)
@@ -102,11 +103,16 @@ def _render_level(thing, undo, warn):
                 setattr(modifier, name, value)
 
 
+def _with_instanced(things):
+    """Objects, and those of the collections that they are instances of."""
+    inside = [o for t in things if t.instance_collection for o in t.instance_collection.all_objects]
+    return list(dict.fromkeys([*things, *inside]))
+
+
 def _worn(things):
     """Materials with nodes that something in the scene wears, instanced collections included."""
-    inside = [o for t in things if t.instance_collection for o in t.instance_collection.all_objects]
     found = {}
-    for thing in [*things, *inside]:
+    for thing in _with_instanced(things):
         for slot in thing.material_slots:
             if slot.material is not None and shading.nodes_of(slot.material) is not None:
                 found[slot.material.name] = slot.material
@@ -161,14 +167,6 @@ def _closed(mesh):
             if a != b:
                 uses[min(a, b), max(a, b)] = uses.get((min(a, b), max(a, b)), 0) + 1
     return all(count % 2 == 0 for count in uses.values())
-
-
-def _finish_materials(document, bodies, warn):
-    for entry in document.get("materials", []):
-        material = bpy.data.materials.get(entry.get("name", ""))
-        if material is not None and shading.nodes_of(material) is not None:
-            closed, least = bodies.get(material.name, (False, 0.0))
-            shading.finish(entry, material, closed, least, warn)
 
 
 def _finish_nodes(document, scene, warn):
