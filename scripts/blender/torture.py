@@ -10,6 +10,7 @@ depend on, so that a run that was stopped goes on where it was.
 
 import argparse
 import hashlib
+import inspect
 import os
 import subprocess
 import sys
@@ -167,7 +168,8 @@ def run(name, look=None):
         beside = [_bytes(os.path.join(folder, file)) for file in sorted(os.listdir(folder))]
         settings = (SIZE, SAMPLES, bpy.app.version_string)
         # What Cycles renders is the feature itself: its code, and the stage.
-        theirs = _kept(_key("cycles", name, settings, *map(_bytes, sources())), lambda seed: (by_cycles(seed), []))
+        scene = inspect.getsource(torture_stage.FEATURES[name]), inspect.getsource(torture_stage)
+        theirs = _kept(_key("cycles", scene, settings), lambda seed: (by_cycles(seed), []))
         try:
             ours = _kept(_key("ours", settings, *beside, _bytes(program())), lambda seed: by_caustique(path, seed))
         except RuntimeError as error:
@@ -182,16 +184,11 @@ def run(name, look=None):
     return Result(name, verdict, mean, tile, noise, "; ".join(losses))
 
 
-def sources():
-    """The files that say what the scenes are."""
-    folder = os.path.dirname(os.path.abspath(__file__))
-    return [os.path.join(folder, name) for name in sorted(os.listdir(folder)) if name.startswith("torture_")]
-
-
 def _show(path, stage, theirs, ours):
     """Cycles' picture and ours side by side, and ten times their difference, each pixel as 6 x 6."""
     pair = [(p[0] + p[1]) / 2 for p in (theirs, ours)]
-    wide = numpy.concatenate([*pair, 0.5 + 5 * (pair[1] - pair[0])], axis=1).repeat(6, 0).repeat(6, 1)
+    pair = [p / max(1.0, float(numpy.percentile(pair[0], 98))) for p in pair]
+    wide = numpy.concatenate([*pair, 0.2 + 5 * (pair[1] - pair[0])], axis=1).repeat(6, 0).repeat(6, 1)
     stored = numpy.clip(wide, 0, 1) ** (1 / 2.2)
     image = stage.image("look", stored)
     image.file_format = "PNG"

@@ -36,8 +36,9 @@ class Stage:
         self.background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
         self.background.inputs["Color"].default_value = (0.5, 0.55, 0.6, 1)
         lamp = bpy.data.lights.new("lamp", "AREA")
-        lamp.size, lamp.energy = 2.5, 350
+        lamp.size, lamp.energy = 1.2, 200  # small, for unlike Cycles' it stands in the world's light
         self.lamp = self.place("lamp", lamp, (1.5, -2.5, 4), (0, 0, 0.5))
+        self.lamp.visible_camera = True
         floor = bpy.data.meshes.new("floor")
         floor.from_pydata([(-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)], [], [(0, 1, 2, 3)])
         self.floor = self.place("floor", floor)
