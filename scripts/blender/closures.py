@@ -60,7 +60,7 @@ def _faceted(mix):
     leaves = isinstance(below, Leaf) and isinstance(coat, Leaf) and below.coat is None
     if output is None or not leaves or coat.node.type not in _GLOSSY or not output.is_output:
         return mix
-    if below.node.type not in {"BSDF_DIFFUSE", "BSDF_REFRACTION"}:
+    if below.node.type not in {"BSDF_DIFFUSE", "BSDF_REFRACTION", "BSDF_TRANSPARENT"}:
         return mix
     node = output.node
     if node.type == "FRESNEL":

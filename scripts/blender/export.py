@@ -8,7 +8,8 @@ Blender's own glTF exporter writes the file. Beyond its defaults this switches o
 applied modifiers (at render level), and completes what it leaves out:
 
 - area lights become one-sided emissive meshes of the same radiance;
-- Glass, Refraction, Glossy, Diffuse and volume shaders become what glTF has for them;
+- shaders, mixes of them and node groups become the nearest glTF material, and what varies in ways that glTF has no
+  words for is baked into images (--bake-size N, --no-bake);
 - transmissive materials on closed meshes become solid (KHR_materials_volume), so that they refract;
 - absorption keeps Cycles' coefficients; a material's custom property `abbe` (number V_d) or `dispersion` (20/V_d, as in
   glTF) becomes KHR_materials_dispersion;
@@ -18,6 +19,7 @@ applied modifiers (at render level), and completes what it leaves out:
 Lights keep the exporter's standard units (lm/W 683). Whatever cannot be carried is named in a warning on stderr.
 """
 
+import argparse
 import contextlib
 import os
 import sys
@@ -38,7 +40,8 @@ _CARRIED = {"MESH", "CURVE", "SURFACE", "FONT", "META", "EMPTY", "LIGHT", "CAMER
 def write(path, scene=None, bake_size=bake.SIZE):
     """Export the open scene (or `scene`) to the .glb at `path`; return the warnings, a list of strings.
 
-    `bake_size`: texels a side of the images into which materials are baked, 0 bakes none and names what is lost. The scene is left as it was found.
+    `bake_size`: texels a side of the images into which materials are baked; 0 bakes none and names what is lost. The
+    scene is left as it was found.
     """
     path = os.path.abspath(path)
     if scene is not None and scene != bpy.context.window.scene:
@@ -215,22 +218,35 @@ def _active_camera_first(document, scene):
 
 def main(arguments):
     """Command line: [IN.blend] OUT.glb; the exit code."""
-    if not 1 <= len(arguments) <= 2 or not arguments[-1].endswith(".glb"):
-        print("usage: export.py IN.blend OUT.glb\n       blender -b IN.blend --python export.py -- OUT.glb", file=sys.stderr)
-        return 2
+    parser = argparse.ArgumentParser(
+        prog="export.py", usage="export.py [options] IN.blend OUT.glb\n       "
+        "blender -b IN.blend --python export.py -- [options] OUT.glb")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="[IN.blend] OUT.glb")
+    parser.add_argument("--bake-size", type=int, default=bake.SIZE, metavar="N",
+                        help=f"texels a side of the images into which materials are baked (default {bake.SIZE})")
+    parser.add_argument("--no-bake", action="store_true", help="bake no material; each loss is named")
+    given = parser.parse_args(arguments)
+    if len(given.files) > 2 or not given.files[-1].endswith(".glb"):
+        parser.error("OUT.glb has to end in .glb, with at most one IN.blend before it")
+    if not 4 <= given.bake_size <= 16384:
+        parser.error("--bake-size has to lie between 4 and 16384 texels")
     try:
-        if len(arguments) == 2:
-            bpy.ops.wm.open_mainfile(filepath=os.path.abspath(arguments[0]), load_ui=False, use_scripts=False)
-        write(arguments[-1])
+        if len(given.files) == 2:
+            source = os.path.abspath(given.files[0])
+            bpy.ops.wm.open_mainfile(filepath=source, load_ui=False, use_scripts=False)
+        write(given.files[-1], bake_size=0 if given.no_bake else given.bake_size)
     except Exception as error:  # whatever Blender raises: a message and a code, never a hanging process
-        print(f"error: {arguments[0]}: {error}".strip(), file=sys.stderr)
+        print(f"error: {given.files[0]}: {error}".strip(), file=sys.stderr)
         return 1
     return 0
 
 
 if __name__ == "__main__":
     given = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
-    code = main(given)
+    try:
+        code = main(given)
+    except SystemExit as stopped:  # help, or a command line that is wrong
+        code = stopped.code
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)  # Blender as a module may hang while it shuts down

@@ -71,6 +71,19 @@ def srgb(x):
     return numpy.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
+def give_default(document):
+    """Let what wears no material be grey as in Cycles; glTF's own default is a rough white metal."""
+    bare = [primitive for mesh in document.get("meshes", []) for primitive in mesh["primitives"]
+            if "material" not in primitive]
+    if bare:
+        materials = document.setdefault("materials", [])
+        materials.append({
+            "name": "no material", "doubleSided": True, "extensions": {"KHR_materials_specular": {"specularFactor": 0}},
+            "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.8, 0.8, 1], "metallicFactor": 0}})
+    for primitive in bare:
+        primitive["material"] = len(materials) - 1
+
+
 def write(entry, channels, writer, texcoord):
     """Complete the material `entry` of the exporter by `channels`.
 

@@ -84,7 +84,10 @@ class Reader:
 
     def _glossy(self, leaf):
         """A constant reflectance as a metal's, whose own rises towards grazing angles: by 1/21 of the rest on average."""
-        colour = self.graph.most(self.graph.times(self.graph.minus(self.get(leaf, "Color"), 1 / 21), 21 / 20), 0.0)
+        colour = self.get(leaf, "Color")
+        if is_constant(colour) and max(colour) - min(colour) > 0.1:
+            self.say("the reflectance of its tinted Glossy shader rises towards the rim")
+        colour = self.graph.most(self.graph.times(self.graph.minus(colour, 1 / 21), 21 / 20), 0.0)
         return self._facets(leaf, Lobe(base=colour, metallic=1.0, specular=0.0))
 
     def _metal(self, leaf):
@@ -107,14 +110,18 @@ class Reader:
     def _glass(self, leaf):
         self._named(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
         colour = self.get(leaf, "Color")
-        specular = 1.0 if leaf.node.type == "BSDF_GLASS" else 0.0
         lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
-                    specular=specular, specular_colour=colour if specular else WHITE, normal=self.normal(leaf))
+                    normal=self.normal(leaf))
+        if leaf.node.type == "BSDF_GLASS":  # its reflection is tinted, too
+            lobe.specular = self.graph.least(self.graph.largest(colour), 1.0)
+            lobe.specular_colour = self.graph.over(colour, self.graph.most(lobe.specular, 1e-6))
+            if is_constant(colour) and max(colour) - min(colour) > 0.25:
+                self.say("the tint of its Glass shader's reflections is carried at steep angles only")
         self._distribution(leaf, lobe)
         return lobe
 
     def _dielectric(self, leaf):
-        """Glossy facets over diffuse or refracting shaders, in the share of Fresnel's equations."""
+        """Glossy facets over diffuse, refracting or transparent shaders, in the share of Fresnel's equations."""
         socket, path = leaf.ior
         ior = self.graph.value(socket, path)
         if socket.node.type == "LAYER_WEIGHT":
@@ -122,8 +129,8 @@ class Reader:
         coat = leaf.coat
         lobe = Lobe(base=self.get(leaf, "Color"), ior=ior, specular=1.0, normal=self.normal(leaf),
                     specular_colour=self.get(coat, "Color"))
-        if leaf.node.type == "BSDF_REFRACTION":
-            lobe.transmission = 1.0
+        if leaf.node.type != "BSDF_DIFFUSE":
+            lobe.transmission, lobe.thin = 1.0, leaf.node.type == "BSDF_TRANSPARENT"
         return self._facets(coat, lobe)
 
     def _facets(self, leaf, lobe):
@@ -158,6 +165,7 @@ class Reader:
         lobe.anisotropy = g.power(g.most(g.over(g.minus(along, across), rest), 0.0), 0.5)
         lobe.roughness = g.power(across, 0.5)
         lobe.tangent = self._tangent(leaf, turn)
+        self.say("its stretched highlights keep the light that Cycles loses between facets, 4 % at most")
         return lobe
 
     def _tangent(self, leaf, turns):
@@ -177,8 +185,13 @@ class Reader:
 
     def _sheen(self, leaf):
         self.say("its Sheen shader is approximated by glTF's sheen over black")
-        return Lobe(sheen=self.get(leaf, "Color"), sheen_roughness=self.get(leaf, "Roughness"), faceted=False,
-                    normal=self.normal(leaf))
+        return Lobe(sheen=self.get(leaf, "Color"), faceted=False, normal=self.normal(leaf),
+                    sheen_roughness=self._sheen_roughness(self.get(leaf, "Roughness")))
+
+    def _sheen_roughness(self, roughness):
+        """The roughness at which glTF's sheen reflects about as much as Cycles' fibres do at this one."""
+        g = self.graph
+        return g.least(g.plus(g.times(roughness, 0.88), g.times(g.most(g.minus(roughness, 0.5), 0.0), 1.0)), 1.0)
 
     def _principled(self, leaf):
         g = self.graph
@@ -191,6 +204,8 @@ class Reader:
         # Principled glass takes the root of the colour at each of a body's two surfaces.
         clear = g.times(lobe.transmission, g.minus(1.0, lobe.metallic))
         lobe.base = g.plus(g.times(lobe.base, g.minus(1.0, clear)), g.times(g.power(lobe.base, 0.5), clear))
+        if is_constant(clear) and 0 < clear < 1 and is_constant(lobe.base) and max(lobe.base) - min(lobe.base) > 0.1:
+            self.say("the colour of its diffuse and of its transmitted light is one: their mean is taken")
         self._reflectance(leaf, lobe)
         self._facets(leaf, lobe)
         self._coverings(leaf, lobe)
@@ -204,9 +219,11 @@ class Reader:
         return lobe
 
     def _reflectance(self, leaf, lobe):
-        """Cycles scales the reflectance at normal incidence by twice the level, and bends the index of opaque facets."""
+        """Cycles scales the reflectance at normal incidence by twice the level, and takes the index that has it."""
         g, level = self.graph, self.get(leaf, "Specular IOR Level")
-        if is_constant(level) and is_constant(lobe.ior) and lobe.transmission == 0.0 and 0 < level:
+        if lobe.transmission == 1.0:  # of which the level says nothing
+            return
+        if is_constant(level) and is_constant(lobe.ior) and 0 < level:
             if level != 0.5:
                 f0 = min(((lobe.ior - 1) / (lobe.ior + 1)) ** 2 * 2 * level, 0.99)
                 lobe.ior = (1 + f0 ** 0.5) / (1 - f0 ** 0.5)
@@ -221,6 +238,8 @@ class Reader:
             tint = self.get(leaf, "Coat Tint")
             if tint != WHITE:
                 self.say("Coat Tint is approximated by a tint of what lies below the coat")
+                # Light is seen through 1 / cos of the coat's thickness: 1.146 on average at an index of 1.5.
+                tint = g.power(tint, 1.146)
                 lobe.base = g.times(lobe.base, g.plus(g.times(tint, lobe.coat), g.minus(1.0, lobe.coat)))
             if self.normal(leaf, "Coat Normal") is not None:
                 self.say("Coat Normal is not carried: the coat follows the surface")
@@ -228,7 +247,7 @@ class Reader:
         if weight != 0.0:
             self.say("sheen is approximated by glTF's")
             lobe.sheen = g.times(self.get(leaf, "Sheen Tint"), weight)
-            lobe.sheen_roughness = self.get(leaf, "Sheen Roughness")
+            lobe.sheen_roughness = self._sheen_roughness(self.get(leaf, "Sheen Roughness"))
 
 
 _READERS = {

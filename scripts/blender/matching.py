@@ -22,14 +22,14 @@ class Matched(Lobe):
 def match(material, output, undo, say):
     """The graph of `material` and what its surface becomes; `say` names what is lost.
 
-    The surface of a medium alone, and of an empty material, are matched too.
+    A material without a surface is black, or bounds its medium.
     """
     graph = Graph(material, undo)
     socket = graph.tree.nodes[output.name].inputs["Surface"]
     tree = closures.read(socket)
     if tree is None:
         inside = output.inputs["Volume"].is_linked
-        return graph, _film(WHITE) if inside else Matched()
+        return graph, replace(_film(WHITE), thin=False) if inside else Matched()
     closures.settle(graph, socket, tree, say)
     weighed = closures.weigh(tree, graph)
     return graph, _Match(graph, say, closures.adds_up(tree)).surface(weighed, output.inputs["Volume"].is_linked)
@@ -48,8 +48,9 @@ class _Match:
     def surface(self, weighed, has_volume):
         """What the pairs of leaf and weight become."""
         g, clear, lobes, shining, kinds = self.graph, [], [], [], []
+        self.adds_up &= all(leaf.node.type not in {"EMISSION", "HOLDOUT", "BSDF_RAY_PORTAL"} for leaf, _ in weighed)
         for leaf, weight in weighed:
-            if leaf.node.type == "BSDF_TRANSPARENT":
+            if leaf.node.type == "BSDF_TRANSPARENT" and leaf.coat is None:
                 clear.append((weight, self.reader.get(leaf, "Color")))
             elif leaf.node.type == "EMISSION":
                 shining.append((weight, self.reader.get(leaf, "Color"), self.reader.get(leaf, "Strength")))
@@ -69,6 +70,9 @@ class _Match:
         if not lobes:
             return self._through(clear, shining, has_volume)
         alpha, within = self._alpha(clear, lobes)
+        if clear and any(lobe.transmission == 1.0 and not lobe.thin for lobe, _ in lobes):
+            self.say("glass that is partly transparent is approximated: light that came in through its transparent share "
+                     "is not within the glass")
         found = self._joined([(lobe, within(part)) for lobe, part in lobes], kinds)
         found = Matched(**{f.name: getattr(found, f.name) for f in fields(Lobe)}, alpha=alpha)
         found.emission, found.strength = self._emission([(within(w), c, s) for w, c, s in shining])
@@ -122,7 +126,7 @@ class _Match:
     def _joined(self, lobes, kinds):
         """One lobe for several, each with its part of the whole."""
         g = self.graph
-        if len(lobes) == 1 and lobes[0][1] == 1.0:
+        if len(lobes) == 1 and lobes[0][1] == 1.0 and not self._is_dark_gloss(lobes[0][0], kinds[0]):
             return lobes[0][0]
         whole = 0.0
         for _, part in lobes:
@@ -134,7 +138,7 @@ class _Match:
         parts = [g.over(part, whole) for _, part in lobes]
         lobes = [lobe for lobe, _ in lobes]
         diffuse = [kind in _DIFFUSE for kind in kinds]
-        if all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and any(diffuse) and not all(diffuse):
+        if all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and not all(diffuse):
             found = self._under_constant_gloss(lobes, parts, diffuse)
         else:
             found = self._mean(lobes, parts)
@@ -143,6 +147,11 @@ class _Match:
             found.specular = g.times(found.specular, g.least(whole, 1.0))
         found.normal = self._normal(lobes, parts)
         return found
+
+    @staticmethod
+    def _is_dark_gloss(lobe, kind):
+        """Whether a metal, which reflects more towards grazing angles, would show that this shader does not."""
+        return kind in _GLOSSY and is_constant(lobe.base) and max(lobe.base) < 0.7
 
     def _sum(self, values, weights):
         """The weighed mean of values, the same constant where all are; weights need not sum to one."""

@@ -5,6 +5,7 @@ import numpy
 from graph import feed
 
 _WRAPS = {"REPEAT", "EXTEND", "MIRROR"}
+_COARSE = 256  # texels
 
 
 def image_of(value, data):
@@ -19,6 +20,9 @@ def image_of(value, data):
     if image is None or image.source not in {"FILE", "GENERATED"} or node.projection != "FLAT":
         return None
     if node.extension not in _WRAPS or image.colorspace_settings.name != ("Non-Color" if data else "sRGB"):
+        return None
+    # Cycles blends neighbouring texels as they are stored, glTF as light: that shows where they are large.
+    if not data and node.interpolation != "Closest" and max(image.size) < _COARSE:
         return None
     if image.is_float or not _plain_coordinates(node.inputs["Vector"]):
         return None
@@ -57,6 +61,12 @@ def normal_map(value):
     output, path = feed(colour)
     plain = output is not None and output.is_output and not path and image_of(output, data=True) is not None
     return node if plain else None
+
+
+def leans(node, cosine):
+    """The share of a Normal Map node's texels whose normal is farther from the surface's than this cosine."""
+    output, _ = feed(node.inputs["Color"])
+    return float(numpy.mean(_pixels(output.node.image)[:, 2] * 2 - 1 < cosine))
 
 
 def _plain_coordinates(socket):

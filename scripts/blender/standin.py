@@ -1,10 +1,14 @@
 """Stand-ins for meshes that are baked: the evaluated shape with a UV map of its own, in which nothing overlaps."""
 
+import contextlib
+
 import bpy
+import numpy
 
-from graph import feed
-
-UV = "caustique bake"
+UV, GENERATED = "caustique bake", "caustique generated"
+# Textures whose coordinates are Generated where nothing is linked.
+_BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
+                 "TEX_GABOR", "TEX_MUSGRAVE"}
 _DEFORM = {
     "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
     "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH",
@@ -25,23 +29,49 @@ def of_object(graph):
     return False
 
 
-def asks_for_generated(graph):
-    """Whether a material reads coordinates of the shape before it was deformed."""
-    procedural = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
-                  "TEX_GABOR", "TEX_WHITE_NOISE"}
+def read_generated(graph):
+    """Let a graph read Generated coordinates from an attribute, which `swap` makes: those of the shape undeformed."""
     for tree in graph.trees():
-        for node in tree.nodes:
-            if node.type == "TEX_COORD" and node.outputs["Generated"].is_linked:
-                return True
-            if node.type in procedural and feed(node.inputs["Vector"])[0] == node.inputs["Vector"]:
-                return True
-    return False
+        wanting = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
+                   if s.name == "Vector" and not s.is_linked]
+        wanting += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD" for link in n.outputs["Generated"].links]
+        if wanting:
+            node = tree.nodes.new("ShaderNodeAttribute")
+            node.attribute_name = GENERATED
+            for socket in wanting:
+                tree.links.new(node.outputs["Vector"], socket)
 
 
-def swap(thing, graphs, undo, say):
+def _places(thing):
+    """Where the vertices of an evaluated object are in its own space: (count, 3)."""
+    mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
+    mesh.vertices.foreach_get("co", places)
+    thing.to_mesh_clear()
+    return places.reshape(-1, 3)
+
+
+def _generate(thing, mesh, space, say):
+    """Put coordinates in the box `space` (centre, half extent) of the undeformed shape on the stand-in's vertices."""
+    with contextlib.ExitStack() as undo:
+        deforming = [m for m in thing.modifiers if m.type in _DEFORM and m.show_viewport]
+        for modifier in deforming:
+            undo.callback(setattr, modifier, "show_viewport", True)
+            modifier.show_viewport = False
+        places = _places(thing)
+    if len(places) != len(mesh.vertices):
+        say(f"Generated coordinates are those of the shape that {', '.join(m.name for m in deforming)} made")
+        places = numpy.array([v.co for v in mesh.vertices], numpy.float32)
+    centre, half = space
+    inside = (places - centre) / (2 * numpy.maximum(half, 1e-12)) + 0.5
+    layer = mesh.attributes.new(GENERATED, "FLOAT_VECTOR", "POINT")
+    layer.data.foreach_set("vector", inside.astype(numpy.float32).ravel())
+
+
+def swap(thing, undo, say):
     """Give `thing` its evaluated mesh until `undo` closes, and return the object that now stands for it.
 
-    Objects that are no meshes are hidden behind a new one. `graphs` are those of the materials that are baked.
+    Objects that are no meshes are hidden behind a new one. `say` takes what is lost.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = thing.evaluated_get(depsgraph)
@@ -52,11 +82,9 @@ def swap(thing, graphs, undo, say):
         undo.callback(setattr, thing.data, "name", name)
         undo.callback(setattr, mesh, "name", name + " baked")
         thing.data.name, mesh.name = name + " unbaked", name
-    deformed = [m.name for m in thing.modifiers if m.type in _DEFORM and m.show_viewport]
-    if deformed and any(map(asks_for_generated, graphs)):
-        say(f"Generated coordinates are taken from the shape that {', '.join(deformed)} made")
+    box = thing.data if thing.type == "MESH" else mesh
+    _generate(thing, mesh, (numpy.array(box.texspace_location), numpy.array(box.texspace_size)), say)
     if thing.type == "MESH":
-        _keep_texture_space(thing.data, mesh)
         body, before = thing, thing.data
         for modifier in thing.modifiers:
             undo.callback(setattr, modifier, "show_viewport", modifier.show_viewport)
@@ -84,12 +112,6 @@ def restore(thing, mesh, worn):
     for slot, (link, material) in zip(thing.material_slots, worn):
         slot.link = link
         slot.material = material
-
-
-def _keep_texture_space(old, new):
-    """Generated coordinates are counted in the box of the mesh before its modifiers."""
-    new.use_auto_texspace = False
-    new.texspace_location, new.texspace_size = old.texspace_location, old.texspace_size
 
 
 def unwrap(body, size):

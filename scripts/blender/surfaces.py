@@ -33,6 +33,11 @@ _WITHOUT = {  # what stands where nothing may be baked
 }
 
 
+_STEEP = 0.75  # cosine
+_IS_STEEP = ("its normals lean by more than 40 degrees from the surface: there it is brighter or darker than in Cycles, "
+             "use a Displace modifier for relief that steep")
+
+
 @dataclass
 class Surface:
     """What a written material is made of: the material it stands for, and channels as gltfmaterial.write takes them."""
@@ -76,6 +81,7 @@ class Surfaces:
                 entry["name"] = surface.material.name
                 gltfmaterial.write(entry, surface.channels, writer, surface.texcoord)
                 shading.finish(entry, surface.material, closed, least, self.warn)
+        gltfmaterial.give_default(document)
         return bytes(writer.buffer)
 
     def _bake(self, things):
@@ -102,8 +108,7 @@ class Surfaces:
             slot.link = "DATA"
 
     def _bake_one(self, thing, plans, own):
-        graphs = [plan.graph for plan in plans.values()]
-        body = standin.swap(thing, graphs, self.undo, lambda what: self.warn(f'object "{thing.name}"', what))
+        body = standin.swap(thing, self.undo, lambda what: self.warn(f'object "{thing.name}"', what))
         mesh = body.data
         if not mesh.polygons:
             return mesh
@@ -158,7 +163,10 @@ class _Plan:
         for name, parts in _PASSES.items():
             if any(part in varying for part in parts):
                 self.passes[name] = self._packed(name, parts, values)
+        if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
+            self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
         if self.passes:
+            standin.read_generated(self.graph)
             self.of_object = standin.of_object(self.graph)
             names = [_SPOKEN[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.surfaces.size} x "
@@ -220,6 +228,8 @@ class _Plan:
         stretched = not is_constant(values["direction"])
         if normal is not None and not self.bumped and not stretched and plain.normal_map(normal) is not None:
             links["normal"] = normal
+            if plain.leans(normal.node, _STEEP) > 0.01:
+                self.say(_IS_STEEP)
 
     def _data(self, value, part):
         """The Image Texture node of which a number is the `part`, or the grey, and the socket to read; or None."""
@@ -265,6 +275,8 @@ class _Plan:
             parts = _PASSES[name]
             if name == "normal":
                 channels["normal"] = _normals(texels, covered)
+                if channels["normal"] is not None and numpy.mean(channels["normal"][covered][:, 2] < _STEEP) > 0.01:
+                    self.say(_IS_STEEP)
                 continue
             if name == "stretch":
                 channels["direction"] = texels[..., :2] * 2 - 1

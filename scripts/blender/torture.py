@@ -168,8 +168,8 @@ def run(name, look=None):
         beside = [_bytes(os.path.join(folder, file)) for file in sorted(os.listdir(folder))]
         settings = (SIZE, SAMPLES, bpy.app.version_string)
         # What Cycles renders is the feature itself: its code, and the stage.
-        scene = inspect.getsource(torture_stage.FEATURES[name]), inspect.getsource(torture_stage)
-        theirs = _kept(_key("cycles", scene, settings), lambda seed: (by_cycles(seed), []))
+        told = [inspect.getsource(part) for part in (inspect.getmodule(torture_stage.FEATURES[name]), torture_stage)]
+        theirs = _kept(_key("cycles", name, *told, settings), lambda seed: (by_cycles(seed), []))
         try:
             ours = _kept(_key("ours", settings, *beside, _bytes(program())), lambda seed: by_caustique(path, seed))
         except RuntimeError as error:

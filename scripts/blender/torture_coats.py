@@ -161,6 +161,11 @@ def glossy_dark(stage):
 
 
 @feature
+def glossy_tinted(stage):
+    stage.surface(stage.node("BsdfGlossy", Color=(0.9, 0.6, 0.2), Roughness=0.3))
+
+
+@feature
 def glossy_anisotropic(stage):
     stage.surface(stage.node("BsdfAnisotropic", Color=(0.8, 0.8, 0.8), Roughness=0.4, Anisotropy=0.6))
 

@@ -5,7 +5,7 @@ import numpy
 from torture_stage import feature, put
 
 
-def _checks(stage, data=False, colours=((0.9, 0.2, 0.1), (0.1, 0.3, 0.8)), cells=4, size=32, alpha=None):
+def _checks(stage, data=False, colours=((0.9, 0.2, 0.1), (0.1, 0.3, 0.8)), cells=4, size=512, alpha=None):
     """An image of squares in two stored colours, of which the second may be transparent."""
     rows, columns = numpy.mgrid[0:size, 0:size] * cells // size
     odd = ((rows + columns) % 2)[..., None]
@@ -32,6 +32,11 @@ def _by(stage, coordinates):
 @feature
 def image(stage):
     stage.principled(Base_Color=stage.node("TexImage", image=_checks(stage)))
+
+
+@feature
+def image_coarse(stage):
+    stage.principled(Base_Color=stage.node("TexImage", image=_checks(stage, size=32)))
 
 
 @feature
