@@ -1,5 +1,5 @@
-"""A material's surface as weighted closures: mixes and sums of shaders walked through groups, and what depends on the view
-settled to its mean."""
+"""A material's surface as weighted closures: mixes and sums of shaders, walked through groups, with the mean of what
+depends on the view."""
 
 from dataclasses import dataclass
 

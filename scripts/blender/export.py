@@ -116,9 +116,9 @@ def _worn(things):
     """Materials with nodes that something in the scene wears, instanced collections included."""
     found = {}
     for thing in _with_instanced(things):
-        for slot in thing.material_slots:
-            if slot.material is not None and shading.nodes_of(slot.material) is not None:
-                found[slot.material.name] = slot.material
+        for material in surfaces.materials_of(thing):
+            if material is not None and shading.nodes_of(material) is not None:
+                found[material.name] = material
     return list(found.values())
 
 

@@ -1,7 +1,7 @@
 """Node trees read and computed with: a throw-away copy of a material in which any socket can be had at the top level.
 
-A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. A *path* holds the group
-nodes around a socket, the outermost first. Arithmetic on values makes nodes only where something varies.
+A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. A *path* holds the
+group nodes around a socket, the outermost first. Arithmetic on values makes nodes only where something varies.
 """
 
 import bpy

@@ -83,7 +83,7 @@ class Reader:
         return Lobe(base=self.get(leaf, "Color"), transmission=1.0, thin=True, normal=self.normal(leaf), faceted=False)
 
     def _glossy(self, leaf):
-        """A constant reflectance as a metal's, whose own rises towards grazing angles: by 1/21 of the rest on average."""
+        """A constant reflectance as a metal's, whose own rises towards the rim: by 1/21 of the rest on average."""
         colour = self.get(leaf, "Color")
         if is_constant(colour) and max(colour) - min(colour) > 0.1:
             self.say("the reflectance of its tinted Glossy shader rises towards the rim")
@@ -147,7 +147,7 @@ class Reader:
             self.say(f"its {leaf.node.distribution.title()} facets are taken for GGX")
 
     def _stretched(self, leaf, lobe, stretch):
-        """Cycles stretches alpha to alpha / a along a tangent and alpha a across it; a^2 = 1 - 0.9 s in Principled, else
+        """Cycles stretches alpha to alpha / a along a tangent and alpha a across; a^2 = 1 - 0.9 s in Principled, else
         a = 1 - s. glTF keeps alpha across, and moves the share of its squared strength of the way to 1 along.
         """
         g, turn = self.graph, self.get(leaf, "Anisotropic Rotation")
@@ -204,7 +204,8 @@ class Reader:
         # Principled glass takes the root of the colour at each of a body's two surfaces.
         clear = g.times(lobe.transmission, g.minus(1.0, lobe.metallic))
         lobe.base = g.plus(g.times(lobe.base, g.minus(1.0, clear)), g.times(g.power(lobe.base, 0.5), clear))
-        if is_constant(clear) and 0 < clear < 1 and is_constant(lobe.base) and max(lobe.base) - min(lobe.base) > 0.1:
+        both = is_constant(clear) and 0 < clear < 1
+        if both and is_constant(lobe.base) and max(lobe.base) - min(lobe.base) > 0.1:
             self.say("the colour of its diffuse and of its transmitted light is one: their mean is taken")
         self._reflectance(leaf, lobe)
         self._facets(leaf, lobe)

@@ -1,5 +1,5 @@
-"""A material's surface matched to the glTF material: closures weighed, joined where the model can hold them, approximated by
-their means, by name, where it cannot."""
+"""A material's surface matched to the glTF material: closures weighed, joined where the model can hold them, and
+approximated by their means, by name, where it cannot."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -71,8 +71,8 @@ class _Match:
             return self._through(clear, shining, has_volume)
         alpha, within = self._alpha(clear, lobes)
         if clear and any(lobe.transmission == 1.0 and not lobe.thin for lobe, _ in lobes):
-            self.say("glass that is partly transparent is approximated: light that came in through its transparent share "
-                     "is not within the glass")
+            self.say("glass that is partly transparent is approximated: light that came in through its transparent "
+                     "share is not within the glass")
         found = self._joined([(lobe, within(part)) for lobe, part in lobes], kinds)
         found = Matched(**{f.name: getattr(found, f.name) for f in fields(Lobe)}, alpha=alpha)
         found.emission, found.strength = self._emission([(within(w), c, s) for w, c, s in shining])
@@ -218,8 +218,8 @@ class _Match:
                  and self._differ([getattr(lobe, name) for lobe, w in zip(lobes, weights) if w != 0.0])]
         if apart:
             apart += ["base colour"] * self._differ([lobe.base for lobe in lobes])
-            self.say(f"its mixed shaders differ in {', '.join(sorted(apart))}: each is mixed for itself, which is exact "
-                     "only where one shader covers all")
+            self.say(f"its mixed shaders differ in {', '.join(sorted(apart))}: each is mixed for itself, which is "
+                     "exact only where one shader covers all")
         return found
 
     def _normal(self, lobes, parts):

@@ -1,5 +1,5 @@
-"""Node trees of materials, lights and the world, and what fills bodies: solid glass (KHR_materials_volume), absorption and
-scattering of volume shaders, dispersion."""
+"""Node trees of materials, lights and the world, and what fills bodies: solid glass (KHR_materials_volume), absorption
+and scattering of volume shaders, dispersion."""
 
 import math
 

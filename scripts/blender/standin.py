@@ -34,7 +34,8 @@ def read_generated(graph):
     for tree in graph.trees():
         wanting = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
                    if s.name == "Vector" and not s.is_linked]
-        wanting += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD" for link in n.outputs["Generated"].links]
+        wanting += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD"
+                    for link in n.outputs["Generated"].links]
         if wanting:
             node = tree.nodes.new("ShaderNodeAttribute")
             node.attribute_name = GENERATED

@@ -4,8 +4,8 @@
     python3 scripts/blender/torture.py --only NAME...         some, the table left as it is
     python3 scripts/blender/torture.py --look FOLDER          also a PNG of both pictures beside each other
 
-Needs bpy; CAUSTIQUE_BIN names the program (target/release/caustique). Pictures are kept in the cache folder under what they
-depend on, so that a run that was stopped goes on where it was.
+Needs bpy; CAUSTIQUE_BIN names the program (target/release/caustique). Pictures are kept in the cache folder under what
+they depend on, so that a run that was stopped goes on where it was.
 """
 
 import argparse
@@ -114,9 +114,9 @@ def by_caustique(scene, seed):
     with tempfile.TemporaryDirectory() as folder:
         picture = os.path.join(folder, "ours.exr")
         done = subprocess.run(
-            [program(), "render", scene, "-o", picture, "--method", "path", "--iterations", str(SAMPLES), "--no-combine",
-             "--width", str(SIZE), "--height", str(SIZE), "--seed", str(seed), "--layers", "beauty", "--progress",
-             "none"], capture_output=True, text=True, timeout=600, check=False)
+            [program(), "render", scene, "-o", picture, "--method", "path", "--iterations", str(SAMPLES),
+             "--no-combine", "--width", str(SIZE), "--height", str(SIZE), "--seed", str(seed), "--layers", "beauty",
+             "--progress", "none"], capture_output=True, text=True, timeout=600, check=False)
         if done.returncode:
             raise RuntimeError(done.stderr.strip().splitlines()[-1])
         lines = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
@@ -208,12 +208,13 @@ def table(results):
     lines = [
         "# What comes across from Blender, feature by feature", "",
         "<!-- Written by scripts/blender/torture.py; do not edit. -->", "",
-        f"Each row is a small scene with one feature, rendered by Cycles and, exported, by caustique: {SIZE} x {SIZE} pixels,",
-        f"twice {SAMPLES} samples each. They agree where every channel's mean is within {MEAN:.0%} and every tile of a sixteenth "
-        "of the",
-        f"picture within {TILE:.0%}, three standard errors of noise allowed for. Images are baked at {BAKE_SIZE} x {BAKE_SIZE}"
-        " texels.", "",
-        "Of " + f"{len(results)} features " + ", ".join(f"{n} {v}" for v, n in counts.items()) + ".", "",
+        "Each row is a small scene with one feature, rendered by Cycles and, exported, by caustique (`--method path`):",
+        f"{SIZE} x {SIZE} pixels, twice {SAMPLES} samples each. They agree where the mean of every channel is within "
+        f"{MEAN:.0%} and every",
+        f"tile of a sixteenth of the picture within {TILE:.0%}, three standard errors of noise allowed for. Images are "
+        f"baked at",
+        f"{BAKE_SIZE} x {BAKE_SIZE} texels.", "",
+        f"{len(results)} features: " + ", ".join(f"{n} {v}" for v, n in counts.items()) + ".", "",
         "| feature | verdict | mean, ours / Cycles | worst tile | what the export and the render say |",
         "| --- | --- | --- | --- | --- |"]
     for r in results:

@@ -72,7 +72,8 @@ def transparent_mask(stage):
 
 @feature
 def transparent_tinted_diffuse(stage):
-    stage.mix(0.5, stage.node("BsdfTransparent", Color=(0.9, 0.4, 0.1)), stage.node("BsdfDiffuse", Color=(0.5, 0.5, 0.5)))
+    stage.mix(0.5, stage.node("BsdfTransparent", Color=(0.9, 0.4, 0.1)),
+              stage.node("BsdfDiffuse", Color=(0.5, 0.5, 0.5)))
 
 
 @feature
@@ -118,7 +119,8 @@ def emission_mask(stage):
 @feature
 def diffuse_translucent(stage):
     stage.shape("plane")
-    stage.mix(0.5, stage.node("BsdfDiffuse", Color=(0.3, 0.6, 0.2)), stage.node("BsdfTranslucent", Color=(0.3, 0.6, 0.2)))
+    stage.mix(0.5, stage.node("BsdfDiffuse", Color=(0.3, 0.6, 0.2)),
+              stage.node("BsdfTranslucent", Color=(0.3, 0.6, 0.2)))
 
 
 @feature

@@ -1,4 +1,4 @@
-"""The stage on which one feature at a time is shown to Cycles and to caustique: a body on a floor, one lamp, a plain world.
+"""The stage on which one feature at a time is shown to Cycles and to caustique: a body, a floor, a lamp, a grey world.
 
 Lengths are metres. A feature is a function of a Stage, registered by `feature`.
 """
@@ -128,7 +128,7 @@ class Stage:
         return self.surface(self.node("AddShader", first.outputs[0], second.outputs[0]))
 
     def group(self, build, **inputs):
-        """A node group with these colour or number inputs; `build(tree, inputs of the group by name)` gives its output."""
+        """A node group with these colour or number inputs; `build(tree, its inputs)` gives its output."""
         inner = bpy.data.node_groups.new("group", "ShaderNodeTree")
         kinds = {name: "NodeSocketColor" if isinstance(value, tuple) else "NodeSocketFloat"
                  for name, value in inputs.items() if not isinstance(value, bpy.types.NodeSocket)}
