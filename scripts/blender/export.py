@@ -113,11 +113,11 @@ def _with_instanced(things):
 
 
 def _worn(things):
-    """Materials with nodes that something in the scene wears, instanced collections included."""
+    """Materials that something in the scene wears, instanced collections included."""
     found = {}
     for thing in _with_instanced(things):
         for material in surfaces.materials_of(thing):
-            if material is not None and shading.nodes_of(material) is not None:
+            if material is not None:
                 found[material.name] = material
     return list(found.values())
 

@@ -165,7 +165,7 @@ class Reader:
         lobe.anisotropy = g.power(g.most(g.over(g.minus(along, across), rest), 0.0), 0.5)
         lobe.roughness = g.power(across, 0.5)
         lobe.tangent = self._tangent(leaf, turn)
-        self.say("its stretched highlights keep the light that Cycles loses between facets, 4 % at most")
+        self.say("its stretched highlights keep the few per cent of light that Cycles loses between facets")
         return lobe
 
     def _tangent(self, leaf, turns):

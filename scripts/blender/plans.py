@@ -36,6 +36,11 @@ _IS_STEEP = ("its normals lean by more than 40 degrees from the surface: there i
              "Cycles; use a Displace modifier for relief that steep")
 
 
+def matt(colour):
+    """The channels of a Lambertian surface, which is what Cycles makes of a material without nodes."""
+    return {f.name: getattr(Matched(), f.name) for f in fields(Matched)} | {"base": tuple(colour), "direction": 0.0}
+
+
 class Plan:
     """What becomes of one material: `channels` as gltfmaterial.write takes them, and `passes`, {name: value to bake}.
 

@@ -88,8 +88,9 @@ def swap(thing, undo, say):
     if thing.type == "MESH":
         body, before = thing, thing.data
         for modifier in thing.modifiers:
-            undo.callback(setattr, modifier, "show_viewport", modifier.show_viewport)
-            modifier.show_viewport = False
+            for shown in ("show_viewport", "show_render"):
+                undo.callback(setattr, modifier, shown, getattr(modifier, shown))
+                setattr(modifier, shown, False)
         worn = [(slot.link, slot.material) for slot in thing.material_slots]
         thing.data = mesh
         undo.callback(restore, thing, before, worn)

@@ -9,7 +9,7 @@ import bake
 import gltfmaterial
 import shading
 import standin
-from plans import Plan
+from plans import Plan, matt
 
 
 def materials_of(thing):
@@ -40,7 +40,12 @@ class Surfaces:
         self.undo, self.warn, self.size = undo, warn, size
         self.baker = bake.Baker(size or bake.SIZE, undo)
         self.found = {}  # by the name of the material that the exporter sees
-        self.plans = {material.name: Plan(material, self.baker, bool(size), undo, warn) for material in materials}
+        self.plans = {}
+        for material in materials:
+            if shading.nodes_of(material) is None:
+                self.found[material.name] = Surface(material, matt(material.diffuse_color[:3]))
+            else:
+                self.plans[material.name] = Plan(material, self.baker, bool(size), undo, warn)
         self._bake(things)
         for plan in self.plans.values():
             if not plan.passes:

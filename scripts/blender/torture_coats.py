@@ -262,5 +262,12 @@ def no_surface(stage):
 
 
 @feature
+def no_nodes(stage):
+    stage.tree
+    stage.material.use_nodes = False
+    stage.material.diffuse_color = (0.7, 0.3, 0.2, 1)
+
+
+@feature
 def no_material(stage):
     stage.body.data.materials.clear()

@@ -91,6 +91,13 @@ class Stage:
             self.material.node_tree.nodes.new("ShaderNodeOutputMaterial")
         return self.material.node_tree
 
+    def material_of(self, build):
+        """The material that `build()` gives the body, which has none afterwards."""
+        build()
+        made, self.material = self.material, None
+        self.body.data.materials.clear()
+        return made
+
     def node(self, kind, *inputs, tree=None, **named):
         """A node "ShaderNode" + `kind`. Inputs by place or by name, _ for spaces; lower-case names are settings."""
         tree = tree or self.tree

@@ -1,5 +1,6 @@
 """Features of textures: where values vary, by which coordinates, through which nodes."""
 
+import bpy
 import numpy
 
 from torture_stage import feature, put
@@ -51,6 +52,41 @@ def image_clipped(stage):
     stage.shape("plane")
     move = stage.node("Mapping", Vector=_coordinates(stage, "UV"), Scale=(2, 2, 1), Location=(-0.5, -0.5, 0))
     stage.principled(Base_Color=stage.node("TexImage", move, image=_checks(stage), extension="CLIP"))
+
+
+@feature
+def image_beside_noise(stage):
+    move = stage.node("Mapping", Vector=_coordinates(stage, "UV"), Scale=(3, 2, 1))
+    stage.principled(Base_Color=stage.node("TexImage", move, image=_checks(stage)), Roughness=_noise(stage).outputs[0])
+
+
+@feature
+def two_materials(stage):
+    other = stage.material_of(lambda: stage.principled(Base_Color=_noise(stage).outputs["Color"]))
+    stage.principled(Base_Color=(0.2, 0.6, 0.3), Roughness=_noise(stage, Scale=1.5).outputs[0])
+    stage.body.data.materials.append(other)
+    for face in stage.body.data.polygons:
+        face.material_index = int(face.center.z > 0.1)
+
+
+@feature
+def mirrored_and_bevelled(stage):
+    stage.shape("cube")
+    mirror = stage.body.modifiers.new("mirror", "MIRROR")
+    mirror.use_axis = mirror.use_bisect_axis = (True, True, False)
+    stage.body.modifiers.new("bevel", "BEVEL").width = 0.15
+    _by(stage, _coordinates(stage, "Object"))
+
+
+@feature
+def text(stage):
+    letters = bpy.data.curves.new("letters", "FONT")
+    letters.body, letters.size, letters.extrude = "O8", 1.6, 0.2
+    letters.align_x = "CENTER"
+    stage.principled(Base_Color=_noise(stage).outputs["Color"])
+    letters.materials.append(stage.material)
+    stage.place("letters", letters, (0, -0.3, 0.3)).rotation_euler = (1.2, 0, 0)
+    stage.body.hide_render = True
 
 
 @feature
