@@ -119,8 +119,8 @@ def by_caustique(scene, seed):
              "--progress", "none"], capture_output=True, text=True, timeout=600, check=False)
         if done.returncode:
             raise RuntimeError(done.stderr.strip().splitlines()[-1])
-        lines = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
-        return pixels(picture), [line.removeprefix("warning:").strip() for line in lines]
+        lines = [line.removeprefix("warning:") for line in done.stderr.splitlines() if line.startswith("warning:")]
+        return pixels(picture), [line.replace(scene + ":", "").strip() for line in lines]
 
 
 def _kept(key, render):
@@ -215,11 +215,11 @@ def table(results):
         f"baked at",
         f"{BAKE_SIZE} x {BAKE_SIZE} texels.", "",
         f"{len(results)} features: " + ", ".join(f"{n} {v}" for v, n in counts.items()) + ".", "",
-        "| feature | verdict | mean, ours / Cycles | worst tile | what the export and the render say |",
-        "| --- | --- | --- | --- | --- |"]
+        "| feature | verdict | mean, ours / Cycles | its noise | worst tile | what the export and the render say |",
+        "| --- | --- | --- | --- | --- | --- |"]
     for r in results:
         words = r.words.replace('material "tested": ', "").replace("|", "/")
-        lines.append(f"| `{r.name}` | {r.verdict} | {r.mean:.3f} | {r.tile:.1%} | {words} |")
+        lines.append(f"| `{r.name}` | {r.verdict} | {r.mean:.3f} | {r.noise:.3f} | {r.tile:.1%} | {words} |")
     return "\n".join(lines) + "\n"
 
 
