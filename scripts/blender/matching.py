@@ -13,10 +13,8 @@ _GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"}
 
 @dataclass
 class Matched(Lobe):
-    """A lobe that stands for a whole surface, and how much of it is there; `sheet`: light passes as through a coloured
-    film."""
+    """A lobe that stands for a whole surface, and how much of it is there."""
     alpha: object = 1.0
-    sheet: bool = False
 
 
 def match(material, output, undo, say):
@@ -37,7 +35,7 @@ def match(material, output, undo, say):
 
 def _film(colour):
     """What bends nothing and reflects nothing, of this transmittance."""
-    return Matched(base=colour, roughness=0.0, transmission=1.0, ior=1.0, thin=True, sheet=True)
+    return Matched(base=colour, roughness=0.0, transmission=1.0, ior=1.0, thin=True)
 
 
 class _Match:

@@ -44,12 +44,12 @@ def matt(colour):
 class Plan:
     """What becomes of one material: `channels` as gltfmaterial.write takes them, and `passes`, {name: value to bake}.
 
-    Without `may_bake` what would be baked is named instead.
+    `unbaked` are the channels where the baker cannot go. Without `may_bake` what would be baked is named instead.
     """
 
     def __init__(self, material, baker, may_bake, undo, warn):
         self.material, self.baker, self.may_bake, self.undo, self.warn = material, baker, may_bake, undo, warn
-        self.passes, self.channels, self.of_object = {}, {}, False
+        self.passes, self.channels, self.unbaked, self.of_object = {}, {}, {}, False
         output = shading.output_of(shading.nodes_of(material))
         self.graph, self.matched = match(material, output, undo, self.say)
         self.links = {}
@@ -60,7 +60,7 @@ class Plan:
 
     def _plan(self, output):
         values = {f.name: getattr(self.matched, f.name) for f in fields(Matched)}
-        values.pop("faceted"), values.pop("sheet")
+        del values["faceted"]
         tangent = values.pop("tangent")
         values["direction"] = self._direction(tangent) if tangent is not None else 0.0
         self._fold(values)
@@ -78,6 +78,7 @@ class Plan:
             self._without(values, varying)
             varying = []
         self.channels = {n: PLAIN if n in self.links else v for n, v in values.items()}
+        self.unbaked = {n: _WITHOUT.get(n, 0.0) if n in varying else v for n, v in self.channels.items()}
         for name, parts in _PASSES.items():
             if any(part in varying for part in parts):
                 self.passes[name] = self._packed(name, parts, values)

@@ -78,7 +78,7 @@ def swap(thing, undo, say):
     evaluated = thing.evaluated_get(depsgraph)
     mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
     undo.callback(bpy.data.meshes.remove, mesh)
-    if thing.type == "MESH":
+    if thing.type == "MESH" and thing.data.is_editable:
         name = thing.data.name
         undo.callback(setattr, thing.data, "name", name)
         undo.callback(setattr, mesh, "name", name + " baked")

@@ -64,7 +64,7 @@ class Surfaces:
         """
         writer = gltfmaterial.Writer(document, buffer)
         for entry in document.get("materials", []):
-            surface = self.found.get(entry.get("name"))
+            surface = self.found.get(entry.get("name")) or self._unreached(entry.get("name"))
             if surface is not None:
                 closed, least = bodies.get(entry["name"], (False, 0.0))
                 entry["name"] = surface.material.name
@@ -73,13 +73,23 @@ class Surfaces:
         gltfmaterial.give_default(document)
         return bytes(writer.buffer)
 
+    def _unreached(self, name):
+        """The surface of a material that the exporter has met where nothing can stand in for it, or None."""
+        plan = self.plans.get(name)
+        if plan is None:
+            return None
+        if plan.passes:
+            plan.say("it is worn where nothing can be baked (objects linked from other files, instances that nodes make): "
+                     "there what would be baked is plain; make such objects local and real")
+        return Surface(plan.material, plan.unbaked)
+
     def _bake(self, things):
         made = {}
         for thing in things:
             worn = materials_of(thing)
             plans = {i: self.plans[m.name] for i, m in enumerate(worn)
                      if m is not None and m.name in self.plans and self.plans[m.name].passes}
-            if not plans:
+            if not plans or not thing.is_editable:
                 continue
             own = any(plan.of_object for plan in plans.values())
             alone = own or thing.type != "MESH" or thing.modifiers or thing.data.shape_keys is not None

@@ -221,6 +221,31 @@ class Baked(Case):
                      "Normal comes from a Bump"):
             self.assertTrue(any(loss in line for line in warnings), (loss, warnings))
 
+    def test_an_object_of_an_instanced_collection_is_baked(self):
+        self.stage.principled(Base_Color=self.across(0))
+        inside = bpy.data.collections.new("inside")
+        inside.objects.link(self.stage.body)
+        self.stage.scene.collection.objects.unlink(self.stage.body)
+        instance = self.stage.place("instance", None, (0, 0, 1))
+        instance.instance_type, instance.instance_collection = "COLLECTION", inside
+        entry, _ = self.write()
+        self.assertIn("baseColorTexture", entry["pbrMetallicRoughness"])
+        self.assertEqual(len(self.document["images"]), 1)
+
+    def test_what_is_linked_from_another_file_is_named(self):
+        self.stage.principled(Base_Color=self.across(0), Roughness=0.25)
+        library = os.path.join(self.folder.name, "library.blend")
+        bpy.data.libraries.write(library, {self.stage.body})
+        self.stage = torture_stage.Stage()
+        with bpy.data.libraries.load(library, link=True) as (_, into):
+            into.objects = ["body"]
+        bpy.data.objects.remove(self.stage.body)
+        self.stage.scene.collection.objects.link(into.objects[0])
+        entry, warnings = self.write()
+        self.assertTrue(any("objects linked from other files" in line for line in warnings), warnings)
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.8, 0.8, 0.8, 1), rtol=1e-5)
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.25, 5)
+
     def test_sizes_on_the_command_line(self):
         script = os.path.join(ROOT, "scripts", "blender", "export.py")
         for size in ("0", "x", "100000"):
