@@ -82,9 +82,9 @@ class Plan:
         for name, parts in _PASSES.items():
             if any(part in varying for part in parts):
                 self.passes[name] = self._packed(name, parts, values)
-        if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
-            self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
         if self.passes:
+            if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
+                self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
             standin.read_generated(self.graph)
             self.of_object = standin.of_object(self.graph)
             names = [_SPOKEN[n] for n in varying if n not in {"direction"}]
