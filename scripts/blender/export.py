@@ -7,9 +7,11 @@
 
 Blender's own glTF exporter writes the file, of a scene that `objects` has evaluated as a render would. Around it:
 
-- `lighting`: area lamps become one-sided glowing meshes of the same radiance, other lamps get size, edge and colour;
-- `shading`: Glass, Refraction, Glossy, Diffuse and volume shaders become what glTF has for them, and transmissive
-  materials on closed meshes become solid (KHR_materials_volume), so that they refract;
+- `lighting`: area lamps become glowing meshes without a body, other lamps get size, edge and colour;
+- `surfaces`: shaders, mixes of them and node groups become the nearest glTF material, and what varies in ways that glTF
+  has no words for is baked into images (--bake-size N, --no-bake);
+- `shading`: transmissive materials on closed meshes become solid (KHR_materials_volume), so that they refract, with
+  Cycles' coefficients; a custom property `abbe` (number V_d) or `dispersion` (20/V_d) becomes KHR_materials_dispersion;
 - `world` and `sky`: environment and medium, the sun of a sky texture as a lamp;
 - `cameras`: lens, shift, and the picture that the scene was made for.
 
@@ -27,19 +29,22 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import bpy  # noqa: E402
 
+import bake  # noqa: E402
 import cameras  # noqa: E402
 import glb  # noqa: E402
 import lighting  # noqa: E402
 import objects  # noqa: E402
 import shading  # noqa: E402
 import sky  # noqa: E402
+import surfaces  # noqa: E402
 import world  # noqa: E402
 
 
-def write(path, scene=None):
+def write(path, scene=None, bake_size=bake.SIZE):
     """Export the open scene (or `scene`) at its current frame to the .glb at `path`; return the warnings, texts.
 
-    They stand in the file, too, as the scene's `losses`. The scene is left as it was found.
+    `bake_size`: texels a side of the images into which materials are baked; 0 bakes none and names what is lost. The
+    warnings stand in the file, too, as the scene's `losses`. The scene is left as it was found.
     """
     path = os.path.abspath(path)
     scene = scene or bpy.context.scene
@@ -63,8 +68,7 @@ def write(path, scene=None):
                 flat.say(thing, **cameras.extras(thing, flat, warn))
         if flat.scene.camera is not None:
             cameras.warn_of_clipping(flat.scene.camera, flat, warn)
-        for material in _worn(flat.things):
-            shading.principled(material, undo, warn)
+        worn = surfaces.Surfaces(flat.things, _worn(flat.things), undo, warn, bake_size)
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.hang(flat, undo, warn)
         if sun is not None:
@@ -74,7 +78,7 @@ def write(path, scene=None):
         _run_exporter(path)
     document, buffer = glb.read(path)
     _finish_names(document, flat.names)
-    _finish_materials(document, bodies, warn)
+    buffer = worn.finish(document, buffer, bodies)
     _finish_lamps(document)
     _active_camera_first(document, scene)
     said["losses"] = warnings
@@ -87,14 +91,14 @@ def write(path, scene=None):
     return warnings
 
 
-def write_frames(path, first, last):
+def write_frames(path, first, last, bake_size=bake.SIZE):
     """Export frames `first` to `last` of the open scene, a .glb each; `####` in `path` becomes the frame's number."""
     scene, warnings = bpy.context.scene, []
     before = scene.frame_current, scene.frame_subframe
     try:
         for frame in range(first, last + 1):
             scene.frame_set(frame)
-            warnings += [w for w in write(_numbered(path, frame)) if w not in warnings]
+            warnings += [w for w in write(_numbered(path, frame), bake_size=bake_size) if w not in warnings]
     finally:
         scene.frame_set(before[0], subframe=before[1])
     return warnings
@@ -122,10 +126,9 @@ def _run_exporter(path):
 
 
 def _worn(things):
-    """Materials with nodes that some of `things` wear."""
-    slots = [slot for thing in things for slot in thing.material_slots]
-    found = {slot.material.name: slot.material for slot in slots if slot.material is not None}
-    return [material for material in found.values() if shading.nodes_of(material) is not None]
+    """Materials that some of `things` wear."""
+    found = {m.name: m for thing in things for m in surfaces.materials_of(thing) if m is not None}
+    return list(found.values())
 
 
 def _bodies(things):
@@ -171,14 +174,6 @@ def _closed(mesh):
     return all(count % 2 == 0 for count in uses.values())
 
 
-def _finish_materials(document, bodies, warn):
-    for entry in document.get("materials", []):
-        material = bpy.data.materials.get(entry.get("name", ""))
-        if material is not None and shading.nodes_of(material) is not None:
-            closed, least = bodies.get(material.name, (False, 0.0))
-            shading.finish(entry, material, closed, least, warn)
-
-
 def _finish_names(document, names):
     """Gives things the names of what they stand for, whose own names are taken in Blender while both are there."""
     for part in ("scenes", "nodes", "meshes"):
@@ -221,19 +216,25 @@ def main(arguments):
     parser.add_argument("files", nargs="+", metavar="FILE", help="[IN.blend] OUT.glb")
     parser.add_argument("--frames", type=_frames, metavar="A-B",
                         help="a file for each frame from A to B; #### in OUT.glb becomes its number")
+    parser.add_argument("--bake-size", type=int, default=bake.SIZE, metavar="N",
+                        help=f"texels a side of the images into which materials are baked (default {bake.SIZE})")
+    parser.add_argument("--no-bake", action="store_true", help="bake no material; each loss is named")
     given = parser.parse_args(arguments)
     if len(given.files) > 2 or not given.files[-1].endswith(".glb"):
         parser.error("OUT.glb has to end in .glb, with at most one IN.blend before it")
+    if not 4 <= given.bake_size <= 16384:
+        parser.error("--bake-size has to lie between 4 and 16384 texels")
     if given.frames and "#" not in given.files[-1]:
         parser.error("--frames: OUT.glb has to have a place for the frame's number, as in shot.####.glb")
     try:
         if len(given.files) == 2:
             source = os.path.abspath(given.files[0])
             bpy.ops.wm.open_mainfile(filepath=source, load_ui=False, use_scripts=False)
+        size = 0 if given.no_bake else given.bake_size
         if given.frames:
-            write_frames(given.files[-1], *given.frames)
+            write_frames(given.files[-1], *given.frames, size)
         else:
-            write(given.files[-1])
+            write(given.files[-1], bake_size=size)
     except Exception as error:  # whatever Blender raises: a message and a code, never a hanging process
         print(f"error: {given.files[0]}: {error}".strip(), file=sys.stderr)
         return 1

@@ -7,6 +7,7 @@ and geometry nodes, shared by the instances of the same; lamps and cameras with 
 import bpy
 from mathutils import Matrix
 
+import standin
 import visibility
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -31,7 +32,7 @@ class Flat:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden = [], {}, {}
-        self._undo, self._warn, self._meshes = undo, warn, {}
+        self._undo, self._warn, self._meshes, self._shapes = undo, warn, {}, []
         self._indirect = visibility.indirect_only(layer)
         self.scene = self._make(bpy.data.scenes, scene.name)
         for name in ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"):
@@ -40,14 +41,19 @@ class Flat:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         # All is taken before anything is put: new objects end the walk through the old ones.
         concerned = {thing for thing in scene.objects if thing.visible_get(view_layer=layer)}
+        # Curves, text and metaballs come twice: as they are, and as the mesh that they make.
+        meshed = {i.object.original for i in depsgraph.object_instances if i.object.type == "MESH"}
         found = []
         for instance in depsgraph.object_instances:
             concerned.add(instance.object.original)
-            found.append(self._take(instance, depsgraph))
+            if instance.object.type == "MESH" or instance.object.original not in meshed:
+                found.append(self._take(instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
             # It is looked through, although it is not shown.
             place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
             found.append((scene.camera, scene.camera.data, place, []))
+        for mesh, original in self._shapes:
+            standin.generate(original, mesh, lambda what, name=original.name: warn(f'object "{name}"', what))
         for taken in filter(None, found):
             self._put(*taken)
         for thing in sorted(concerned, key=lambda thing: thing.name):
@@ -91,15 +97,18 @@ class Flat:
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, made once for all that share it; None if it has no faces."""
         thing = instance.object
-        key = thing.original.name_full, thing.data.as_pointer()
-        if key in self._meshes:
-            return self._meshes[key]
         name = thing.original.data.name
         by_nodes = instance.is_instance and instance.instance_object.original == instance.parent.original
+        key = (thing.original.name_full, thing.data.as_pointer())
+        if not by_nodes and _is_bare(thing.original):
+            key = thing.original.data.name_full
+        if key in self._meshes:
+            return self._meshes[key]
         if by_nodes and thing.type == "MESH":
             mesh = thing.data.copy()  # it is of no object
         else:
             mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
+            self._shapes.append((mesh, thing.original))
         self._undo.callback(bpy.data.meshes.remove, mesh)
         self.names[mesh.name] = name
         for index, slot in enumerate(thing.material_slots):
@@ -119,6 +128,7 @@ class Flat:
                 sheared.flip_normals()
             data, matrix = sheared, Matrix()
         body = self.add(original.name, data, matrix, hidden)
+        body.color, body.pass_index = original.color, original.pass_index
         if "caustique" in original:
             self.say(body, **original["caustique"].to_dict())
         if original == bpy.context.scene.camera and self.scene.camera is None:
@@ -166,6 +176,12 @@ def _is_pattern(instance):
     if parent is None or parent.instance_type not in {"VERTS", "FACES"}:
         return False
     return not instance.is_instance or instance.parent.original != parent
+
+
+def _is_bare(thing):
+    """Whether an object shows its mesh as it is, so that all objects that have it show the same."""
+    plain = thing.type == "MESH" and not thing.modifiers and thing.data.shape_keys is None
+    return plain and all(slot.link == "DATA" for slot in thing.material_slots)
 
 
 def _is_plain(matrix):

@@ -1,17 +1,9 @@
-"""Blender materials in terms of what glTF can say.
-
-Blender's exporter understands the Principled and Emission shaders alone. `principled` puts a Principled shader in the
-place of the common others while the export runs. `finish` then completes the written material: solid glass
-(KHR_materials_volume), absorption and scattering of the volume shader, dispersion.
-"""
+"""Node trees of materials, lights and the world, and what fills bodies: solid glass (KHR_materials_volume), absorption
+and scattering of volume shaders, dispersion."""
 
 import math
 
 import bpy
-
-_GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_METALLIC"}
-_GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
-_IMAGE_ONLY = ("Base Color", "Roughness", "Metallic", "Transmission Weight", "Alpha", "Emission Color")
 
 
 def nodes_of(block):
@@ -61,102 +53,6 @@ def leaves(node):
         sockets = [s for s in node.inputs if s.type == "SHADER"]
         return [leaf for s in sockets for leaf in leaves(source(s))]
     return [node]
-
-
-def _copy(tree, socket_from, socket_to):
-    if socket_from.is_linked:
-        tree.links.new(socket_from.links[0].from_socket, socket_to)
-    elif socket_to.type == "VALUE":
-        socket_to.default_value = constant(socket_from)
-    else:
-        socket_to.default_value = [*constant(socket_from), 1.0]
-
-
-def principled(material, undo, warn):
-    """Until `undo` (a contextlib.ExitStack) closes, let `material` end in a Principled or Emission shader."""
-    tree, output = nodes_of(material), output_of(nodes_of(material))
-    where = f'material "{material.name}"'
-    if output is None:
-        return
-    parts = leaves(source(output.inputs["Surface"]))
-    kinds = {p.type for p in parts}
-    if len(parts) == 1 and kinds <= {"BSDF_PRINCIPLED", "EMISSION"}:
-        _warn_of_textures(parts[0], where, warn)
-        return
-    if not parts and not output.inputs["Volume"].is_linked:
-        return
-
-    def pick(*names):
-        return next((p for p in parts if p.type in names), None)
-
-    glass = pick(*_GLASS)
-    base = pick("BSDF_PRINCIPLED") or glass or pick("BSDF_DIFFUSE", *_GLOSSY) or (parts[0] if parts else None)
-    emission = pick("EMISSION")
-    node = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    undo.callback(lambda: tree.nodes.remove(node))
-    into = node.inputs
-    rest = kinds - {"EMISSION"}
-    if base is None or kinds == {"BSDF_TRANSPARENT"}:
-        if output.inputs["Volume"].is_linked:  # a boundary of the medium that bends nothing
-            into["Base Color"].default_value = (1, 1, 1, 1)
-            into["Transmission Weight"].default_value = 1
-            into["Roughness"].default_value = 0
-            into["IOR"].default_value = 1
-        else:
-            into["Alpha"].default_value = 0
-    elif glass is not None and rest <= _GLASS | _GLOSSY | {"BSDF_TRANSPARENT"}:
-        into["Transmission Weight"].default_value = 1
-        _copy(tree, glass.inputs["Color"], into["Base Color"])
-        _copy(tree, glass.inputs["Roughness"], into["Roughness"])
-        _copy(tree, glass.inputs["IOR"], into["IOR"])
-        if rest == {"BSDF_REFRACTION"}:
-            warn(where, "a Refraction shader alone gains the reflection of the same surface")
-    elif base.type == "BSDF_PRINCIPLED":
-        for socket in base.inputs:
-            if socket.name in into and socket.type in {"VALUE", "RGBA"}:
-                _copy(tree, socket, into[socket.name])
-        _warn_of_textures(base, where, warn)
-        if rest != {"BSDF_PRINCIPLED"}:
-            warn(where, f"of its mixed shaders {sorted(rest)} only the Principled one is carried")
-    else:
-        colour = base.inputs.get("Color") or base.inputs.get("Base Color")
-        if colour is not None:
-            _copy(tree, colour, into["Base Color"])
-        if base.type in _GLOSSY:
-            into["Metallic"].default_value = 1
-            _copy(tree, base.inputs["Roughness"], into["Roughness"])
-        else:
-            into["Roughness"].default_value = 1
-            into["Specular IOR Level"].default_value = 0
-        if rest - {"BSDF_DIFFUSE"} - _GLOSSY or len(rest) > 1:
-            warn(where, f"shaders {sorted(rest)} are approximated by {base.type}")
-    if emission is not None and base is not emission:
-        _copy(tree, emission.inputs["Color"], into["Emission Color"])
-        _copy(tree, emission.inputs["Strength"], into["Emission Strength"])
-    surface = output.inputs["Surface"]
-    before = surface.links[0].from_socket if surface.is_linked else None
-    if before is not None:
-        undo.callback(lambda: tree.links.new(before, surface))
-    tree.links.new(node.outputs[0], surface)
-
-
-def _warn_of_textures(node, where, warn):
-    for name in _IMAGE_ONLY:
-        fed = source(node.inputs[name]) if name in node.inputs else None
-        if fed is not None and fed.type in _PROCEDURAL:
-            warn(where, f"{name} comes from a {fed.bl_label} node: bake it to an image to carry it")
-    bump = source(node.inputs["Normal"]) if "Normal" in node.inputs else None
-    if bump is not None and bump.type != "NORMAL_MAP":
-        warn(where, f"the {bump.bl_label} node is not carried: bake it to a normal map")
-    for name in ("Subsurface Weight", "Thin Film Thickness"):
-        if name in node.inputs and constant(node.inputs[name], 1.0):
-            warn(where, f"{name} is not carried")
-
-
-_PROCEDURAL = {
-    "TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT", "TEX_MUSGRAVE",
-    "TEX_WHITE_NOISE", "TEX_GABOR", "VALTORGB", "BLACKBODY", "WAVELENGTH", "OBJECT_INFO", "FRESNEL", "LAYER_WEIGHT",
-}
 
 
 def medium(volume, where, warn):
@@ -218,6 +114,10 @@ def finish(entry, material, closed, thickness, warn):
     extensions = entry.setdefault("extensions", {})
     inside = medium(source(output.inputs["Volume"]), where, warn) if output is not None else None
     clear = extensions.get("KHR_materials_transmission")
+    if extensions.get("KHR_materials_volume") == {"thicknessFactor": 0}:  # a film, whatever wears it
+        if inside is not None:
+            warn(where, "its volume shader lies behind a film: it is not carried")
+        return
     if clear is not None and not closed and "KHR_materials_volume" not in extensions:
         warn(where, "transmissive, but on a mesh that is not closed: it stays a thin sheet that bends no light")
     if clear is not None and (closed or "KHR_materials_volume" in extensions):
@@ -230,7 +130,6 @@ def finish(entry, material, closed, thickness, warn):
             strongest = max(inside["sigma_a"])
             volume["attenuationDistance"] = 1 / strongest
             volume["attenuationColor"] = [math.exp(-s / strongest) for s in inside["sigma_a"]]
-        _square_root_tint(entry, material)
         number = material.get("abbe")
         spread = 20 / float(number) if number else float(material.get("dispersion", 0))
         if spread > 0:
@@ -241,12 +140,3 @@ def finish(entry, material, closed, thickness, warn):
         warn(where, "its volume shader needs a closed, transmissive mesh: it is not carried")
     if not extensions:
         del entry["extensions"]
-
-
-def _square_root_tint(entry, material):
-    """Principled tints light once on its way through the body, glTF at each of the two surfaces."""
-    parts = leaves(source(output_of(nodes_of(material)).inputs["Surface"]))
-    pbr = entry.get("pbrMetallicRoughness", {})
-    if [p.type for p in parts] == ["BSDF_PRINCIPLED"] and "baseColorFactor" in pbr and "baseColorTexture" not in pbr:
-        *rgb, alpha = pbr["baseColorFactor"]
-        pbr["baseColorFactor"] = [math.sqrt(max(c, 0)) for c in rgb] + [alpha]

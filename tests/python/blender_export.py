@@ -118,6 +118,10 @@ class Export(unittest.TestCase):
 
     def test_fresnel_mix_of_refraction_and_glossy_is_glass(self):
         material = node_material("g", "ShaderNodeBsdfRefraction", "ShaderNodeBsdfGlossy", mix="ShaderNodeMixShader", Color=(1, 1, 1, 1), IOR=1.33, Roughness=0.0)
+        tree = material.node_tree
+        fresnel, mixer = tree.nodes.new("ShaderNodeFresnel"), next(n for n in tree.nodes if n.type == "MIX_SHADER")
+        fresnel.inputs["IOR"].default_value = 1.33
+        tree.links.new(fresnel.outputs[0], mixer.inputs["Fac"])
         entry, warnings = self.material(material)
         self.assertEqual(warnings, [])
         self.assertAlmostEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1.33, 5)
@@ -133,9 +137,16 @@ class Export(unittest.TestCase):
         self.assertEqual(entry["extensions"]["KHR_materials_specular"], {"specularFactor": 0})
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.1, 0.2, 0.3, 1), rtol=1e-5)
         self.setUp()
-        entry, _ = self.material(node_material("m", "ShaderNodeBsdfGlossy", Color=(0.1, 0.2, 0.3, 1), Roughness=0.4))
+        entry, _ = self.material(node_material("m", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1), Roughness=0.4))
         self.assertEqual(entry["pbrMetallicRoughness"].get("metallicFactor", 1), 1)
         self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.4, 5)
+
+    def test_dark_glossy_reflects_the_same_at_all_angles(self):
+        entry, warnings = self.material(node_material("m", "ShaderNodeBsdfGlossy", Color=(0.2, 0.2, 0.2, 1)))
+        self.assertEqual(warnings, [])
+        self.assertEqual(entry["extensions"]["KHR_materials_ior"], {"ior": 0})
+        self.assertAlmostEqual(entry["extensions"]["KHR_materials_specular"]["specularFactor"], 0.2, 5)
+        self.assertEqual(entry["pbrMetallicRoughness"]["baseColorFactor"], [0, 0, 0, 1])
 
     def test_sum_with_emission(self):
         material = node_material("e", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", mix="ShaderNodeAddShader", Color=(0.5, 0.25, 0.1, 1), Strength=8.0)
@@ -164,13 +175,15 @@ class Export(unittest.TestCase):
         entry, _ = self.material(material)
         self.assertEqual(entry["extensions"]["KHR_materials_dispersion"], {"dispersion": 0.5})
 
-    def test_procedural_texture_is_named(self):
+    def test_procedural_texture_is_named_where_it_is_not_baked(self):
         material = node_material("n", "ShaderNodeBsdfPrincipled")
         tree = material.node_tree
         noise, shader = tree.nodes.new("ShaderNodeTexNoise"), next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
         tree.links.new(noise.outputs[0], shader.inputs["Base Color"])
-        _, warnings = self.material(material)
-        self.assertEqual(warnings, ['material "n": Base Color comes from a Noise Texture node: bake it to an image to carry it'])
+        cube(material)
+        warnings = export.write(self.path, bake_size=0)
+        self.assertEqual(warnings, ['material "n": Base Color comes from a Noise Texture node and is not baked: leave out '
+                                    '--no-bake to carry it'])
 
     def test_camera(self):
         focus = place("focus", None, (0, 3, 4))

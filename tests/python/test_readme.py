@@ -144,6 +144,7 @@ class Text(unittest.TestCase):
     def test_options_that_are_named_exist(self):
         names = ("render", "plan", "combine", "compare", "converge", "info", "doctor")
         known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
+        known += (support.ROOT / "scripts" / "blender" / "export.py").read_text(encoding="utf-8")
         known = set(re.findall(r"--[a-z][a-z-]*", known))
         for page in PAGES:
             if page.name in ("measurements.md", "architecture.md"):  # They name options of cargo and of scripts, too.

@@ -1,0 +1,141 @@
+"""Baked images kept between exports: by a hash of all that they depend on, in the user's cache folder."""
+
+import hashlib
+import os
+import time
+
+import bpy
+import numpy
+
+_KEPT_DAYS = 30
+_NOT_LOOKS = {  # of a node in the editor, or described otherwise
+    "rna_type", "location", "location_absolute", "width", "height", "width_hidden", "select", "dimensions", "parent",
+    "color", "use_custom_color", "label", "name", "inputs", "outputs", "internal_links", "id_data", "show_options",
+    "show_preview", "show_texture", "warning_propagation", "hide", "bl_width_default", "bl_width_min", "bl_width_max",
+    "bl_height_default", "bl_height_min", "bl_height_max", "bl_description", "bl_label", "bl_icon", "interface",
+    "color_tag", "node_tree", "debug_zone_body_lazy_function_graph", "debug_zone_lazy_function_graph",
+}
+
+
+def folder():
+    """Where images are kept: $XDG_CACHE_HOME or ~/.cache, and below it caustique/bake."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return os.path.join(base, "caustique", "bake")
+
+
+def kept(key):
+    """The array that was stored under `key`, or None."""
+    path = os.path.join(folder(), key + ".npy")
+    try:
+        texels = numpy.load(path, allow_pickle=False)
+        os.utime(path)
+    except (OSError, ValueError):
+        return None
+    return texels.astype(numpy.float32)
+
+
+def keep(key, texels):
+    """Store an array of halves under `key`, and drop what nobody has asked for in a month.
+
+    A folder that cannot be written costs time at the next export and nothing else.
+    """
+    try:
+        os.makedirs(folder(), exist_ok=True)
+        path = os.path.join(folder(), key + ".npy")
+        with open(f"{path}.{os.getpid()}", "wb") as file:
+            numpy.save(file, texels.astype(numpy.float16))
+        os.replace(file.name, path)
+        for entry in os.scandir(folder()):
+            if time.time() - entry.stat().st_mtime > _KEPT_DAYS * 86400:
+                os.remove(entry.path)
+    except OSError:
+        pass
+
+
+def digest(*parts):
+    """A key for texts, numbers, bytes and arrays."""
+    total = hashlib.sha256()
+    for part in parts:
+        part = part.tobytes() if isinstance(part, numpy.ndarray) else part
+        part = part if isinstance(part, bytes) else repr(part).encode()
+        total.update(b"%d:" % len(part) + part)
+    return total.hexdigest()[:40]
+
+
+def of_mesh(mesh):
+    """A digest of shape, normals, materials by face, and every attribute of a mesh."""
+    parts = [bpy.app.version_string]
+    for attribute in mesh.attributes:
+        if len(attribute.data) == 0:
+            continue
+        field = next((n for n in ("vector", "color", "value") if hasattr(attribute.data[0], n)), None)
+        if field is None or attribute.data_type == "STRING":
+            continue
+        first = getattr(attribute.data[0], field)
+        whole = attribute.data_type in {"INT", "INT8", "BOOLEAN", "INT32_2D", "INT16_2D"}
+        count = len(first) if hasattr(first, "__len__") else 1
+        values = numpy.empty(len(attribute.data) * count, numpy.int32 if whole else numpy.float32)
+        attribute.data.foreach_get(field, values)
+        parts += [attribute.name, attribute.domain, values]
+    corners = numpy.empty(len(mesh.loops) * 3, numpy.float32)
+    mesh.corner_normals.foreach_get("vector", corners)
+    starts = numpy.empty(len(mesh.polygons), numpy.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    return digest(*parts, corners, starts, tuple(mesh.texspace_location), tuple(mesh.texspace_size))
+
+
+def of_tree(tree):
+    """A digest of what a node tree computes: nodes, values, links, images, groups."""
+    parts = []
+    for node in tree.nodes:
+        parts += [node.name, node.bl_idname, _described(node)]
+        parts += [_plain(s.default_value) for s in node.inputs if hasattr(s, "default_value")]
+        if not node.inputs:
+            parts += [_plain(s.default_value) for s in node.outputs if hasattr(s, "default_value")]
+        if node.type == "GROUP" and node.node_tree is not None:
+            parts.append(of_tree(node.node_tree))
+    parts += sorted((k.from_node.name, k.from_socket.identifier, k.to_node.name, k.to_socket.identifier, k.is_muted)
+                    for k in tree.links)
+    return digest(*parts)
+
+
+def _plain(value):
+    return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+
+def _described(struct, depth=0):
+    """What the properties of a node, ramp or curve hold, as nested lists."""
+    found = []
+    for name in struct.bl_rna.properties.keys():
+        if name in (_NOT_LOOKS if depth == 0 else {"rna_type", "id_data"}):
+            continue
+        value = getattr(struct, name, None)
+        if isinstance(value, bpy.types.Image):
+            value = _image(value)
+        elif isinstance(value, bpy.types.Object):
+            value = [tuple(row) for row in value.matrix_world]
+        elif isinstance(value, bpy.types.ID):
+            value = value.name
+        elif isinstance(value, bpy.types.bpy_struct):
+            value = _described(value, depth + 1) if depth < 4 else None
+        elif isinstance(value, bpy.types.bpy_prop_collection):
+            value = [_described(item, depth + 1) for item in value] if depth < 4 else None
+        elif hasattr(value, "__len__") and not isinstance(value, (str, set)):
+            value = tuple(value)
+        found.append((name, sorted(value) if isinstance(value, set) else value))
+    return found
+
+
+def _image(image):
+    """What identifies an image's texels: those of memory, or the file's place, size and time."""
+    settings = (image.colorspace_settings.name, image.alpha_mode, tuple(image.size))
+    if image.source == "FILE" and image.packed_file is None and not image.is_dirty:
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        if os.path.isfile(path):
+            state = os.stat(path)
+            return settings, path, state.st_size, state.st_mtime_ns
+    if image.packed_file is not None and not image.is_dirty:
+        return settings, digest(image.packed_file.data)
+    texels = numpy.empty(len(image.pixels), numpy.float32)
+    image.pixels.foreach_get(texels)
+    return settings, digest(texels)

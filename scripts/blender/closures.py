@@ -1,0 +1,162 @@
+"""A material's surface as weighted closures: mixes and sums of shaders, walked through groups, with the mean of what
+depends on the view."""
+
+from dataclasses import dataclass
+
+import bpy
+
+from graph import feed, is_constant, upstream
+
+_DEPENDS_ON_VIEW = {
+    "FRESNEL": {"Fac"}, "LAYER_WEIGHT": {"Fresnel", "Facing"}, "NEW_GEOMETRY": {"Incoming", "Backfacing"},
+    "TEX_COORD": {"Camera", "Window", "Reflection"}, "CAMERA": {"View Vector", "View Z Depth", "View Distance"},
+}
+_GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"}
+
+
+@dataclass
+class Leaf:
+    """A shader node that scatters, emits or lets through. `ior`: a dielectric's facets lie on it, those of `coat`."""
+    node: bpy.types.Node
+    path: tuple
+    ior: object = None
+    coat: object = None
+
+
+@dataclass
+class Mix:
+    """Two surfaces in the shares 1 - f and f; `factor` is the input socket of f at `path`."""
+    factor: bpy.types.NodeSocket
+    path: tuple
+    first: object
+    second: object
+
+
+@dataclass
+class Sum:
+    """Two surfaces added."""
+    first: object
+    second: object
+
+
+def read(socket, path=()):
+    """The shader tree under a shader socket: Leaf, Mix, Sum, or None for a black one."""
+    output, path = feed(socket, path)
+    if output is None or not output.is_output:
+        return None
+    node = output.node
+    if node.type == "MIX_SHADER":
+        first, second = (read(s, path) for s in node.inputs if s.type == "SHADER")
+        return _faceted(Mix(node.inputs[0], path, first, second))
+    if node.type == "ADD_SHADER":
+        return Sum(*(read(s, path) for s in node.inputs))
+    return Leaf(node, path)
+
+
+def _faceted(mix):
+    """The same mix, or one leaf where Fresnel's equations mix a Glossy shader over another: that is a dielectric."""
+    output, path = feed(mix.factor, mix.path)
+    below, coat = mix.first, mix.second
+    leaves = isinstance(below, Leaf) and isinstance(coat, Leaf) and below.coat is None
+    if output is None or not leaves or coat.node.type not in _GLOSSY or not output.is_output:
+        return mix
+    if below.node.type not in {"BSDF_DIFFUSE", "BSDF_REFRACTION", "BSDF_TRANSPARENT"}:
+        return mix
+    node = output.node
+    if node.type == "FRESNEL":
+        return Leaf(below.node, below.path, (node.inputs["IOR"], path), coat)
+    if node.type == "LAYER_WEIGHT" and output.name == "Fresnel":
+        return Leaf(below.node, below.path, (node.inputs["Blend"], path), coat)
+    return mix
+
+
+def weigh(tree, graph, weight=1.0):
+    """Pairs of a leaf and its weight, a value of `graph`; what weighs nothing is left out."""
+    if tree is None or (is_constant(weight) and weight == 0):
+        return []
+    if isinstance(tree, Leaf):
+        return [(tree, weight)]
+    if isinstance(tree, Sum):
+        return weigh(tree.first, graph, weight) + weigh(tree.second, graph, weight)
+    share = graph.unit(graph.grey(graph.value(tree.factor, tree.path)))
+    first = weigh(tree.first, graph, graph.times(weight, graph.minus(1.0, share)))
+    return first + weigh(tree.second, graph, graph.times(weight, share))
+
+
+def adds_up(tree):
+    """Whether the weights of all leaves sum to one: nothing is added, and nothing is missing."""
+    if isinstance(tree, Mix):
+        return adds_up(tree.first) and adds_up(tree.second)
+    return isinstance(tree, Leaf)
+
+
+def facets(tree):
+    """The leaves that Fresnel's equations cover with facets."""
+    if isinstance(tree, Leaf):
+        return [tree] if tree.coat is not None else []
+    return facets(tree.first) + facets(tree.second) if tree is not None else []
+
+
+def settle(graph, surface, tree, say):
+    """Put a constant in the place of what depends on the view or the kind of ray; `say` names each.
+
+    `surface` is the shader socket of which `tree` was read.
+    """
+    known = {leaf.ior[0].node.as_pointer() for leaf in facets(tree)}
+    for node, output in upstream(surface).values():
+        if node.type == "LIGHT_PATH":
+            _replace(output, 1.0 if output.name == "Is Camera Ray" else 0.0)
+            say("Light Path: all rays see what the camera sees")
+        elif output.name in _DEPENDS_ON_VIEW.get(node.type, ()):
+            _replace(output, _typical(node, output))
+            if node.as_pointer() not in known:
+                say(f"{output.name} of its {node.bl_label} node depends on the view: its mean over all directions is "
+                    "taken" if node.type in {"FRESNEL", "LAYER_WEIGHT"} else
+                    f"{output.name} of its {node.bl_label} node depends on the view: it is taken as from the front")
+
+
+def _replace(output, value):
+    tree = output.node.id_data
+    node = tree.nodes.new("ShaderNodeValue" if isinstance(value, float) else "ShaderNodeRGB")
+    node.outputs[0].default_value = value if isinstance(value, float) else (*value, 1.0)
+    for link in list(output.links):
+        tree.links.new(node.outputs[0], link.to_socket)
+
+
+def _typical(node, output):
+    """The mean of a node's output over directions, by the cosine, or what it is from straight above."""
+    if node.type == "FRESNEL":
+        return mean_reflectance(_held(node.inputs["IOR"]))
+    if node.type == "LAYER_WEIGHT":
+        blend = min(max(_held(node.inputs["Blend"]), 0.0), 1 - 1e-5)
+        if output.name == "Fresnel":
+            return mean_reflectance(1 / (1 - blend))
+        # Cycles: 1 - cos^b, whose mean by the cosine is b / (b + 2).
+        power = 2 * blend if blend < 0.5 else 0.5 / (1 - blend)
+        return power / (power + 2) if blend != 0.5 else 1 / 3
+    return 0.0 if output.type == "VALUE" else (0.5, 0.5, 0.5) if node.type == "TEX_COORD" else (0.0, 0.0, 1.0)
+
+
+def _held(socket):
+    output, _ = feed(socket)
+    return output.default_value if output is not None and not output.is_output else socket.default_value
+
+
+def mean_reflectance(ior, steps=256):
+    """The share of diffuse light that a smooth dielectric of relative index `ior` reflects from outside."""
+    total = 0.0
+    for step in range(steps):
+        cos = (step + 0.5) / steps
+        total += 2 * cos * reflectance(cos, ior) / steps
+    return total
+
+
+def reflectance(cos, ior):
+    """Fresnel's equations for unpolarised light."""
+    g2 = ior * ior - 1 + cos * cos
+    if g2 <= 0:
+        return 1.0
+    g = g2 ** 0.5
+    near = (g - cos) / (g + cos)
+    far = (cos * (g + cos) - 1) / (cos * (g - cos) + 1)
+    return 0.5 * near * near * (1 + far * far)

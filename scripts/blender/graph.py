@@ -1,0 +1,251 @@
+"""Node trees read and computed with: a throw-away copy of a material in which any socket can be had at the top level.
+
+A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. A *path* holds the
+group nodes around a socket, the outermost first. Arithmetic on values makes nodes only where something varies.
+"""
+
+import bpy
+
+_SOCKETS = {"VALUE": "NodeSocketFloat", "INT": "NodeSocketFloat", "RGBA": "NodeSocketColor",
+            "VECTOR": "NodeSocketVector"}
+# What these nodes give depends on nothing but their inputs.
+_FUNCTIONS = {
+    "MATH", "VECT_MATH", "MIX", "MIX_RGB", "MAP_RANGE", "CLAMP", "GAMMA", "HUE_SAT", "INVERT", "BRIGHTCONTRAST",
+    "VALTORGB", "CURVE_RGB", "CURVE_FLOAT", "CURVE_VEC", "BLACKBODY", "WAVELENGTH", "SEPARATE_COLOR", "COMBINE_COLOR",
+    "SEPRGB", "COMBRGB", "SEPHSV", "COMBHSV", "SEPXYZ", "COMBXYZ", "RGBTOBW", "VECTOR_ROTATE", "VALUE", "RGB",
+}
+
+
+def named(sockets, identifier):
+    """The socket of this identifier, or None: names repeat, identifiers do not."""
+    return next((s for s in sockets if s.identifier == identifier), None)
+
+
+def feed(socket, path=()):
+    """What gives an input socket its value, past reroutes, muted nodes and the borders of groups, and the path there.
+
+    An output socket; or the input socket that holds the value itself; or None where a muted node cuts the line.
+    """
+    while socket.is_linked and not socket.links[0].is_muted:
+        output, node = socket.links[0].from_socket, socket.links[0].from_node
+        inner = None
+        if node.type == "REROUTE":
+            inner = node.inputs[0]
+        elif node.mute:
+            inner = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
+            if inner is None:
+                return None, path
+        elif node.type == "GROUP" and node.node_tree is not None:
+            end = end_of(node.node_tree)
+            inner = named(end.inputs, output.identifier) if end is not None else None
+            if inner is None:
+                return None, path
+            path += (node,)
+        elif node.type == "GROUP_INPUT" and path:
+            inner, path = named(path[-1].inputs, output.identifier), path[:-1]
+        if inner is None:
+            return output, path
+        socket = inner
+    return socket, path
+
+
+def end_of(tree):
+    """The node through which a group gives its outputs, or None."""
+    ends = [n for n in tree.nodes if n.type == "GROUP_OUTPUT"]
+    return next((n for n in ends if n.is_active_output), ends[0] if ends else None)
+
+
+def upstream(socket, path=(), seen=None):
+    """All nodes that an input socket's value comes from, with the output that is used of each."""
+    seen = {} if seen is None else seen
+    output, path = feed(socket, path)
+    if output is None or not output.is_output:
+        return seen
+    key = (output.node.as_pointer(), output.identifier, tuple(n.as_pointer() for n in path))
+    if key not in seen:
+        seen[key] = (output.node, output)
+        for inner in output.node.inputs:
+            upstream(inner, path, seen)
+    return seen
+
+
+def is_constant(value):
+    """Whether a value is the same everywhere because it is a number or a colour."""
+    return not isinstance(value, bpy.types.NodeSocket)
+
+
+def is_colour(value):
+    """Whether a value has three components."""
+    return isinstance(value, tuple) if is_constant(value) else value.type in {"RGBA", "VECTOR"}
+
+
+class Graph:
+    """A copy of `material` until `undo` (a contextlib.ExitStack) closes, its groups copied too, one for each use."""
+
+    def __init__(self, material, undo):
+        self.original = material
+        self.material = material.copy()
+        undo.callback(lambda: bpy.data.materials.remove(self.material))
+        self.tree = self.material.node_tree
+        self._lifted = {}
+        self._own_groups(self.tree, undo)
+
+    def _own_groups(self, tree, undo):
+        for node in tree.nodes:
+            if node.type == "GROUP" and node.node_tree is not None:
+                copy = node.node_tree.copy()
+                undo.callback(bpy.data.node_groups.remove, copy)
+                node.node_tree = copy
+                self._own_groups(copy, undo)
+
+    def trees(self):
+        """The copied node tree and those of its groups."""
+        def below(tree):
+            yield tree
+            for node in tree.nodes:
+                if node.type == "GROUP" and node.node_tree is not None:
+                    yield from below(node.node_tree)
+        return list(below(self.tree))
+
+    def value(self, socket, path=()):
+        """The value of an input socket of any depth."""
+        output, path = feed(socket, path)
+        if output is None:
+            return (0.0,) * 3 if socket.type in {"RGBA", "VECTOR"} else 0.0
+        if not output.is_output or output.node.type in {"VALUE", "RGB"}:
+            value = output.default_value
+            value = tuple(value)[:3] if hasattr(value, "__len__") else float(value)
+            if isinstance(value, float) and socket.type in {"RGBA", "VECTOR"}:
+                value = (value,) * 3
+            if isinstance(value, tuple) and socket.type == "VALUE":
+                value = 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
+            return value
+        top = self._top(output, path)
+        return top if socket.type in {"RGBA", "VECTOR"} or top.type == "VALUE" else self.times(self.grey(top), 1.0)
+
+    def grey(self, value):
+        """A value as one number, colours by their luminance as Cycles does."""
+        if not is_colour(value):
+            return value
+        if is_constant(value):
+            return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
+        node = self.tree.nodes.new("ShaderNodeRGBToBW")
+        self.tree.links.new(value, node.inputs[0])
+        return node.outputs[0]
+
+    def mean(self, value):
+        """The mean of a colour's three components."""
+        if not is_colour(value):
+            return value
+        if is_constant(value):
+            return sum(value) / 3
+        return self.node("ShaderNodeVectorMath", "DOT_PRODUCT", value, (1 / 3,) * 3, output="Value")
+
+    def _top(self, output, path):
+        key = (output.node.as_pointer(), output.identifier, tuple(n.as_pointer() for n in path))
+        if key not in self._lifted:
+            for group in reversed(path):
+                inner = group.node_tree
+                item = inner.interface.new_socket("lifted", in_out="OUTPUT", socket_type=_SOCKETS[output.type])
+                inner.links.new(output, named(end_of(inner).inputs, item.identifier))
+                output = named(group.outputs, item.identifier)
+            self._lifted[key] = output
+        return self._lifted[key]
+
+    def node(self, kind, operation, *values, output=0):
+        """An output of a new Math or Vector Math node at the top level, its inputs given."""
+        node = self.tree.nodes.new(kind)
+        node.operation = operation
+        for socket, value in zip(node.inputs, values):
+            self.put(value, socket)
+        return node.outputs[output]
+
+    def put(self, value, socket):
+        """Give an input socket at the top level a value."""
+        if not is_constant(value):
+            self.tree.links.new(value, socket)
+        elif socket.type == "VALUE":
+            socket.default_value = value
+        else:
+            value = value if isinstance(value, tuple) else (value,) * 3
+            socket.default_value = (*value, 1.0) if len(socket.default_value) == 4 else value
+
+    def _binary(self, operation, function, a, b):
+        if is_constant(a) and is_constant(b):
+            if isinstance(a, tuple) or isinstance(b, tuple):
+                a, b = (x if isinstance(x, tuple) else (x,) * 3 for x in (a, b))
+                return tuple(function(x, y) for x, y in zip(a, b))
+            return function(a, b)
+        kind = "ShaderNodeVectorMath" if is_colour(a) or is_colour(b) else "ShaderNodeMath"
+        return self.node(kind, operation, a, b)
+
+    def times(self, a, b):
+        """The product of two values."""
+        for one, other in ((a, b), (b, a)):
+            if is_constant(one) and one in (1.0, (1.0,) * 3) and (is_colour(other) or not is_colour(one)):
+                return other
+            if is_constant(one) and one in (0.0, (0.0,) * 3):
+                return (0.0,) * 3 if is_colour(one) or is_colour(other) else 0.0
+        return self._binary("MULTIPLY", lambda x, y: x * y, a, b)
+
+    def plus(self, a, b):
+        """The sum of two values."""
+        for one, other in ((a, b), (b, a)):
+            if is_constant(one) and one in (0.0, (0.0,) * 3) and (is_colour(other) or not is_colour(one)):
+                return other
+        return self._binary("ADD", lambda x, y: x + y, a, b)
+
+    def minus(self, a, b):
+        """The difference of two values."""
+        return self.plus(a, self.times(b, -1.0))
+
+    def over(self, a, b):
+        """The quotient of two values, 0 where the divisor is 0 as Blender's nodes have it."""
+        if is_constant(b) and b in (1.0, (1.0,) * 3):
+            return a
+        return self._binary("DIVIDE", lambda x, y: x / y if y else 0.0, a, b)
+
+    def least(self, a, b):
+        """The smaller of two values, for each component."""
+        return self._binary("MINIMUM", min, a, b)
+
+    def most(self, a, b):
+        """The larger of two values, for each component."""
+        return self._binary("MAXIMUM", max, a, b)
+
+    def power(self, a, exponent):
+        """A value to a power; what is negative counts as 0."""
+        return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
+
+    def unit(self, a):
+        """A value held within [0, 1]."""
+        return self.least(self.most(a, 0.0), 1.0)
+
+    def largest(self, colour):
+        """The largest component of a colour."""
+        if is_constant(colour):
+            return max(colour) if isinstance(colour, tuple) else colour
+        if not is_colour(colour):
+            return colour
+        split = self.tree.nodes.new("ShaderNodeSeparateXYZ")
+        self.put(colour, split.inputs[0])
+        return self.most(self.most(*split.outputs[:2]), split.outputs[2])
+
+    def joined(self, values):
+        """Three numbers as one colour."""
+        if all(map(is_constant, values)):
+            return tuple(map(float, values))
+        node = self.tree.nodes.new("ShaderNodeCombineXYZ")
+        for value, socket in zip(values, node.inputs):
+            self.put(value, socket)
+        return node.outputs[0]
+
+    def varies(self, value):
+        """Whether a value differs from place to place: something upstream is no mere function of its inputs."""
+        if is_constant(value):
+            return False
+        probe = self.tree.nodes.new("NodeReroute")
+        self.tree.links.new(value, probe.inputs[0])
+        kinds = {node.type for node, _ in upstream(probe.inputs[0]).values()}
+        self.tree.nodes.remove(probe)
+        return not kinds <= _FUNCTIONS

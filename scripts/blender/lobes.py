@@ -1,0 +1,259 @@
+"""Each shader node of Cycles as a lobe of the glTF material: the same quantities, and what is lost named."""
+
+from dataclasses import dataclass
+
+from graph import is_constant
+
+WHITE, BLACK = (1.0,) * 3, (0.0,) * 3
+
+
+@dataclass
+class Lobe:
+    """Quantities of glTF's metallic-roughness model and its extensions, each a value of a graph.
+
+    `roughness` is perceptual (GGX alpha is its square), `ior` 0 stands for a reflectance that keeps to `specular` and
+    `specular_colour`, `anisotropy` is the extension's strength, `tangent` the direction of its larger alpha.
+    """
+    base: object = BLACK
+    metallic: object = 0.0
+    roughness: object = 1.0
+    transmission: object = 0.0
+    ior: object = 1.5
+    specular: object = 0.0
+    specular_colour: object = WHITE
+    coat: object = 0.0
+    coat_roughness: object = 0.0
+    sheen: object = BLACK
+    sheen_roughness: object = 0.5
+    anisotropy: object = 0.0
+    tangent: object = None
+    normal: object = None
+    emission: object = BLACK
+    strength: object = 0.0
+    thin: bool = False
+    faceted: bool = True  # roughness and anisotropy mean something
+
+
+class Reader:
+    """Translates leaves of a surface; `say` takes what is lost or approximated."""
+
+    def __init__(self, graph, say):
+        self.graph, self.say = graph, say
+
+    def lobe(self, leaf):
+        """The lobe of a leaf, or None for what is transparent or only shines."""
+        node = leaf.node
+        if leaf.coat is not None:
+            return self._dielectric(leaf)
+        read = _READERS.get(node.type)
+        if read is None:
+            self.say(f"its {node.bl_label} shader is approximated by diffuse reflection of its colour")
+            read = Reader._diffuse
+        return read(self, leaf)
+
+    def get(self, leaf, name):
+        """The value of an input of the leaf's node, or None where this version of Blender has no such input."""
+        socket = leaf.node.inputs.get(name)
+        return None if socket is None else self.graph.value(socket, leaf.path)
+
+    def _named(self, leaf, name, text):
+        """Say `text` where an input is not zero."""
+        value = self.get(leaf, name)
+        if value is not None and not (is_constant(value) and value in (0.0, BLACK)):
+            self.say(text)
+
+    def normal(self, leaf, name="Normal"):
+        """The socket that bends the normal, or None."""
+        value = self.get(leaf, name)
+        return None if value is None or is_constant(value) else value
+
+    def _diffuse(self, leaf):
+        node = leaf.node
+        colour = self.get(leaf, "Color") or self.get(leaf, "Base Color") or BLACK
+        if node.type == "BSDF_DIFFUSE":
+            self._named(leaf, "Roughness", "the Roughness of its Diffuse shader is not carried: it is Lambertian")
+        return Lobe(base=colour, normal=self.normal(leaf), faceted=False)
+
+    def _subsurface(self, leaf):
+        self.say("subsurface scattering is not carried: its light leaves where it arrives")
+        return self._diffuse(leaf)
+
+    def _translucent(self, leaf):
+        self.say("diffuse transmission is approximated by that of a rough thin sheet")
+        return Lobe(base=self.get(leaf, "Color"), transmission=1.0, thin=True, normal=self.normal(leaf), faceted=False)
+
+    def _glossy(self, leaf):
+        """A constant reflectance as a metal's, whose own rises towards the rim: by 1/21 of the rest on average."""
+        colour = self.get(leaf, "Color")
+        if is_constant(colour) and max(colour) - min(colour) > 0.1:
+            self.say("the reflectance of its tinted Glossy shader rises towards the rim")
+        colour = self.graph.most(self.graph.times(self.graph.minus(colour, 1 / 21), 21 / 20), 0.0)
+        return self._facets(leaf, Lobe(base=colour, metallic=1.0, specular=0.0))
+
+    def _metal(self, leaf):
+        if getattr(leaf.node, "fresnel_type", "F82") == "PHYSICAL_CONDUCTOR":
+            self.say("the conductor's reflectance is Schlick's from the one at normal incidence")
+            n, k = (self.graph.value(leaf.node.inputs[name], leaf.path) for name in ("IOR", "Extinction"))
+            colour = self._conductor(n, k)
+        else:
+            colour = self.get(leaf, "Base Color")
+            if self.get(leaf, "Edge Tint") != WHITE:
+                self.say("the Edge Tint of its Metallic shader is not carried: the rim reflects white")
+        return self._facets(leaf, Lobe(base=colour, metallic=1.0))
+
+    def _conductor(self, n, k):
+        g = self.graph
+        k2 = g.times(k, k)
+        below, above = g.minus(n, 1.0), g.plus(n, 1.0)
+        return g.over(g.plus(g.times(below, below), k2), g.plus(g.times(above, above), k2))
+
+    def _glass(self, leaf):
+        self._named(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
+        colour = self.get(leaf, "Color")
+        lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
+                    normal=self.normal(leaf))
+        if leaf.node.type == "BSDF_GLASS":  # its reflection is tinted, too
+            lobe.specular = self.graph.least(self.graph.largest(colour), 1.0)
+            lobe.specular_colour = self.graph.over(colour, self.graph.most(lobe.specular, 1e-6))
+            if is_constant(colour) and max(colour) - min(colour) > 0.25:
+                self.say("the tint of its Glass shader's reflections is carried at steep angles only")
+        self._distribution(leaf, lobe)
+        return lobe
+
+    def _dielectric(self, leaf):
+        """Glossy facets over diffuse, refracting or transparent shaders, in the share of Fresnel's equations."""
+        socket, path = leaf.ior
+        ior = self.graph.value(socket, path)
+        if socket.node.type == "LAYER_WEIGHT":
+            ior = self.graph.over(1.0, self.graph.most(self.graph.minus(1.0, ior), 1e-5))
+        coat = leaf.coat
+        lobe = Lobe(base=self.get(leaf, "Color"), ior=ior, specular=1.0, normal=self.normal(leaf),
+                    specular_colour=self.get(coat, "Color"))
+        if leaf.node.type != "BSDF_DIFFUSE":
+            lobe.transmission, lobe.thin = 1.0, leaf.node.type == "BSDF_TRANSPARENT"
+        return self._facets(coat, lobe)
+
+    def _facets(self, leaf, lobe):
+        """Roughness, anisotropy and normal of a shader with GGX facets."""
+        lobe.roughness, lobe.normal = self.get(leaf, "Roughness"), self.normal(leaf)
+        self._distribution(leaf, lobe)
+        stretch = self.get(leaf, "Anisotropy") if "Anisotropy" in leaf.node.inputs else self.get(leaf, "Anisotropic")
+        if stretch is None or (is_constant(stretch) and stretch == 0):
+            return lobe
+        return self._stretched(leaf, lobe, stretch)
+
+    def _distribution(self, leaf, lobe):
+        if lobe.roughness != 0.0 and getattr(leaf.node, "distribution", "GGX") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
+            self.say(f"its {leaf.node.distribution.title()} facets are taken for GGX")
+
+    def _stretched(self, leaf, lobe, stretch):
+        """Cycles stretches alpha to alpha / a along a tangent and alpha a across; a^2 = 1 - 0.9 s in Principled, else
+        a = 1 - s. glTF keeps alpha across, and moves the share of its squared strength of the way to 1 along.
+        """
+        g, turn = self.graph, self.get(leaf, "Anisotropic Rotation")
+        alpha = g.times(lobe.roughness, lobe.roughness)
+        if leaf.node.type == "BSDF_PRINCIPLED":
+            aspect = g.power(g.minus(1.0, g.times(0.9, stretch)), 0.5)
+        else:
+            # The other shaders are smoother along the tangent where their anisotropy is positive.
+            turn, negative = self.get(leaf, "Rotation"), is_constant(stretch) and stretch < 0
+            turn = turn if negative else g.plus(turn, 0.25)
+            aspect = g.minus(1.0, g.times(stretch, -1.0 if negative else 1.0))
+        along, across = g.over(alpha, aspect), g.times(alpha, aspect)
+        along = g.least(along, 1.0)
+        rest = g.most(g.minus(1.0, across), 1e-6)
+        lobe.anisotropy = g.power(g.most(g.over(g.minus(along, across), rest), 0.0), 0.5)
+        lobe.roughness = g.power(across, 0.5)
+        lobe.tangent = self._tangent(leaf, turn)
+        self.say("its stretched highlights keep the few per cent of light that Cycles loses between facets")
+        return lobe
+
+    def _tangent(self, leaf, turns):
+        """The direction of the highlight's stretch: the Tangent input, or Blender's about the object's axis, turned."""
+        g, tangent = self.graph, self.normal(leaf, "Tangent")
+        geometry = g.tree.nodes.new("ShaderNodeNewGeometry")
+        if tangent is None:
+            tangent = geometry.outputs["Tangent"]
+        if is_constant(turns) and turns == 0:
+            return tangent
+        node = g.tree.nodes.new("ShaderNodeVectorRotate")
+        node.rotation_type = "AXIS_ANGLE"
+        g.put(tangent, node.inputs["Vector"])
+        g.put(geometry.outputs["Normal"], node.inputs["Axis"])
+        g.put(g.times(turns, 6.283185307179586), node.inputs["Angle"])
+        return node.outputs[0]
+
+    def _sheen(self, leaf):
+        self.say("its Sheen shader is approximated by glTF's sheen over black")
+        return Lobe(sheen=self.get(leaf, "Color"), faceted=False, normal=self.normal(leaf),
+                    sheen_roughness=self._sheen_roughness(self.get(leaf, "Roughness")))
+
+    def _sheen_roughness(self, roughness):
+        """The roughness at which glTF's sheen reflects about as much as Cycles' fibres do at this one."""
+        g = self.graph
+        return g.least(g.plus(g.times(roughness, 0.88), g.times(g.most(g.minus(roughness, 0.5), 0.0), 1.0)), 1.0)
+
+    def _principled(self, leaf):
+        g = self.graph
+        lobe = Lobe(
+            base=self.get(leaf, "Base Color"), metallic=g.unit(self.get(leaf, "Metallic")),
+            transmission=g.unit(self.get(leaf, "Transmission Weight")), ior=self.get(leaf, "IOR"), specular=1.0,
+            specular_colour=self.get(leaf, "Specular Tint"), coat=g.unit(self.get(leaf, "Coat Weight")),
+            coat_roughness=self.get(leaf, "Coat Roughness"), emission=self.get(leaf, "Emission Color"),
+            strength=self.get(leaf, "Emission Strength"))
+        # Principled glass takes the root of the colour at each of a body's two surfaces.
+        clear = g.times(lobe.transmission, g.minus(1.0, lobe.metallic))
+        lobe.base = g.plus(g.times(lobe.base, g.minus(1.0, clear)), g.times(g.power(lobe.base, 0.5), clear))
+        both = is_constant(clear) and 0 < clear < 1
+        if both and is_constant(lobe.base) and max(lobe.base) - min(lobe.base) > 0.1:
+            self.say("the colour of its diffuse and of its transmitted light is one: their mean is taken")
+        self._reflectance(leaf, lobe)
+        self._facets(leaf, lobe)
+        self._coverings(leaf, lobe)
+        if lobe.metallic != 0.0 and self.get(leaf, "Specular Tint") != WHITE:
+            self.say("the tint of its metal's rim (Specular Tint) is not carried: the rim reflects white")
+        if lobe.metallic != 1.0 and lobe.transmission != 1.0:
+            self._named(leaf, "Diffuse Roughness", "Diffuse Roughness is not carried: its diffuse part is Lambertian")
+            self._named(leaf, "Subsurface Weight",
+                        "Subsurface Weight is not carried: light leaves where it arrives")
+        self._named(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
+        return lobe
+
+    def _reflectance(self, leaf, lobe):
+        """Cycles scales the reflectance at normal incidence by twice the level, and takes the index that has it."""
+        g, level = self.graph, self.get(leaf, "Specular IOR Level")
+        if lobe.transmission == 1.0:  # of which the level says nothing
+            return
+        if is_constant(level) and is_constant(lobe.ior) and 0 < level:
+            if level != 0.5:
+                f0 = min(((lobe.ior - 1) / (lobe.ior + 1)) ** 2 * 2 * level, 0.99)
+                lobe.ior = (1 + f0 ** 0.5) / (1 - f0 ** 0.5)
+        elif level != 0.5:
+            lobe.specular = g.least(g.times(level, 2.0), 1.0)
+
+    def _coverings(self, leaf, lobe):
+        g = self.graph
+        if lobe.coat != 0.0:
+            if self.get(leaf, "Coat IOR") != 1.5:
+                self.say("Coat IOR is not carried: the coat's index of refraction is 1.5")
+            tint = self.get(leaf, "Coat Tint")
+            if tint != WHITE:
+                self.say("Coat Tint is approximated by a tint of what lies below the coat")
+                # Light is seen through 1 / cos of the coat's thickness: 1.146 on average at an index of 1.5.
+                tint = g.power(tint, 1.146)
+                lobe.base = g.times(lobe.base, g.plus(g.times(tint, lobe.coat), g.minus(1.0, lobe.coat)))
+            if self.normal(leaf, "Coat Normal") is not None:
+                self.say("Coat Normal is not carried: the coat follows the surface")
+        weight = self.get(leaf, "Sheen Weight")
+        if weight != 0.0:
+            self.say("sheen is approximated by glTF's")
+            lobe.sheen = g.times(self.get(leaf, "Sheen Tint"), weight)
+            lobe.sheen_roughness = self._sheen_roughness(self.get(leaf, "Sheen Roughness"))
+
+
+_READERS = {
+    "BSDF_DIFFUSE": Reader._diffuse, "SUBSURFACE_SCATTERING": Reader._subsurface,
+    "BSDF_TRANSLUCENT": Reader._translucent, "BSDF_GLOSSY": Reader._glossy, "BSDF_ANISOTROPIC": Reader._glossy,
+    "BSDF_METALLIC": Reader._metal, "BSDF_GLASS": Reader._glass, "BSDF_REFRACTION": Reader._glass,
+    "BSDF_SHEEN": Reader._sheen, "BSDF_VELVET": Reader._sheen, "BSDF_PRINCIPLED": Reader._principled,
+}

@@ -1,0 +1,229 @@
+"""A material's surface matched to the glTF material: closures weighed, joined where the model can hold them, and
+approximated by their means, by name, where it cannot."""
+
+from dataclasses import dataclass, fields, replace
+
+import closures
+from graph import Graph, is_constant
+from lobes import BLACK, WHITE, Lobe, Reader
+
+_DIFFUSE = {"BSDF_DIFFUSE", "SUBSURFACE_SCATTERING", "BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"}
+_GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"}
+
+
+@dataclass
+class Matched(Lobe):
+    """A lobe that stands for a whole surface, and how much of it is there."""
+    alpha: object = 1.0
+
+
+def match(material, output, undo, say):
+    """The graph of `material` and what its surface becomes; `say` names what is lost.
+
+    A material without a surface is black, or bounds its medium.
+    """
+    graph = Graph(material, undo)
+    socket = graph.tree.nodes[output.name].inputs["Surface"]
+    tree = closures.read(socket)
+    if tree is None:
+        inside = output.inputs["Volume"].is_linked
+        return graph, replace(_film(WHITE), thin=False) if inside else Matched()
+    closures.settle(graph, socket, tree, say)
+    weighed = closures.weigh(tree, graph)
+    return graph, _Match(graph, say, closures.adds_up(tree)).surface(weighed, output.inputs["Volume"].is_linked)
+
+
+def _film(colour):
+    """What bends nothing and reflects nothing, of this transmittance."""
+    return Matched(base=colour, roughness=0.0, transmission=1.0, ior=1.0, thin=True)
+
+
+class _Match:
+    def __init__(self, graph, say, adds_up):
+        self.graph, self.say, self.adds_up = graph, say, adds_up
+        self.reader = Reader(graph, say)
+
+    def surface(self, weighed, has_volume):
+        """What the pairs of leaf and weight become."""
+        g, clear, lobes, shining, kinds = self.graph, [], [], [], []
+        self.adds_up &= all(leaf.node.type not in {"EMISSION", "HOLDOUT", "BSDF_RAY_PORTAL"} for leaf, _ in weighed)
+        for leaf, weight in weighed:
+            if leaf.node.type == "BSDF_TRANSPARENT" and leaf.coat is None:
+                clear.append((weight, self.reader.get(leaf, "Color")))
+            elif leaf.node.type == "EMISSION":
+                shining.append((weight, self.reader.get(leaf, "Color"), self.reader.get(leaf, "Strength")))
+            elif leaf.node.type in {"HOLDOUT", "BSDF_RAY_PORTAL"}:
+                self.say(f"its {leaf.node.bl_label} shader is not carried: it is black")
+            else:
+                lobe, part = self.reader.lobe(leaf), weight
+                if leaf.node.type == "BSDF_PRINCIPLED":
+                    alpha = g.unit(self.reader.get(leaf, "Alpha"))
+                    if alpha != 1.0:
+                        part = g.times(weight, alpha)
+                        clear.append((g.times(weight, g.minus(1.0, alpha)), WHITE))
+                    if lobe.strength != 0.0 and lobe.emission != BLACK:
+                        shining.append((part, lobe.emission, lobe.strength))
+                lobes.append((lobe, part))
+                kinds.append("fresnel" if leaf.coat is not None else leaf.node.type)
+        if not lobes:
+            return self._through(clear, shining, has_volume)
+        alpha, within = self._alpha(clear, lobes)
+        if clear and any(lobe.transmission == 1.0 and not lobe.thin for lobe, _ in lobes):
+            self.say("glass that is partly transparent is approximated: light that came in through its transparent "
+                     "share is not within the glass")
+        found = self._joined([(lobe, within(part)) for lobe, part in lobes], kinds)
+        found = Matched(**{f.name: getattr(found, f.name) for f in fields(Lobe)}, alpha=alpha)
+        found.emission, found.strength = self._emission([(within(w), c, s) for w, c, s in shining])
+        return found
+
+    def _through(self, clear, shining, has_volume):
+        """A surface that scatters nothing: a film where it tints, shines or bounds a medium, else a hole."""
+        g = self.graph
+        tint = BLACK
+        for weight, colour in clear:
+            tint = g.plus(tint, g.times(weight, colour))
+        emission, strength = self._emission(shining)
+        if tint == BLACK:
+            return Matched(emission=emission, strength=strength)
+        if tint == WHITE and not shining and not has_volume:
+            return Matched(alpha=0.0)
+        return replace(_film(tint), emission=emission, strength=strength, thin=not has_volume)
+
+    def _alpha(self, clear, lobes):
+        """Coverage, and a function that makes of a part of the whole a part of what is covered."""
+        g = self.graph
+        if not clear:
+            return 1.0, lambda part: part
+        if self.adds_up and all(tint == WHITE for _, tint in clear):
+            alpha = 0.0
+            for _, part in lobes:
+                alpha = g.plus(alpha, part)
+        else:
+            passed = BLACK
+            for weight, tint in clear:
+                passed = g.plus(passed, g.times(weight, tint))
+            if not (is_constant(passed) and len(set(passed)) == 1):
+                self.say("the colour of its Transparent shader is not carried beside other shaders: its mean is taken")
+            alpha = g.unit(g.minus(1.0, g.mean(passed)))
+
+        def within(part):
+            if part is alpha or part == alpha:
+                return 1.0
+            return g.over(part, alpha if is_constant(alpha) else g.most(alpha, 1e-4))
+        return alpha, within
+
+    def _emission(self, shining):
+        g = self.graph
+        if len(shining) == 1 and shining[0][0] == 1.0:
+            return shining[0][1:]
+        total = BLACK
+        for weight, colour, strength in shining:
+            total = g.plus(total, g.times(g.times(weight, strength), colour))
+        return total, (1.0 if shining else 0.0)
+
+    def _joined(self, lobes, kinds):
+        """One lobe for several, each with its part of the whole."""
+        g = self.graph
+        if len(lobes) == 1 and lobes[0][1] == 1.0 and not self._is_dark_gloss(lobes[0][0], kinds[0]):
+            return lobes[0][0]
+        whole = 0.0
+        for _, part in lobes:
+            whole = g.plus(whole, part)
+        if is_constant(whole) and whole > 1 + 1e-5:
+            self.say(f"its shaders add up to {whole:.3g} times the light they receive: colours are held within 1")
+        if self.adds_up or (is_constant(whole) and abs(whole - 1) < 1e-6):
+            whole = 1.0
+        parts = [g.over(part, whole) for _, part in lobes]
+        lobes = [lobe for lobe, _ in lobes]
+        diffuse = [kind in _DIFFUSE for kind in kinds]
+        if all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and not all(diffuse):
+            found = self._under_constant_gloss(lobes, parts, diffuse)
+        else:
+            found = self._mean(lobes, parts)
+        found.base = g.times(found.base, whole)
+        if found.specular != 0.0 and whole != 1.0:
+            found.specular = g.times(found.specular, g.least(whole, 1.0))
+        found.normal = self._normal(lobes, parts)
+        return found
+
+    @staticmethod
+    def _is_dark_gloss(lobe, kind):
+        """Whether a metal, which reflects more towards grazing angles, would show that this shader does not."""
+        return kind in _GLOSSY and is_constant(lobe.base) and max(lobe.base) < 0.7
+
+    def _sum(self, values, weights):
+        """The weighed mean of values, the same constant where all are; weights need not sum to one."""
+        g = self.graph
+        if all(is_constant(v) and v == values[0] for v in values):
+            return values[0]
+        counted = [(v, w) for v, w in zip(values, weights) if not (is_constant(w) and w == 0)]
+        if not counted:
+            return values[0]
+        if len(counted) == 1:
+            return counted[0][0]
+        top, below = 0.0, 0.0
+        for value, weight in counted:
+            top, below = g.plus(top, g.times(value, weight)), g.plus(below, weight)
+        if is_constant(below) and abs(below - 1) < 1e-6:
+            return top
+        return g.over(top, below if is_constant(below) else g.most(below, 1e-5))
+
+    def _under_constant_gloss(self, lobes, parts, diffuse):
+        """Glossy shaders reflect the same at every angle: facets of that reflectance over what is diffuse.
+
+        The facets keep 1 - r from the base, r their largest component; the colour below makes up for it.
+        """
+        g = self.graph
+        under, gloss = BLACK, BLACK
+        shiny = [(lobe, part) for lobe, part, matt in zip(lobes, parts, diffuse) if not matt]
+        for lobe, part, matt in zip(lobes, parts, diffuse):
+            # Undo the metal's rise towards the rim.
+            colour = lobe.base if matt else g.plus(g.times(lobe.base, 20 / 21), 1 / 21)
+            colour = g.times(colour, part)
+            under, gloss = (g.plus(under, colour), gloss) if matt else (under, g.plus(gloss, colour))
+        if self._differ([lobe.roughness for lobe, _ in shiny]):
+            self.say("its mixed shaders differ in roughness: the mean is taken")
+        strongest = g.largest(gloss)
+        rest = g.minus(1.0, strongest)
+        first = shiny[0][0]
+        return Lobe(
+            base=g.unit(g.over(under, rest if is_constant(rest) else g.most(rest, 1e-3))),
+            roughness=self._sum([lobe.roughness for lobe, _ in shiny], [part for _, part in shiny]),
+            ior=0.0, specular=strongest, specular_colour=g.over(gloss, g.most(strongest, 1e-6)),
+            anisotropy=first.anisotropy, tangent=first.tangent)
+
+    @staticmethod
+    def _differ(values):
+        return any(value is not values[0] and value != values[0] for value in values)
+
+    def _mean(self, lobes, parts):
+        """Every quantity averaged, each over the lobes in which it means something."""
+        g = self.graph
+        dull = [g.times(p, g.minus(1.0, lobe.metallic)) for lobe, p in zip(lobes, parts)]
+        shiny = [p if lobe.faceted else 0.0 for lobe, p in zip(lobes, parts)]
+        coated = [g.times(d, lobe.specular) if lobe.faceted else 0.0 for lobe, d in zip(lobes, dull)]
+        over = {"metallic": parts, "base": parts, "transmission": dull, "specular": dull, "roughness": shiny,
+                "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
+                "coat_roughness": [g.times(p, lobe.coat) for lobe, p in zip(lobes, parts)],
+                "sheen_roughness": [g.times(p, g.largest(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
+        found = Lobe(**{name: self._sum([getattr(lobe, name) for lobe in lobes], weights)
+                        for name, weights in over.items()})
+        found.thin = any(lobe.thin for lobe in lobes)
+        if found.thin:
+            found.roughness = self._sum([lobe.roughness for lobe in lobes], parts)
+        found.tangent = next((lobe.tangent for lobe in lobes if lobe.tangent is not None), None)
+        apart = [name.replace("_", " ") for name, weights in over.items() if name != "base"
+                 and self._differ([getattr(lobe, name) for lobe, w in zip(lobes, weights) if w != 0.0])]
+        if apart:
+            apart += ["base colour"] * self._differ([lobe.base for lobe in lobes])
+            self.say(f"its mixed shaders differ in {', '.join(sorted(apart))}: each is mixed for itself, which is "
+                     "exact only where one shader covers all")
+        return found
+
+    def _normal(self, lobes, parts):
+        normals = [lobe.normal for lobe in lobes]
+        if all(normal == normals[0] for normal in normals):
+            return normals[0]
+        self.say("its mixed shaders differ in their normals: that of the strongest is taken")
+        known = [part if is_constant(part) else 0.5 for part in parts]
+        return normals[known.index(max(known))]

@@ -1,0 +1,93 @@
+"""Which values glTF can say as they are: an image on the mesh's own UV map, at most shifted, turned and scaled."""
+
+import numpy
+
+from graph import feed
+
+_WRAPS = {"REPEAT", "EXTEND", "MIRROR"}
+_COARSE = 256  # texels
+
+
+def image_of(value, data):
+    """The Image Texture node whose Color `value` is, if glTF has a word for it, or None.
+
+    `data`: the image holds numbers rather than colours.
+    """
+    node = value.node
+    if node.type != "TEX_IMAGE" or value.name != "Color" or node.mute:
+        return None
+    image = node.image
+    if image is None or image.source not in {"FILE", "GENERATED"} or node.projection != "FLAT":
+        return None
+    if node.extension not in _WRAPS or image.colorspace_settings.name != ("Non-Color" if data else "sRGB"):
+        return None
+    # Cycles blends neighbouring texels as they are stored, glTF as light: that shows where they are large.
+    if not data and node.interpolation != "Closest" and max(image.size) < _COARSE:
+        return None
+    if image.is_float or not _plain_coordinates(node.inputs["Vector"]):
+        return None
+    return node
+
+
+def is_opaque(image):
+    """Whether no texel is transparent: Cycles multiplies colours by alpha, glTF does not."""
+    if image.channels < 4 or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}:
+        return True
+    return bool(_pixels(image)[..., 3].min() >= 1)
+
+
+def is_grey(image):
+    """Whether red, green and blue are the same everywhere."""
+    if image.channels < 3:
+        return True
+    texels = _pixels(image)
+    return bool(numpy.abs(texels[..., :3] - texels[..., :1]).max() < 1e-3)
+
+
+def _pixels(image):
+    texels = numpy.empty(len(image.pixels), numpy.float32)
+    image.pixels.foreach_get(texels)
+    return texels.reshape(-1, image.channels)
+
+
+def normal_map(value):
+    """The Normal Map node of full strength whose tangent-space image glTF can name, or None."""
+    node = value.node
+    if node.type != "NORMAL_MAP" or node.space != "TANGENT" or node.uv_map or node.mute:
+        return None
+    strength, colour = node.inputs["Strength"], node.inputs["Color"]
+    if strength.is_linked or strength.default_value != 1 or not colour.is_linked:
+        return None
+    output, path = feed(colour)
+    plain = output is not None and output.is_output and not path and image_of(output, data=True) is not None
+    return node if plain else None
+
+
+def leans(node, cosine):
+    """The share of a Normal Map node's texels whose normal is farther from the surface's than this cosine."""
+    output, _ = feed(node.inputs["Color"])
+    return float(numpy.mean(_pixels(output.node.image)[:, 2] * 2 - 1 < cosine))
+
+
+def _plain_coordinates(socket):
+    """Whether an image's coordinates are the UV map that the mesh shows in renders, moved by one Mapping at most."""
+    if not socket.is_linked:
+        return True
+    output, path = feed(socket)
+    if output is None or not output.is_output or path:
+        return False
+    node = output.node
+    if node.type == "TEX_COORD":
+        return output.name == "UV" and not node.from_instancer
+    if node.type == "UVMAP":
+        return not node.uv_map and not node.from_instancer
+    if node.type != "MAPPING" or node.vector_type != "POINT":
+        return False
+    values = [node.inputs[name] for name in ("Location", "Rotation", "Scale")]
+    flat = not any(s.is_linked for s in values) and not any(node.inputs["Rotation"].default_value[:2])
+    return flat and _plain_coordinates(node.inputs["Vector"]) and not _moved(node.inputs["Vector"])
+
+
+def _moved(socket):
+    output, _ = feed(socket)
+    return output is not None and output.is_output and output.node.type == "MAPPING"

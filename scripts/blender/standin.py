@@ -1,0 +1,147 @@
+"""Stand-ins for meshes that are baked: the evaluated shape with a UV map of its own, in which nothing overlaps."""
+
+import contextlib
+
+import bpy
+import numpy
+
+UV, GENERATED = "caustique bake", "caustique generated"
+# Textures whose coordinates are Generated where nothing is linked.
+_BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
+                 "TEX_GABOR", "TEX_MUSGRAVE"}
+_DEFORM = {
+    "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
+    "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH",
+    "SOFT_BODY", "VOLUME_DISPLACE",
+}
+
+
+def of_object(graph):
+    """Whether a material looks different on each object that wears it: it asks where, which or what colour that is."""
+    for tree in graph.trees():
+        for node in tree.nodes:
+            if node.type in {"OBJECT_INFO", "NEW_GEOMETRY", "PARTICLE_INFO"} or (
+                    node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY"):
+                return True
+            if node.type in {"TEX_COORD", "BUMP", "NORMAL_MAP", "TANGENT"} and (
+                    getattr(node, "object", None) is not None or getattr(node, "space", "") in {"WORLD", "OBJECT"}):
+                return True
+    return False
+
+
+def read_generated(graph):
+    """Let a graph read Generated coordinates from an attribute, which `swap` makes: those of the shape undeformed."""
+    for tree in graph.trees():
+        wanting = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
+                   if s.name == "Vector" and not s.is_linked]
+        wanting += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD"
+                    for link in n.outputs["Generated"].links]
+        if wanting:
+            node = tree.nodes.new("ShaderNodeAttribute")
+            node.attribute_name = GENERATED
+            for socket in wanting:
+                tree.links.new(node.outputs["Vector"], socket)
+
+
+def _places(thing):
+    """Where the vertices of an evaluated object are in its own space: (count, 3)."""
+    mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
+    mesh.vertices.foreach_get("co", places)
+    thing.to_mesh_clear()
+    return places.reshape(-1, 3)
+
+
+def generate(thing, mesh, say):
+    """Put Generated coordinates on the vertices of `mesh`, the evaluated shape of `thing`: those of the undeformed shape
+    in the box of the object's own mesh, or in its own box where the object is no mesh."""
+    if not mesh.vertices or GENERATED in mesh.attributes:
+        return
+    places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
+    mesh.vertices.foreach_get("co", places)
+    places = places.reshape(-1, 3)
+    deforming = [m for m in thing.modifiers if m.type in _DEFORM and m.show_viewport]
+    if deforming:
+        with contextlib.ExitStack() as undo:
+            for modifier in deforming:
+                undo.callback(setattr, modifier, "show_viewport", True)
+                modifier.show_viewport = False
+            undeformed = _places(thing)
+        if len(undeformed) == len(places):
+            places = undeformed
+        else:
+            say(f"Generated coordinates are those of the shape that {', '.join(m.name for m in deforming)} made")
+    box = thing.data if thing.type == "MESH" else mesh
+    centre, half = numpy.array(box.texspace_location), numpy.array(box.texspace_size)
+    inside = (places - centre) / (2 * numpy.maximum(half, 1e-12)) + 0.5
+    layer = mesh.attributes.new(GENERATED, "FLOAT_VECTOR", "POINT")
+    layer.data.foreach_set("vector", inside.astype(numpy.float32).ravel())
+
+
+def swap(thing, undo, say):
+    """Give `thing` its evaluated mesh until `undo` closes, and return the object that now stands for it.
+
+    Objects that are no meshes are hidden behind a new one. `say` takes what is lost.
+    """
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = thing.evaluated_get(depsgraph)
+    mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    undo.callback(bpy.data.meshes.remove, mesh)
+    if thing.type == "MESH" and thing.data.is_editable:
+        name = thing.data.name
+        undo.callback(setattr, thing.data, "name", name)
+        undo.callback(setattr, mesh, "name", name + " baked")
+        thing.data.name, mesh.name = name + " unbaked", name
+    generate(thing, mesh, say)
+    if thing.type == "MESH":
+        body, before = thing, thing.data
+        for modifier in thing.modifiers:
+            for shown in ("show_viewport", "show_render"):
+                undo.callback(setattr, modifier, shown, getattr(modifier, shown))
+                setattr(modifier, shown, False)
+        worn = [(slot.link, slot.material) for slot in thing.material_slots]
+        thing.data = mesh
+        undo.callback(restore, thing, before, worn)
+        for i, (link, material) in enumerate(worn):
+            thing.material_slots[i].link = "DATA"
+            mesh.materials[i] = material
+    else:
+        body = bpy.data.objects.new(thing.name, mesh)
+        undo.callback(bpy.data.objects.remove, body)
+        for collection in thing.users_collection:
+            collection.objects.link(body)
+        body.matrix_world = thing.matrix_world.copy()
+        undo.callback(setattr, thing, "hide_render", False)
+        thing.hide_render = True
+    return body
+
+
+def restore(thing, mesh, worn):
+    """Give an object back its mesh, and its slots where they hang and what they hold."""
+    thing.data = mesh
+    for slot, (link, material) in zip(thing.material_slots, worn):
+        slot.link = link
+        slot.material = material
+
+
+def unwrap(body, size):
+    """Add the UV map for images of `size` texels a side to the mesh of `body`, which is in the current view layer."""
+    mesh = body.data
+    mesh.uv_layers.active = mesh.uv_layers.new(name=UV)
+    layer = bpy.context.view_layer
+    for other in layer.objects:
+        other.select_set(other == body)
+    layer.objects.active = body
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.reveal(select=True)
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.uv.smart_project(angle_limit=1.15, island_margin=4 / size, area_weight=0.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def keep_two_uv_maps(mesh):
+    """Leave the UV map that renders show and the one that is baked to: caustique reads two."""
+    shown = next((uv.name for uv in mesh.uv_layers if uv.active_render), UV)
+    for name in [uv.name for uv in mesh.uv_layers if uv.name not in {shown, UV}]:
+        mesh.uv_layers.remove(mesh.uv_layers[name])
+    return [uv.name for uv in mesh.uv_layers].index(UV)

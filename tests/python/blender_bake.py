@@ -1,0 +1,357 @@
+"""Materials that glTF has no words for: what is baked against closed forms, what mixes become, and that nothing stays behind."""
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from unittest import mock
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
+import torture_stage  # noqa: E402, first: it brings bpy
+
+import bpy  # noqa: E402
+import numpy  # noqa: E402
+
+import bake  # noqa: E402
+import closures  # noqa: E402
+import export  # noqa: E402
+import glb  # noqa: E402
+
+SIZE = 64
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=os.path.join(self.folder.name, "cache")))
+        self.path = os.path.join(self.folder.name, "scene.glb")
+        self.stage = torture_stage.Stage("plane")
+        self.stage.body.rotation_euler = (0, 0, 0)
+
+    def write(self, size=SIZE):
+        """Export; the material "tested", and the warnings."""
+        warnings = export.write(self.path, bake_size=size)
+        self.document, self.buffer = glb.read(self.path)
+        return next(m for m in self.document["materials"] if m["name"] == "tested"), warnings
+
+    def texels(self, info):
+        """The stored numbers of a textureInfo's image, 0 to 1, first row at the top."""
+        image = self.document["images"][self.document["textures"][info["index"]]["source"]]
+        view = self.document["bufferViews"][image["bufferView"]]
+        path = os.path.join(self.folder.name, "image.png")
+        with open(path, "wb") as file:
+            file.write(self.buffer[view["byteOffset"]:view["byteOffset"] + view["byteLength"]])
+        loaded = bpy.data.images.load(path)
+        loaded.colorspace_settings.name, loaded.alpha_mode = "Non-Color", "CHANNEL_PACKED"
+        values = numpy.empty(len(loaded.pixels), numpy.float32)
+        loaded.pixels.foreach_get(values)
+        shape = loaded.size[1], loaded.size[0], loaded.channels
+        bpy.data.images.remove(loaded)
+        return values.reshape(shape)[::-1]
+
+    def points(self):
+        """Of the body's vertices in the file: positions (count, 3) in Blender's axes, and the UV set that is baked to."""
+        node = next(n for n in self.document["nodes"] if n["name"] == "body")
+        attributes = self.document["meshes"][node["mesh"]]["primitives"][0]["attributes"]
+
+        def read(name, width):
+            accessor = self.document["accessors"][attributes[name]]
+            view = self.document["bufferViews"][accessor["bufferView"]]
+            start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+            return numpy.frombuffer(self.buffer, numpy.float32, accessor["count"] * width, start).reshape(-1, width)
+        places = read("POSITION", 3)
+        return numpy.stack([places[:, 0], -places[:, 2], places[:, 1]], 1), read("TEXCOORD_1", 2)
+
+    def look_up(self, info):
+        """The stored texels at the body's inner vertices, with their positions."""
+        places, uv = self.points()
+        texels = self.texels(info)
+        inner = numpy.abs(places[:, :2]).max(1) < 0.9
+        x, y = (numpy.clip(uv[inner] * texels.shape[0] - 0.5, 0, texels.shape[0] - 1.001)).T
+        i, j, s, t = y.astype(int), x.astype(int), (y % 1)[:, None], (x % 1)[:, None]
+        mixed = ((texels[i, j] * (1 - t) + texels[i, j + 1] * t) * (1 - s)
+                 + (texels[i + 1, j] * (1 - t) + texels[i + 1, j + 1] * t) * s)
+        return places[inner], mixed
+
+
+def linear(x):
+    return numpy.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+
+class Baked(Case):
+    def across(self, axis=0):
+        """A number that grows from 0 to 1 along an axis of the plane."""
+        split = self.stage.node("SeparateXYZ", self.stage.node("TexCoord").outputs["Object"])
+        return self.stage.node("MapRange", split.outputs[axis], -1.0, 1.0, 0.0, 1.0).outputs[0]
+
+    def test_colour_is_that_of_the_place(self):
+        self.stage.principled(Base_Color=self.stage.node("CombineXYZ", self.across(0), self.across(1), 0.25))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, ['material "tested": Base Color is baked to images of 64 x 64 texels'])
+        info = entry["pbrMetallicRoughness"]["baseColorTexture"]
+        self.assertEqual(info["texCoord"], 1)
+        places, found = self.look_up(info)
+        expected = numpy.stack([(places[:, 0] + 1) / 2, (places[:, 1] + 1) / 2, 0 * places[:, 0] + 0.25], 1)
+        numpy.testing.assert_allclose(linear(found[:, :3]), expected, atol=0.015)
+
+    def test_numbers_share_an_image_by_channel(self):
+        self.stage.principled(Roughness=self.across(0), Metallic=self.across(1), Transmission_Weight=0.0)
+        entry, _ = self.write()
+        places, found = self.look_up(entry["pbrMetallicRoughness"]["metallicRoughnessTexture"])
+        numpy.testing.assert_allclose(found[:, 1], (places[:, 0] + 1) / 2, atol=0.015)
+        numpy.testing.assert_allclose(found[:, 2], (places[:, 1] + 1) / 2, atol=0.015)
+        self.assertNotIn("KHR_materials_transmission", entry.get("extensions", {}))
+
+    def test_what_is_the_same_everywhere_becomes_a_factor(self):
+        checker = self.stage.node("TexChecker", Color1=(0.3, 0.2, 0.1), Color2=(0.3, 0.2, 0.1))
+        self.stage.principled(Base_Color=checker.outputs["Color"])
+        entry, _ = self.write()
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.3, 0.2, 0.1, 1), rtol=1e-3)
+        self.assertNotIn("images", self.document)
+
+    def test_functions_of_numbers_need_no_image(self):
+        ramp = self.stage.node("ValToRGB", self.stage.node("Math", 0.5, 0.25, operation="MULTIPLY"))
+        self.stage.principled(Base_Color=ramp, Roughness=self.stage.node("Math", 0.5, 0.3, operation="ADD"))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, [])
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (*[0.125] * 3, 1), rtol=1e-3)
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.8, 3)
+
+    def test_bright_emission_keeps_its_strength(self):
+        glow = self.stage.node("VectorMath", self.stage.node("CombineXYZ", self.across(0), 0.5, 0.0), (20, 20, 20),
+                               operation="MULTIPLY")
+        self.stage.surface(self.stage.node("Emission", Color=glow, Strength=2.0))
+        entry, _ = self.write()
+        places, found = self.look_up(entry["emissiveTexture"])
+        strength = entry["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"]
+        expected = 40 * numpy.stack([(places[:, 0] + 1) / 2, 0 * places[:, 0] + 0.5], 1)
+        numpy.testing.assert_allclose(linear(found[:, :2]) * strength, expected, atol=0.6)
+
+    def test_bump_becomes_the_normals_of_its_slope(self):
+        """Heights that rise by 0.3 a metre lean all normals alike; the height image is not in the file."""
+        heights = self.stage.node("Math", self.across(0), 0.6, operation="MULTIPLY")
+        self.stage.principled(Normal=self.stage.node("Bump", Strength=1.0, Distance=1.0, Height=heights))
+        entry, _ = self.write()
+        self.assertEqual(len(self.document["images"]), 1)
+        _, found = self.look_up(entry["normalTexture"])
+        normals = found[:, :3] * 2 - 1
+        numpy.testing.assert_allclose(numpy.hypot(normals[:, 0], normals[:, 1]) / normals[:, 2], 0.3, atol=0.02)
+
+    def test_generated_coordinates_are_those_of_the_undeformed_shape(self):
+        modifier = self.stage.body.modifiers.new("stretch", "SIMPLE_DEFORM")
+        modifier.deform_method, modifier.factor, modifier.deform_axis = "STRETCH", 1.0, "X"
+        self.stage.principled(Base_Color=self.stage.node("TexCoord").outputs["Generated"])
+        entry, _ = self.write()
+        places, found = self.look_up(entry["pbrMetallicRoughness"]["baseColorTexture"])
+        reach = abs(self.points()[0][:, 0]).max()
+        self.assertGreater(reach, 1.4)
+        numpy.testing.assert_allclose(linear(found[:, 0]), places[:, 0] / (2 * reach) + 0.5, atol=0.015)
+
+    def test_objects_that_share_a_mesh_share_an_image_unless_their_material_asks_which(self):
+        self.stage.principled(Base_Color=self.across(0))
+        twin = self.stage.place("twin", self.stage.body.data, (3, 0, 1))
+        self.write()
+        self.assertEqual(len(self.document["images"]), 1)
+        self.stage.body.color, twin.color = (0.2, 0.2, 0.2, 1), (0.6, 0.6, 0.6, 1)
+        self.stage.principled(Base_Color=self.stage.node("ObjectInfo").outputs["Color"])
+        self.write()
+        colours = [m["pbrMetallicRoughness"]["baseColorFactor"][0] for m in self.document["materials"]
+                   if m["name"] == "tested"]
+        numpy.testing.assert_allclose(sorted(colours), (0.2, 0.6), rtol=2e-3)
+
+    def test_text_is_baked_too(self):
+        text = bpy.data.curves.new("text", "FONT")
+        text.body = "I"
+        self.stage.principled(Base_Color=self.stage.node("TexNoise").outputs["Color"])
+        text.materials.append(self.stage.material)
+        self.stage.place("text", text)
+        self.write()
+        worn = [m for m in self.document["materials"] if m["name"] == "tested"]
+        self.assertEqual(len([m for m in worn if "baseColorTexture" in m["pbrMetallicRoughness"]]), 2)
+        self.assertFalse(bpy.data.objects["text"].hide_render)
+
+    def test_a_second_export_bakes_nothing_until_something_changes(self):
+        noise = self.stage.node("TexNoise", Scale=3.0)
+        self.stage.principled(Base_Color=noise.outputs["Color"])
+        first, _ = self.write()
+        before = self.texels(first["pbrMetallicRoughness"]["baseColorTexture"])
+        with mock.patch.object(bake.Baker, "_texels", side_effect=AssertionError("baked again")):
+            second, _ = self.write()
+            numpy.testing.assert_allclose(self.texels(second["pbrMetallicRoughness"]["baseColorTexture"]), before,
+                                          atol=1 / 254)
+            noise.inputs["Scale"].default_value = 4
+            with self.assertRaisesRegex(AssertionError, "baked again"):
+                self.write()
+            noise.inputs["Scale"].default_value = 3
+            self.stage.body.data.vertices[0].co.x -= 0.2
+            with self.assertRaisesRegex(AssertionError, "baked again"):
+                self.write()
+
+    def test_nothing_is_left_behind(self):
+        self.stage.principled(Base_Color=self.stage.group(
+            lambda tree, inputs: self.stage.node("TexNoise", tree=tree).outputs["Color"]))
+        modifier = self.stage.body.modifiers.new("finer", "SUBSURF")
+        self.stage.body.material_slots[0].link = "OBJECT"
+        self.stage.body.material_slots[0].material = self.stage.material
+
+        def state():
+            kinds = ("objects", "meshes", "materials", "images", "scenes", "node_groups", "curves")
+            tree = self.stage.material.node_tree
+            return ({kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds},
+                    len(tree.nodes), len(tree.links), bpy.context.scene.name, self.stage.body.data.name,
+                    [uv.name for uv in self.stage.body.data.uv_layers], modifier.show_viewport,
+                    self.stage.body.material_slots[0].link, self.stage.body.material_slots[0].material.name,
+                    [c.name for c in self.stage.body.users_collection])
+        before = state()
+        entry, _ = self.write()
+        self.assertIn("baseColorTexture", entry["pbrMetallicRoughness"])
+        self.assertEqual(state(), before)
+
+    def test_each_loss_is_named_where_nothing_may_be_baked(self):
+        noise = self.stage.node("TexNoise")
+        self.stage.principled(Base_Color=noise.outputs["Color"], Roughness=noise.outputs[0],
+                              Normal=self.stage.node("Bump", Height=noise.outputs[0]))
+        _, warnings = self.write(0)
+        self.assertNotIn("images", self.document)
+        for loss in ("Base Color comes from a Noise Texture", "Roughness comes from a Noise Texture",
+                     "Normal comes from a Bump"):
+            self.assertTrue(any(loss in line for line in warnings), (loss, warnings))
+
+    def test_an_object_of_an_instanced_collection_is_baked(self):
+        self.stage.principled(Base_Color=self.across(0))
+        inside = bpy.data.collections.new("inside")
+        inside.objects.link(self.stage.body)
+        self.stage.scene.collection.objects.unlink(self.stage.body)
+        instance = self.stage.place("instance", None, (0, 0, 1))
+        instance.instance_type, instance.instance_collection = "COLLECTION", inside
+        entry, _ = self.write()
+        self.assertIn("baseColorTexture", entry["pbrMetallicRoughness"])
+        self.assertEqual(len(self.document["images"]), 1)
+
+    def test_what_is_linked_from_another_file_is_baked(self):
+        self.stage.principled(Base_Color=self.across(0), Roughness=0.25)
+        library = os.path.join(self.folder.name, "library.blend")
+        bpy.data.libraries.write(library, {self.stage.body})
+        self.stage = torture_stage.Stage()
+        with bpy.data.libraries.load(library, link=True) as (_, into):
+            into.objects = ["body"]
+        bpy.data.objects.remove(self.stage.body)
+        self.stage.scene.collection.objects.link(into.objects[0])
+        entry, _ = self.write()
+        self.assertIn("baseColorTexture", entry["pbrMetallicRoughness"])
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.25, 5)
+
+    def test_sizes_on_the_command_line(self):
+        script = os.path.join(ROOT, "scripts", "blender", "export.py")
+        for size in ("0", "x", "100000"):
+            done = subprocess.run([sys.executable, script, "--bake-size", size, self.path], capture_output=True,
+                                  text=True, timeout=120, check=False)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("--bake-size", done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+
+
+class Matched(Case):
+    def test_transparent_share_is_alpha(self):
+        self.stage.mix(0.25, self.stage.node("BsdfTransparent"), self.stage.node("BsdfDiffuse", Color=(0.4, 0.3, 0.2)))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, [])
+        self.assertEqual(entry["alphaMode"], "BLEND")
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.4, 0.3, 0.2, 0.25), rtol=1e-5)
+
+    def test_fresnel_of_glossy_over_diffuse_is_a_dielectric(self):
+        self.stage.mix(self.stage.node("Fresnel", IOR=1.8), self.stage.node("BsdfDiffuse", Color=(0.4, 0.3, 0.2)),
+                       self.stage.node("BsdfGlossy", Color=(1, 1, 1), Roughness=0.3))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, [])
+        self.assertAlmostEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1.8, 5)
+        self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.3, 5)
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.4, 0.3, 0.2, 1), rtol=1e-5)
+
+    def test_gloss_over_matt_keeps_the_light_of_both(self):
+        """Matt 0.7 x 0.5 below facets that reflect 0.3 x 0.8 and keep 1 - 0.24 of what is below."""
+        self.stage.mix(0.3, self.stage.node("BsdfDiffuse", Color=(0.5, 0.5, 0.5)),
+                       self.stage.node("BsdfGlossy", Color=(0.8, 0.8, 0.8), Roughness=0.2))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, [])
+        self.assertAlmostEqual(entry["extensions"]["KHR_materials_specular"]["specularFactor"], 0.24, 5)
+        base = entry["pbrMetallicRoughness"]["baseColorFactor"][0]
+        self.assertAlmostEqual(base * (1 - 0.24), 0.35, 5)
+
+    def test_a_film_tints_and_shines(self):
+        self.stage.mix(0.4, self.stage.node("BsdfTransparent", Color=(0.5, 1, 1)),
+                       self.stage.node("Emission", Color=(1, 0.5, 0.25), Strength=2.0))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, [])
+        self.assertEqual(entry["extensions"]["KHR_materials_volume"], {"thicknessFactor": 0})
+        self.assertEqual(entry["extensions"]["KHR_materials_ior"], {"ior": 1})
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.3, 0.6, 0.6, 1), rtol=1e-5)
+        numpy.testing.assert_allclose(entry["emissiveFactor"], (0.8, 0.4, 0.2), rtol=1e-5)
+
+    def test_groups_reroutes_and_muted_nodes_are_walked_through(self):
+        stage = self.stage
+
+        def build(tree, inputs):
+            hop = tree.nodes.new("NodeReroute")
+            tree.links.new(inputs[0], hop.inputs[0])
+            under = stage.node("BsdfDiffuse", Color=hop.outputs[0], tree=tree)
+            over = stage.node("Emission", Strength=9.0, tree=tree)
+            mixer = stage.node("MixShader", 0.9, under.outputs[0], over.outputs[0], tree=tree)
+            mixer.mute = True
+            return mixer.outputs[0]
+        stage.surface(stage.group(build, Paint=(0.3, 0.2, 0.1)))
+        entry, warnings = self.write()
+        self.assertEqual(warnings, [])
+        self.assertNotIn("emissiveFactor", entry)
+        numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.3, 0.2, 0.1, 1), rtol=1e-5)
+
+    def test_stretched_highlights_keep_both_widths(self):
+        """Cycles: alpha / a along and alpha a across, a^2 = 1 - 0.9 x 0.8."""
+        self.stage.principled(Metallic=1.0, Roughness=0.5, Anisotropic=0.8)
+        entry, _ = self.write()
+        across = entry["pbrMetallicRoughness"]["roughnessFactor"] ** 2
+        strength = entry["extensions"]["KHR_materials_anisotropy"]["anisotropyStrength"]
+        aspect = math.sqrt(1 - 0.9 * 0.8)
+        self.assertAlmostEqual(across, 0.25 * aspect, 5)
+        self.assertAlmostEqual(across + (1 - across) * strength ** 2, 0.25 / aspect, 5)
+
+    def test_the_specular_level_scales_the_reflectance_at_normal_incidence(self):
+        self.stage.principled(IOR=1.5, Specular_IOR_Level=0.75)
+        entry, _ = self.write()
+        ior = entry["extensions"]["KHR_materials_ior"]["ior"]
+        self.assertAlmostEqual(((ior - 1) / (ior + 1)) ** 2, 0.06, 5)
+
+    def test_diffuse_reflectance_of_glass(self):
+        """Duntley's closed form for diffuse light from outside at an index of 1.5: 9.18 %."""
+        self.assertAlmostEqual(closures.mean_reflectance(1.5), 0.0918, 4)
+
+    def test_what_cannot_be_carried_is_named(self):
+        losses = {
+            "Coat Tint": dict(Coat_Weight=1.0, Coat_Tint=(1, 0.5, 0.5)), "sheen": dict(Sheen_Weight=1.0),
+            "Diffuse Roughness": dict(Diffuse_Roughness=0.5), "Subsurface Weight": dict(Subsurface_Weight=0.5),
+            "Thin Film": dict(Thin_Film_Thickness=300.0), "Coat IOR": dict(Coat_Weight=1.0, Coat_IOR=1.8),
+            "rim": dict(Metallic=1.0, Specular_Tint=(1, 0.5, 0.5)),
+        }
+        for words, inputs in losses.items():
+            self.setUp()
+            self.stage.principled(**inputs)
+            _, warnings = self.write()
+            self.assertTrue(any(words in line for line in warnings), (words, warnings))
+
+    def test_no_material_is_grey(self):
+        self.write_grey()
+        bare = self.document["meshes"][next(n["mesh"] for n in self.document["nodes"] if n["name"] == "body")]
+        entry = self.document["materials"][bare["primitives"][0]["material"]]
+        self.assertEqual(entry["pbrMetallicRoughness"], {"baseColorFactor": [0.8, 0.8, 0.8, 1], "metallicFactor": 0})
+
+    def write_grey(self):
+        export.write(self.path, bake_size=SIZE)
+        self.document, self.buffer = glb.read(self.path)
+
+
+if __name__ == "__main__":
+    unittest.main()

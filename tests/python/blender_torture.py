@@ -1,0 +1,58 @@
+"""Features of Blender materials rendered by Cycles and by caustique: a part of docs/blender-table.md, which must not get worse."""
+
+import os
+import sys
+import tempfile
+import unittest
+from unittest import mock
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
+import torture  # noqa: E402
+import torture_stage  # noqa: E402
+
+SHORT = (
+    "principled_coat", "principled_glass_tinted", "image_alpha", "noise_roughness", "image_box", "bump",
+    "group_of_textures", "diffuse_glossy_fresnel", "transparent_mask", "principled_mask",
+)
+
+
+class Torture(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=folder.name))
+
+    def test_no_feature_is_worse_than_in_the_table(self):
+        stored = torture.rows()
+        for name in SHORT:
+            with self.subTest(name):
+                result = torture.run(name)
+                self.assertNotEqual(result.verdict, torture.WRONG, result)
+                self.assertLessEqual(torture.RANK.index(result.verdict), torture.RANK.index(stored[name]), result)
+
+    def test_a_wrong_material_is_found_out(self):
+        """The comparison must tell 5 % of a sphere's colour apart."""
+        def off(stage):
+            stage.principled(Base_Color=(0.5, 0.5, 0.5), Specular_IOR_Level=0.0)
+
+        def meant(stage):
+            stage.principled(Base_Color=(0.55, 0.55, 0.55), Specular_IOR_Level=0.0)
+        with mock.patch.dict(torture_stage.FEATURES, off=off):
+            theirs = self.cycles(meant)
+            with mock.patch.object(torture, "by_cycles", side_effect=theirs):
+                self.assertEqual(torture.run("off").verdict, torture.WRONG)
+
+    @staticmethod
+    def cycles(make):
+        make(torture_stage.Stage())
+        return [torture.by_cycles(seed) for seed in (1, 2)]
+
+    def test_the_table_holds_every_feature_and_nothing_wrong(self):
+        stored = torture.rows()
+        self.assertEqual(list(stored), list(torture_stage.FEATURES))
+        self.assertNotIn(torture.WRONG, stored.values())
+
+
+if __name__ == "__main__":
+    unittest.main()
