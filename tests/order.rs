@@ -106,7 +106,8 @@ fn the_order_test_finds_planted_faults() {
     assert_eq!(broken(&order, "math", "use embree_crate::scene;"), [] as [&str; 0]);
 }
 
-/// The modules of a room below `src`, each with its text, but for what is in the room's `mod.rs`; those in folders of their own count as one.
+/// The modules of a room below `src`, each with its text, but for what is in the room's `mod.rs`; those in folders of
+/// their own count as one.
 fn room(root: &Path, name: &str) -> Vec<(String, String)> {
     let mut modules: HashMap<String, String> = HashMap::new();
     for file in files(&format!("src/{name}")) {

@@ -1,8 +1,8 @@
 //! What lies on top of the base: sheen, and a clear coat over it.
 //!
-//! Below a covering of albedo E, lobes with facets are seen through `1 - max(E(o), E(i))`, which is exact for mirrors; separable lobes
-//! through `(1 - E(o)) (1 - E(i))`, normalised to keep `1 - E(o)` of their albedo. Both keep the exchange of directions. Both sides of a
-//! surface are covered.
+//! Below a covering of albedo E, lobes with facets are seen through `1 - max(E(o), E(i))`, which is exact for mirrors;
+//! separable lobes through `(1 - E(o)) (1 - E(i))`, normalised to keep `1 - E(o)` of their albedo. Both keep the
+//! exchange of directions. Both sides of a surface are covered.
 
 use super::energy::{COAT_ETA, EnergyTables};
 use super::fresnel::{dielectric, reflect};
@@ -75,7 +75,8 @@ impl Cover {
         [self.coat, self.sheen.max_element()]
     }
 
-    /// Albedo of white sheen. The distribution's own exceeds 1 at grazing angles where it is narrow: see [`Cover::sheen`].
+    /// Albedo of white sheen. The distribution's own exceeds 1 at grazing angles where it is narrow: see
+    /// [`Cover::sheen`].
     #[inline]
     fn sheen_albedo(&self, mu: Position) -> f32 {
         self.sheen_albedo.at(mu).min(1.0)
@@ -111,7 +112,8 @@ impl Cover {
         albedos
     }
 
-    /// The coat's lobe without cosine, and the density of its facets' reflection; not for delta coats. Both directions above.
+    /// The coat's lobe without cosine, and the density of its facets' reflection; not for delta coats. Both directions
+    /// above.
     #[inline]
     pub fn coat(&self, o: Vec3, i: Vec3) -> (f32, f32) {
         let Some(h) = (o + i).try_normalize() else { return (0.0, 0.0) };

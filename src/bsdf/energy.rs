@@ -9,22 +9,23 @@ use crate::math::{Vec2, Vec3, Vec4, sqr};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands have
-/// kinks along curves, at the horizon and the critical angle, where product rules converge slowly).
+/// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands
+/// have kinks along curves, at the horizon and the critical angle, where product rules converge slowly).
 const LATTICE: (usize, usize) = (987, 610);
 
 /// Index of refraction of clear coats (KHR_materials_clearcoat).
 pub(super) const COAT_ETA: f32 = 1.5;
 
-/// Albedos of single scattering at one side of a rough dielectric, split so that the reflectances F0 at normal and F90 at grazing
-/// incidence can be chosen later: everything is linear in them.
+/// Albedos of single scattering at one side of a rough dielectric, split so that the reflectances F0 at normal and F90
+/// at grazing incidence can be chosen later: everything is linear in them.
 #[derive(Clone, Debug)]
 pub(super) struct SideTables {
     /// Reflection: of a perfect reflector, of total reflection, of the rest per F0, per F90.
     pub reflected: Grid,
     /// Both: constant, per F0, per F90; the fourth is unused.
     pub scattered: Grid,
-    /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of [`Smooth::grazing_weight`].
+    /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of
+    /// [`Smooth::grazing_weight`].
     pub average_total: f32,
     /// See `average_total`.
     pub average_grazing: f32,
@@ -85,8 +86,8 @@ enum By {
     One,
 }
 
-/// Tabulates functions of alpha and cosine: `f` is given a lobe, the direction towards the viewer, Lambda of it, a visible normal and
-/// its weight in the quadrature.
+/// Tabulates functions of alpha and cosine: `f` is given a lobe, the direction towards the viewer, Lambda of it, a
+/// visible normal and its weight in the quadrature.
 fn tabulate<T: Send>(
     by: By,
     zero: impl Fn() -> T + Sync,
@@ -169,7 +170,8 @@ impl SideTables {
         }
     }
 
-    /// Share of what arrives that the facets of a perfect reflector scatter less than all of: what compensation gives back.
+    /// Share of what arrives that the facets of a perfect reflector scatter less than all of: what compensation gives
+    /// back.
     #[inline]
     pub fn white_loss(&self, alpha: Position) -> Profile {
         Profile::new(&self.reflected, alpha, 1.0, -Vec4::X)
@@ -242,7 +244,8 @@ impl CoverTables {
 }
 
 impl EnergyTables {
-    /// Tables for interfaces of the relative indices `etas` (an index and its inverse share one), and for 1.5; others use the nearest.
+    /// Tables for interfaces of the relative indices `etas` (an index and its inverse share one), and for 1.5; others
+    /// use the nearest.
     pub fn new(etas: impl IntoIterator<Item = f32>, coverings: Coverings) -> EnergyTables {
         EnergyTables::on_demand(etas, [], coverings)
     }
@@ -327,8 +330,9 @@ impl EnergyTables {
         self.sheen.as_ref().map_or(Profile::constant(0.0), |grid| Profile::new(grid, alpha, 0.0, Vec4::X))
     }
 
-    /// Facets below a covering of albedo E are seen through `1 - max(E(o), E(i))`, which is exact for mirrors and keeps the exchange of
-    /// directions. Rough ones then lose `integral f max(E(i) - E(o), 0) cos` of what `1 - E(o)` would let them keep: this profile.
+    /// Facets below a covering of albedo E are seen through `1 - max(E(o), E(i))`, which is exact for mirrors and keeps
+    /// the exchange of directions. Rough ones then lose `integral f max(E(i) - E(o), 0) cos` of what `1 - E(o)` would
+    /// let them keep: this profile.
     #[inline]
     pub(super) fn covered_loss(&self, covering: Covering, alpha: Position, cover_alpha: f32) -> Profile {
         let tables = match covering {

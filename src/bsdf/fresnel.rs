@@ -16,8 +16,8 @@ pub fn is_matched(eta: f32) -> bool {
     (eta - 1.0).abs() < MATCHED
 }
 
-/// Fresnel's equations for unpolarised light that meets a smooth dielectric from a medium in which the ray makes the angle
-/// `cos_o` (in `[0, 1]`) with the normal; `eta` is the index on the far side over the index on the near side.
+/// Fresnel's equations for unpolarised light that meets a smooth dielectric from a medium in which the ray makes the
+/// angle `cos_o` (in `[0, 1]`) with the normal; `eta` is the index on the far side over the index on the near side.
 /// Returns the reflectance and the cosine of the refracted ray; `(1, 0)` at total internal reflection.
 #[inline]
 pub fn dielectric(cos_o: f32, eta: f32) -> (f32, f32) {
@@ -128,7 +128,8 @@ pub fn reflect(w: Vec3, h: Vec3) -> Vec3 {
     h * (2.0 * w.dot(h)) - w
 }
 
-/// The direction into which `w` is refracted at a facet with normal `h` on the side of `w`; `cos_t` from [`dielectric`].
+/// The direction into which `w` is refracted at a facet with normal `h` on the side of `w`; `cos_t` from
+/// [`dielectric`].
 #[inline]
 pub fn refract(w: Vec3, h: Vec3, eta: f32, cos_t: f32) -> Vec3 {
     h * (w.dot(h) / eta - cos_t) - w / eta

@@ -204,8 +204,9 @@ mod tests {
         }
     }
 
-    /// A photon that has met another facet squarely, and grazes the plane of this one, brings what its small cosine with the shading normal leaves. Over its cosine with
-    /// this plane it would be hundreds of times what any photon should.
+    /// A photon that has met another facet squarely, and grazes the plane of this one, brings what its small cosine
+    /// with the shading normal leaves. Over its cosine with this plane it would be hundreds of times what any photon
+    /// should.
     #[test]
     fn photons_of_facets_nearby_bring_no_more_than_their_own_cosine_allows() {
         let tables = EnergyTables::new([1.5], Coverings { coat: false, sheen: false });

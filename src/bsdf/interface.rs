@@ -1,4 +1,5 @@
-//! What of a surface's scattering does not depend on its colours: made once for a material without textures on it, else per vertex.
+//! What of a surface's scattering does not depend on its colours: made once for a material without textures on it, else
+//! per vertex.
 
 use super::cover::Cover;
 use super::energy::{Covering, EnergyTables, SideTables};
@@ -9,8 +10,8 @@ use super::{DELTA_ALPHA, LobeSet, Parameters};
 use crate::math::{Rgb, sqr};
 use std::f32::consts::FRAC_1_PI;
 
-/// Reflection of light that facets of reflectance `f` scatter more than once, as a share of what a perfect reflector's lose; `kept` is the
-/// share that those reflect at once \[Kulla and Conty 2017\].
+/// Reflection of light that facets of reflectance `f` scatter more than once, as a share of what a perfect reflector's
+/// lose; `kept` is the share that those reflect at once \[Kulla and Conty 2017\].
 #[inline]
 pub(super) fn again(f: Rgb, kept: f32) -> Rgb {
     f * f * kept / (Rgb::ONE - f * (1.0 - kept))
@@ -55,7 +56,8 @@ pub(super) struct RoughGlass {
     pub reflected: [Profile; 2],
     /// Reflected compensation: `returned[side] * loss(o) * loss(i)`.
     pub returned: [f32; 2],
-    /// Transmitted compensation over the squared index of the side transmitted to (with 1 above): the same from both sides.
+    /// Transmitted compensation over the squared index of the side transmitted to (with 1 above): the same from both
+    /// sides.
     pub passed: f32,
 }
 
@@ -63,13 +65,13 @@ pub(super) struct RoughGlass {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Covered {
     pub cover: Cover,
-    /// Normalisation of separable lobes below: average profile over average of the profile times what passes, for the profiles `through`,
-    /// `loss` and those of glass.
+    /// Normalisation of separable lobes below: average profile over average of the profile times what passes, for the
+    /// profiles `through`, `loss` and those of glass.
     pub through: f32,
     pub loss: f32,
     pub glass_loss: [f32; 2],
-    /// What facets of average reflectance r lose below coat and sheen: `r * below[k] * profile(o) * profile(i)`, with albedo
-    /// `pi * average * r * below * profile(o)`.
+    /// What facets of average reflectance r lose below coat and sheen: `r * below[k] * profile(o) * profile(i)`, with
+    /// albedo `pi * average * r * below * profile(o)`.
     pub below: [f32; 2],
     pub profiles: [Profile; 2],
 }
@@ -81,8 +83,9 @@ impl Interface {
         // A lobe that is narrow along one axis only is still sampled as a lobe.
         let ggx = Ggx { alpha_x: p.alpha_x.max(DELTA_ALPHA), alpha_y: p.alpha_y.max(DELTA_ALPHA) };
         let rough = class != LobeSet::DELTA;
-        // The tables are isotropic: a stretched lobe takes what one of the same mean square slope loses. At normal incidence that
-        // is right within 3 %; at grazing angles a metal stretched fourfold is off by up to -18 % across and +6 % along.
+        // The tables are isotropic: a stretched lobe takes what one of the same mean square slope loses. At normal
+        // incidence that is right within 3 %; at grazing angles a metal stretched fourfold is off by up to -18 % across
+        // and +6 % along.
         let mean_square = 0.5 * (sqr(ggx.alpha_x) + sqr(ggx.alpha_y));
         let alpha = Position::new(if rough { mean_square.sqrt() } else { 0.0 });
         let sides = tables.sides(p.eta);
@@ -158,8 +161,9 @@ impl Interface {
 impl RoughGlass {
     fn new(alpha: Position, sides: [&SideTables; 2], eta: f32, f0: f32, f90: f32) -> RoughGlass {
         let loss = sides.map(|s| s.glass_loss(alpha, f0, f90));
-        // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average those of the other side;
-        // k makes no share larger than the average transmittance of the smooth interface, which is in proportion to n^2 already.
+        // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average
+        // those of the other side; k makes no share larger than the average transmittance of the smooth interface,
+        // which is in proportion to n^2 already.
         let transmitted = sides.map(|s| 1.0 - s.average_reflectance(f0, f90));
         let averages = loss.each_ref().map(|l| l.average);
         let k = (transmitted[0] / sqr(eta)).min(transmitted[1]) / averages[0].max(averages[1]).max(1e-9);

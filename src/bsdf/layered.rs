@@ -1,11 +1,13 @@
-//! glTF's metallic-roughness model: metal, and a dielectric over a diffuse or transmitting base, sharing one rough interface.
+//! glTF's metallic-roughness model: metal, and a dielectric over a diffuse or transmitting base, sharing one rough
+//! interface.
 //!
 //! Everything is a mixture of three surfaces, each reciprocal and free of loss for a white base:
 //! - *metal*: GGX with Schlick's Fresnel term;
-//! - *matte*: a rough dielectric interface over a diffuse base, coupled as in \[Kelemen and Szirmay-Kalos 2001\]: diffuse light
-//!   is what the interface lets in, (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)). Both sides of the surface look like its front;
-//! - *glass*: a rough dielectric interface between two media \[Walter 2007\], or two equal ones (a thin wall, whose transmitted lobe is the
-//!   mirror image of the reflected one).
+//! - *matte*: a rough dielectric interface over a diffuse base, coupled as in \[Kelemen and Szirmay-Kalos 2001\]:
+//!   diffuse light is what the interface lets in, (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)). Both sides of the surface
+//!   look like its front;
+//! - *glass*: a rough dielectric interface between two media \[Walter 2007\], or two equal ones (a thin wall, whose
+//!   transmitted lobe is the mirror image of the reflected one).
 //!
 //! What single scattering between facets loses is given back by a separable lobe, for glass on both sides in the ratio
 //! that keeps it reciprocal \[Kulla and Conty 2017\]. The lobe belongs to the class of the lobe it completes.
@@ -17,7 +19,8 @@ use super::profile::Position;
 use crate::math::{Rgb, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// Directions nearer to the surface than this (cosine) are in it: nothing comes from there. Below it, products of cosines underflow.
+/// Directions nearer to the surface than this (cosine) are in it: nothing comes from there. Below it, products of
+/// cosines underflow.
 pub(super) const LEAST_COSINE: f32 = 1e-6;
 
 /// Mean of the channels: what lobes are chosen by.
@@ -42,8 +45,8 @@ pub struct Layered<'a> {
     /// Diffuse: `diffuse * through(o) * through(i)`; `diffuse_albedo * through(o)` is its albedo.
     pub(super) diffuse: Rgb,
     pub(super) diffuse_albedo: Rgb,
-    /// Compensation for reflecting facets: `returned * loss(o) * loss(i)`, and for thin walls `passed` likewise on the other side;
-    /// times pi times the average of `loss` they are albedos.
+    /// Compensation for reflecting facets: `returned * loss(o) * loss(i)`, and for thin walls `passed` likewise on the
+    /// other side; times pi times the average of `loss` they are albedos.
     pub(super) returned: Rgb,
     pub(super) passed: Rgb,
     /// Average reflectance of the facets below a covering.

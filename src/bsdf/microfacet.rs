@@ -51,21 +51,23 @@ impl Ggx {
         (sqr(w.z) + sqr(w.x * self.alpha_x) + sqr(w.y * self.alpha_y)).sqrt()
     }
 
-    /// D G2 / (4 o i) for reflection; what that is to be multiplied with and divided by `o.z + root_o` to give the density of `i` by
-    /// reflection at visible normals; the cosine at the facet. `root_o` is
-    /// [`Ggx::root`] of `o`; both directions above, their cosines not below 1e-6.
+    /// D G2 / (4 o i) for reflection; what that is to be multiplied with and divided by `o.z + root_o` to give the
+    /// density of `i` by reflection at visible normals; the cosine at the facet. `root_o` is [`Ggx::root`] of `o`; both
+    /// directions above, their cosines not below 1e-6.
     #[inline]
     pub fn reflection(&self, o: Vec3, root_o: f32, i: Vec3) -> (f32, f32, f32) {
         let h = o + i;
         let length2 = h.length_squared();
         let stretched = (sqr(h.x / self.alpha_x) + sqr(h.y / self.alpha_y) + sqr(h.z)) / length2;
-        // With root = z (1 + 2 Lambda), G2 / (4 o i) = 1 / (2 (root_o i + root_i o)) and G1 / (4 o) = 1 / (2 (o + root_o)).
+        // With root = z (1 + 2 Lambda), G2 / (4 o i) = 1 / (2 (root_o i + root_i o)) and G1 / (4 o) = 1 / (2 (o +
+        // root_o)).
         let both = root_o * i.z + self.root(i) * o.z;
         let value = (0.5 * FRAC_1_PI) / (self.alpha_x * self.alpha_y * sqr(stretched) * both);
         (value, both, (0.5 * length2.sqrt()).min(1.0))
     }
 
-    /// A facet normal seen from `w`, with density `d(h) max(w.h, 0) / (w.z (1 + lambda(w)))` \[Dupuy and Benyoub 2023\].
+    /// A facet normal seen from `w`, with density `d(h) max(w.h, 0) / (w.z (1 + lambda(w)))` \[Dupuy and Benyoub
+    /// 2023\].
     #[inline]
     pub fn sample_visible(&self, w: Vec3, u: Vec2) -> Vec3 {
         let stretched = Vec3::new(w.x * self.alpha_x, w.y * self.alpha_y, w.z).normalize();
@@ -90,8 +92,8 @@ pub fn g2_reflection(lambda_o: f32, lambda_i: f32) -> f32 {
     1.0 / (1.0 + lambda_o + lambda_i)
 }
 
-/// Fraction seen from two directions on opposite sides: separable, as in \[Walter 2007 (23)\]. (The exact value, Beta(1 + a, 1 + b)
-/// \[Heitz 2014 (A.3)\], costs gamma functions; what it would lose more comes back by compensation here.)
+/// Fraction seen from two directions on opposite sides: separable, as in \[Walter 2007 (23)\]. (The exact value, Beta(1
+/// + a, 1 + b) \[Heitz 2014 (A.3)\], costs gamma functions; what it would lose more comes back by compensation here.)
 #[inline]
 pub fn g2_transmission(lambda_o: f32, lambda_i: f32) -> f32 {
     g1(lambda_o) * g1(lambda_i)

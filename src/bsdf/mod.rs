@@ -93,9 +93,11 @@ pub enum Transport {
 pub struct BsdfSample {
     /// Unit direction, local frame.
     pub wi: Vec3,
-    /// f |cos wi| / pdf over the set of lobes asked for (for a delta lobe, its weight over the probability of choosing it).
+    /// f |cos wi| / pdf over the set of lobes asked for (for a delta lobe, its weight over the probability of choosing
+    /// it).
     pub weight: Rgb,
-    /// Density per solid angle of `wi` over the non-delta lobes of the set; for a delta sample the probability of choosing that lobe.
+    /// Density per solid angle of `wi` over the non-delta lobes of the set; for a delta sample the probability of
+    /// choosing that lobe.
     pub pdf_w: f32,
     /// Class of the lobe drawn (exactly one).
     pub lobe: LobeSet,
@@ -113,7 +115,8 @@ pub enum Bsdf<'a> {
     Layered(Layered<'a>),
 }
 
-/// Lambert's BSDF and density over `set`, from the cosines of both directions with the normal on the side that the surface is seen from.
+/// Lambert's BSDF and density over `set`, from the cosines of both directions with the normal on the side that the
+/// surface is seen from.
 #[inline(always)]
 fn lambert(color: Rgb, seen: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
     if seen > 0.0 && lit > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
@@ -164,11 +167,11 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The BSDF (1/sr, without cosine) over the lobes of `set` that are not delta, and the density per solid angle with which
-    /// [`Bsdf::sample`] draws `wi` for `wo` and `set`.
+    /// The BSDF (1/sr, without cosine) over the lobes of `set` that are not delta, and the density per solid angle with
+    /// which [`Bsdf::sample`] draws `wi` for `wo` and `set`.
     ///
-    /// [`Transport::Radiance`]: light from `wi` is seen along `wo`; [`Transport::Importance`]: flux that came from `wo` leaves
-    /// along `wi`. They differ for refraction only: with n the index on the side of a direction,
+    /// [`Transport::Radiance`]: light from `wi` is seen along `wo`; [`Transport::Importance`]: flux that came from `wo`
+    /// leaves along `wi`. They differ for refraction only: with n the index on the side of a direction,
     /// `f_radiance(o, i) = f_importance(i, o) = f_importance(o, i) n_o^2 / n_i^2`.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
@@ -200,7 +203,8 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Where only diffuse reflection is in `set`: the BSDF over its dependence on `wi`, and that dependence (`None`: there is none).
+    /// Where only diffuse reflection is in `set`: the BSDF over its dependence on `wi`, and that dependence (`None`:
+    /// there is none).
     #[inline]
     fn diffuse_only(&self, seen: &Seen, set: LobeSet) -> Option<(Rgb, Option<&'a Profile>)> {
         match self {
@@ -227,8 +231,8 @@ impl<'a> Bsdf<'a> {
         self.evaluate(wo, wi, transport, set).1
     }
 
-    /// Draws a direction from the lobes of `set`; `u_lobe` chooses the lobe, `u` the direction. `None` where the lobes scatter
-    /// nothing, or the direction drawn is not one they scatter to.
+    /// Draws a direction from the lobes of `set`; `u_lobe` chooses the lobe, `u` the direction. `None` where the lobes
+    /// scatter nothing, or the direction drawn is not one they scatter to.
     #[inline]
     pub fn sample(&self, wo: Vec3, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         self.sample_seen(&self.seen(wo), transport, set, u_lobe, u)
@@ -252,7 +256,8 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Albedo of the lobes of `set`: the share of flux from `wo` that they scatter. Exact for delta and diffuse lobes, a good estimate for others.
+    /// Albedo of the lobes of `set`: the share of flux from `wo` that they scatter. Exact for delta and diffuse lobes,
+    /// a good estimate for others.
     #[inline]
     pub fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {
         self.albedo_seen(&self.seen(wo), set)

@@ -1,8 +1,8 @@
 //! Tabulated functions of a cosine and a roughness, and the lobes whose angular profile they are.
 //!
-//! A grid runs over the fourth roots of the cosine and of alpha, which puts nodes where albedos bend: at cosines near alpha, down to
-//! nearly smooth surfaces. Interpolation is linear; averages integrate the interpolant exactly, so that a lobe normalised by
-//! them gives back what the table says is missing, no more and no less.
+//! A grid runs over the fourth roots of the cosine and of alpha, which puts nodes where albedos bend: at cosines near
+//! alpha, down to nearly smooth surfaces. Interpolation is linear; averages integrate the interpolant exactly, so that
+//! a lobe normalised by them gives back what the table says is missing, no more and no less.
 
 use crate::math::{Vec2, Vec3, Vec4};
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -34,7 +34,8 @@ const AVERAGE: [f32; NODES] = {
     result
 };
 
-/// Weights of the nodes in the integral of `f 2 mu dmu` times two, `f` made constant between nodes: the mean of its two ends, doubled.
+/// Weights of the nodes in the integral of `f 2 mu dmu` times two, `f` made constant between nodes: the mean of its two
+/// ends, doubled.
 const MASS: [f32; NODES] = {
     let mut weights = [0.0f32; NODES];
     let mut i = 0;
@@ -103,8 +104,8 @@ impl Grid {
     }
 }
 
-/// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe. Its nodes are kept, so that a
-/// photon costs one interpolation and no look at the grid.
+/// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe. Its nodes are
+/// kept, so that a photon costs one interpolation and no look at the grid.
 #[derive(Clone, Copy, Debug)]
 pub struct Profile {
     nodes: [f32; NODES],
@@ -163,14 +164,16 @@ impl Profile {
         a + (b - a) * mu.t
     }
 
-    /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which [`Profile::sample`] draws it.
+    /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which
+    /// [`Profile::sample`] draws it.
     #[inline]
     pub fn at_with_pdf_w(&self, at: Position, mu: f32) -> (f32, f32) {
         let (a, b) = (self.nodes[at.i], self.nodes[at.i + 1]);
         (a + (b - a) * at.t, (a + b) / self.mass.max(f32::MIN_POSITIVE) * mu * FRAC_1_PI)
     }
 
-    /// A direction of the upper hemisphere, drawn as if the profile were constant between nodes; `None` where the profile is nothing.
+    /// A direction of the upper hemisphere, drawn as if the profile were constant between nodes; `None` where the
+    /// profile is nothing.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<Vec3> {
         let mut left = u.x * self.mass;

@@ -17,7 +17,8 @@ impl Layered<'_> {
         if t > 0.0 { r / (r + t) } else { 1.0 }
     }
 
-    /// What a transmitted path weighs more than the adjoint of this transport mode: radiance is denser where the index is higher.
+    /// What a transmitted path weighs more than the adjoint of this transport mode: radiance is denser where the index
+    /// is higher.
     #[inline]
     fn radiance_scale(&self, side: usize, transport: Transport) -> f32 {
         match transport {
@@ -189,8 +190,8 @@ impl Layered<'_> {
         (f, pdf)
     }
 
-    /// Rough refraction \[Walter 2007 (17), (21)\] for flux that comes along `o` (above) and leaves along `i` (below), and the
-    /// density of `i`.
+    /// Rough refraction \[Walter 2007 (17), (21)\] for flux that comes along `o` (above) and leaves along `i` (below),
+    /// and the density of `i`.
     #[inline]
     fn transmitting_facets(&self, seen: &Seen, i: Vec3) -> (Rgb, f32) {
         let (o, ggx) = (seen.o, &self.interface.ggx);

@@ -1,10 +1,12 @@
 //! Scattering in world space: shading normals, decided once.
 //!
-//! Light whose sides of the shading plane and of the geometric plane differ is not scattered: whether light is reflected or transmitted is then never in doubt, nothing
-//! leaks, and a surface is dark where its shading normal faces away from the lamp. A viewer whose sides differ, as on steep normal maps seen from
-//! the side, stands for the opposite direction: so there is no black, and since the directions that light is scattered to which are on the wrong side of
-//! the surface are just the opposites of those that it is not, each carries what its opposite would have, and all that is scattered leaves.
-//! Every algorithm sees the same function. Light carried the other way takes the adjoint of Veach \[1997, 5.3\].
+//! Light whose sides of the shading plane and of the geometric plane differ is not scattered: whether light is
+//! reflected or transmitted is then never in doubt, nothing leaks, and a surface is dark where its shading normal faces
+//! away from the lamp. A viewer whose sides differ, as on steep normal maps seen from the side, stands for the opposite
+//! direction: so there is no black, and since the directions that light is scattered to which are on the wrong side of
+//! the surface are just the opposites of those that it is not, each carries what its opposite would have, and all that
+//! is scattered leaves. Every algorithm sees the same function. Light carried the other way takes the adjoint of Veach
+//! \[1997, 5.3\].
 
 use super::layered::Seen;
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
@@ -37,8 +39,8 @@ impl<'a> Shading<'a> {
         Shading { frame, ng, bsdf, seen: bsdf.seen(if opposite { -local } else { local }), cos_og, opposite }
     }
 
-    /// `w`, which paths of `transport` come from, in the frame, and its cosine with the geometric normal; `None` where the two normals disagree about the side of
-    /// light, be it `w` or the direction seen along.
+    /// `w`, which paths of `transport` come from, in the frame, and its cosine with the geometric normal; `None` where
+    /// the two normals disagree about the side of light, be it `w` or the direction seen along.
     #[inline]
     fn local(&self, w: Vec3, transport: Transport) -> Option<(Vec3, f32)> {
         let local = self.frame.to_local(w);
@@ -52,8 +54,8 @@ impl<'a> Shading<'a> {
     }
 
     /// The BSDF times the cosine that belongs to it: `f |wi.ns|` for radiance, and for importance
-    /// `f |wi.ns| (|wo.ns| |wi.ng|) / (|wo.ng| |wi.ns|)` \[Veach 1997 (5.17)\]; and the density per solid angle with which
-    /// [`Shading::sample`] draws `wi`.
+    /// `f |wi.ns| (|wo.ns| |wi.ng|) / (|wo.ng| |wi.ns|)` \[Veach 1997 (5.17)\]; and the density per solid angle with
+    /// which [`Shading::sample`] draws `wi`.
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
@@ -77,7 +79,8 @@ impl<'a> Shading<'a> {
         self.evaluate_cos(wi, transport, set).1
     }
 
-    /// Density per solid angle with which a path that comes along `wi` would be sent along the direction the surface is seen along.
+    /// Density per solid angle with which a path that comes along `wi` would be sent along the direction the surface is
+    /// seen along.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         // Whoever comes along `wi` looks for light if this path does not.
@@ -89,9 +92,10 @@ impl<'a> Shading<'a> {
         self.bsdf.pdf(i, self.seen.wo(), transport, set)
     }
 
-    /// What a photon from `wi` (unit, towards where it came from) adds to the radiance seen, per flux over kernel area: photons
-    /// measure irradiance on the geometric surface where they are, so `f |wi.ns| / cosine`, the latter that of `wi` with the normal there. That of the normal here would
-    /// not do: photons that graze it have met another facet nearby, whose share of them does not vanish with their cosine here.
+    /// What a photon from `wi` (unit, towards where it came from) adds to the radiance seen, per flux over kernel area:
+    /// photons measure irradiance on the geometric surface where they are, so `f |wi.ns| / cosine`, the latter that of
+    /// `wi` with the normal there. That of the normal here would not do: photons that graze it have met another facet
+    /// nearby, whose share of them does not vanish with their cosine here.
     #[inline]
     pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
         let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {

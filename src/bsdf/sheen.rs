@@ -1,4 +1,5 @@
-//! Sheen of cloth: the Charlie distribution of KHR_materials_sheen \[Estevez and Kulla 2017, "Production Friendly Microfacet Sheen BRDF"\].
+//! Sheen of cloth: the Charlie distribution of KHR_materials_sheen \[Estevez and Kulla 2017, "Production Friendly
+//! Microfacet Sheen BRDF"\].
 
 use crate::math::sqr;
 use std::f32::consts::FRAC_1_PI;

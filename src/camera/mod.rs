@@ -50,9 +50,9 @@ pub struct CameraSample {
     pub wi: Vec3,
     /// Point on the lens.
     pub lens: Vec3,
-    /// Density per area of the point at which rays from the film through this lens point, with all `width * height` pixels
-    /// together as one measurement of mean 1, arrive at distance d: importance over d^2 and the cosine at the camera; multiply by the
-    /// cosine at the point.
+    /// Density per area of the point at which rays from the film through this lens point, with all `width * height`
+    /// pixels together as one measurement of mean 1, arrive at distance d: importance over d^2 and the cosine at the
+    /// camera; multiply by the cosine at the point.
     pub importance: f32,
 }
 
@@ -79,8 +79,9 @@ impl Camera {
         Camera { offset: 2.0 * shift * half, ..*self }
     }
 
-    /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film: each sees as much as a pixel does here. What light
-    /// paths send to the film is taken from all around it: as much noise as if there were all pixels and as many light paths.
+    /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film:
+    /// each sees as much as a pixel does here. What light paths send to the film is taken from all around it: as much
+    /// noise as if there were all pixels and as many light paths.
     pub fn sparse(&self, factor: f64) -> Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
@@ -139,7 +140,8 @@ impl Camera {
         self.lens_radius > 0.0
     }
 
-    /// Film point in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size, about the film's middle.
+    /// Film point in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size, about the film's
+    /// middle.
     #[inline]
     fn plane(&self, film: Vec2, half: Vec2) -> Vec2 {
         let size = Vec2::new(self.width as f32, self.height as f32);
@@ -166,7 +168,8 @@ impl Camera {
         }
     }
 
-    /// Width that the picture spans per metre of distance (perspective; 0 for an orthographic camera), and at distance 0.
+    /// Width that the picture spans per metre of distance (perspective; 0 for an orthographic camera), and at distance
+    /// 0.
     pub fn span(&self) -> (f32, f32) {
         match self.projection {
             Projection::Perspective(half) => (2.0 * half.x, 0.0),
@@ -204,7 +207,8 @@ impl Camera {
         if !(film.x >= 0.0 && film.y >= 0.0 && film.x < self.width as f32 && film.y < self.height as f32) {
             return None;
         }
-        // Film points are uniform over the area 4 half.x half.y at distance 1: density per solid angle 1 / (area cos^3).
+        // Film points are uniform over the area 4 half.x half.y at distance 1: density per solid angle 1 / (area
+        // cos^3).
         let importance = 1.0 / (4.0 * half.x * half.y * cos * cos * cos * distance2);
         Some(CameraSample { film, wi, lens: lens_world, importance })
     }

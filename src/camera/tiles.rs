@@ -24,9 +24,10 @@ pub fn band(width: u32) -> usize {
     width as usize * TILE
 }
 
-/// Calls `f(scratch, band, places)` for all pixels of a picture stored row by row and cut into `bands` of [`band`] pixels, [`GROUP`] of them at a time
-/// (fewer at edges), in tiles and within them along a Z-order curve: neighbours in time are neighbours in the picture, in both directions. Groups depend
-/// on the picture's size alone. `scratch` is made once per unit of work or less often, so nothing may depend on what is in it.
+/// Calls `f(scratch, band, places)` for all pixels of a picture stored row by row and cut into `bands` of [`band`]
+/// pixels, [`GROUP`] of them at a time (fewer at edges), in tiles and within them along a Z-order curve: neighbours in
+/// time are neighbours in the picture, in both directions. Groups depend on the picture's size alone. `scratch` is made
+/// once per unit of work or less often, so nothing may depend on what is in it.
 pub fn par_pixels<B: Send, S>(
     bands: impl IndexedParallelIterator<Item = B>,
     (width, height): (u32, u32),

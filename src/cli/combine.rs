@@ -14,9 +14,10 @@ use std::path::PathBuf;
 
 /// Finish a rendered EXR as 'caustique render' finishes its own
 ///
-/// The file needs a picture and what tells its noise: the layers that 'caustique render' writes, or from another renderer the beauty with a layer
-/// Variance (of the mean) or two independent halves, Half1 and Half2. Albedo and normal guide the denoiser, by the names that Blender, Mitsuba, pbrt,
-/// LuxCore and Arnold give them. With --model it needs Level1, Level2, ... and Variance1, ... All layers are kept, the picture itself is replaced.
+/// The file needs a picture and what tells its noise: the layers that 'caustique render' writes, or from another
+/// renderer the beauty with a layer Variance (of the mean) or two independent halves, Half1 and Half2. Albedo and
+/// normal guide the denoiser, by the names that Blender, Mitsuba, pbrt, LuxCore and Arnold give them. With --model it
+/// needs Level1, Level2, ... and Variance1, ... All layers are kept, the picture itself is replaced.
 #[derive(clap::Args)]
 pub struct CombineArgs {
     /// EXR to finish

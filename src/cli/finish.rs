@@ -39,12 +39,14 @@ impl From<Denoise> for DenoiserChoice {
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Finish")]
 pub struct FinishArgs {
-    /// What makes the denoised picture: 'oidn' is Intel Open Image Denoise, 'own' needs no library, 'auto' takes oidn where it is found
+    /// What makes the denoised picture: 'oidn' is Intel Open Image Denoise, 'own' needs no library, 'auto' takes oidn
+    /// where it is found
     ///
     /// The estimate moves towards it as far as its own standard errors allow
     #[arg(long, value_enum, default_value_t = Denoise::Auto)]
     pub denoise: Denoise,
-    /// Combine five bandwidth levels by equation (6) of the 2021 paper before that, with a network: 'compact' comes with the program; or an ONNX file
+    /// Combine five bandwidth levels by equation (6) of the 2021 paper before that, with a network: 'compact' comes
+    /// with the program; or an ONNX file
     #[arg(long, value_name = "compact|FILE.onnx", help_heading = "Expert")]
     pub model: Option<String>,
 }

@@ -129,7 +129,8 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     builder.build().map_err(|error| Error::new(Kind::Io, "threads", error).hint("ask for fewer with --threads"))
 }
 
-/// Prints a line to stderr. Nobody may be listening any more (a closed pipe, a terminal that is gone): a render goes on.
+/// Prints a line to stderr. Nobody may be listening any more (a closed pipe, a terminal that is gone): a render goes
+/// on.
 fn say(line: &str) {
     progress::beside_the_bar(|| {
         let _ = writeln!(std::io::stderr().lock(), "{line}");

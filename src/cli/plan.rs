@@ -12,8 +12,9 @@ use serde_json::json;
 
 /// Say which effects a scene calls for, which will be simulated, and why.
 ///
-/// Reads the scene as 'caustique render' does, tries what --method auto tries, and prints what it would do. Below that it says what looks like a mistake in the scene: glass that does not bend
-/// light, lamps that are closed in or a thousand times too bright, and the like.
+/// Reads the scene as 'caustique render' does, tries what --method auto tries, and prints what it would do. Below that
+/// it says what looks like a mistake in the scene: glass that does not bend light, lamps that are closed in or a
+/// thousand times too bright, and the like.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
 pub struct PlanArgs {

@@ -1,7 +1,7 @@
 //! Whether this processor has the instructions that the program was built with.
 //!
-//! `.cargo/config.toml` builds for x86-64-v3. `is_x86_feature_detected!` is no help: where a feature is enabled at build time it
-//! is simply `true`. So the kernel is asked, which lists the features as `flags` in `/proc/cpuinfo`.
+//! `.cargo/config.toml` builds for x86-64-v3. `is_x86_feature_detected!` is no help: where a feature is enabled at
+//! build time it is simply `true`. So the kernel is asked, which lists the features as `flags` in `/proc/cpuinfo`.
 
 use caustique::error::{Error, Kind, Result};
 

@@ -103,7 +103,8 @@ impl Drop for Bar {
     }
 }
 
-/// Something that goes on without a measure of how far it is: a spinner on a terminal, a line elsewhere, once it has taken as long as [`PATIENCE`].
+/// Something that goes on without a measure of how far it is: a spinner on a terminal, a line elsewhere, once it has
+/// taken as long as [`PATIENCE`].
 pub struct Waiting {
     over: Option<Sender<()>>,
     teller: Option<JoinHandle<()>>,

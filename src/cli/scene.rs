@@ -34,12 +34,14 @@ pub struct SceneArgs {
     /// Units of lamps: 'photometric' is what Blender's exporter writes unless told otherwise, 683 lumen to the watt
     #[arg(long, value_enum, default_value_t = LightUnits::Auto)]
     pub light_units: LightUnits,
-    /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light, and says so
+    /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light,
+    /// and says so
     #[arg(long, value_enum, default_value_t = Glass::Auto)]
     pub glass: Glass,
-    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: classes of light paths (emission, direct, indirect, glossy,
-    /// caustic, sds), and dispersion, volume (or medium), depth_of_field, environment, alpha (cut-outs), textures. 'caustique plan' lists what a
-    /// scene calls for [default: all that it calls for]
+    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: classes of light paths
+    /// (emission, direct, indirect, glossy, caustic, sds), and dispersion, volume (or medium), depth_of_field,
+    /// environment, alpha (cut-outs), textures. 'caustique plan' lists what a scene calls for [default: all that it
+    /// calls for]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
     pub effects: Option<Switches>,
     /// Let the scene name files (buffers, textures, its environment) outside its own folder

@@ -1,4 +1,5 @@
-//! `caustique completions` and `caustique man`: what a shell and the reader of manuals take from the command line itself.
+//! `caustique completions` and `caustique man`: what a shell and the reader of manuals take from the command line
+//! itself.
 
 use super::print;
 use caustique::error::{Error, Kind, Result};

@@ -1,5 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end after the current iteration, the second ends the program at once.
-//! Ctrl-C is answered, by a thread of its own: a handler may not print.
+//! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end after the current iteration, the second
+//! ends the program at once. Ctrl-C is answered, by a thread of its own: a handler may not print.
 
 use super::say;
 use caustique::error::{Error, Kind, Result};

@@ -4,7 +4,8 @@ use caustique::error::{Error, Kind};
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// Words that people type, the option that is meant, and what to say of it where the command has that option; where it is "", to every command.
+/// Words that people type, the option that is meant, and what to say of it where the command has that option; where it
+/// is "", to every command.
 const WORDS: [(&[&str], &str, &str); 16] = [
     (
         &["--samples", "--spp", "-s", "--aa-samples", "--num-samples"],

@@ -21,7 +21,8 @@ pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, weights: &Map, p
     let (independent, correlated) = (&stack.levels[0], &stack.levels[pair + 1]);
     sums.par_chunks_mut(core.width()).enumerate().for_each(|(y, sums)| {
         let y = core.y0 + y;
-        // Sums of w (y_i - z_i) and of w: the centre's z joins them once, so that equal levels leave no rounding behind.
+        // Sums of w (y_i - z_i) and of w: the centre's z joins them once, so that equal levels leave no rounding
+        // behind.
         let mut window = vec![Sums::default(); sums.len()];
         for v in 0..side {
             let Some(row) = (y + v).checked_sub(radius).filter(|row| *row < stack.height) else { continue };

@@ -1,8 +1,8 @@
 //! Finding and loading ONNX Runtime, once per process.
 //!
 //! Candidates in order: the file that the environment variable `CAUSTIQUE_ONNXRUNTIME` names, and then no other; the
-//! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/` of the current directory or of a
-//! folder above the executable (where `scripts/setup.sh` puts it).
+//! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/` of the current
+//! directory or of a folder above the executable (where `scripts/setup.sh` puts it).
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
@@ -134,8 +134,9 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     Err(Error::new(Kind::Library, "ONNX Runtime", cause).hint(HINT))
 }
 
-/// While it lives, what is written to stderr is lost. Debian 13's ONNX Runtime is linked to a libonnx that has registered all operators already,
-/// and complains of each of them, past its own logger, some 500 lines with the first session. Errors come back as values all the same.
+/// While it lives, what is written to stderr is lost. Debian 13's ONNX Runtime is linked to a libonnx that has
+/// registered all operators already, and complains of each of them, past its own logger, some 500 lines with the first
+/// session. Errors come back as values all the same.
 pub(super) struct Quiet(Option<OwnedFd>);
 
 impl Quiet {

@@ -1,9 +1,11 @@
-//! Initial bandwidths: one per pixel and kind of photons, for both eye paths, from a pilot pass whose photons are not accumulated.
+//! Initial bandwidths: one per pixel and kind of photons, for both eye paths, from a pilot pass whose photons are not
+//! accumulated.
 //!
-//! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest bandwidth is
-//! the distance to the k-th nearest photon of the kind on its own surface around its pilot path's gathering point, at most [`SCREEN_CAP`] of the
-//! picture's width there (by default). With fewer than k photons within the cap it is the cap. A pixel whose pilot path gathers nowhere
-//! gets the median of the others (or, with no others, the cap at the scene's size).
+//! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest
+//! bandwidth is the distance to the k-th nearest photon of the kind on its own surface around its pilot path's
+//! gathering point, at most [`SCREEN_CAP`] of the picture's width there (by default). With fewer than k photons within
+//! the cap it is the cap. A pixel whose pilot path gathers nowhere gets the median of the others (or, with no others,
+//! the cap at the scene's size).
 
 use crate::camera::{Camera, band, par_pixels};
 use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
@@ -12,8 +14,8 @@ use crate::transport::{Eye, GatherPoint, PathStart};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the picture says
-/// nothing about a place.
+/// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the
+/// picture says nothing about a place.
 pub const SCREEN_CAP: f32 = 0.05;
 /// `--initial-bandwidth footprint`: radius over the width of a pixel at the gathering point.
 pub const FOOTPRINT_PIXELS: f32 = 3.0;
@@ -50,7 +52,8 @@ pub fn footprint(camera: &Camera, length: f32) -> f32 {
     FOOTPRINT_PIXELS * span(camera, length) / camera.size().0 as f32
 }
 
-/// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the picture's width.
+/// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the
+/// picture's width.
 pub fn initial_bandwidths<const MAPS: usize>(
     eye: &Eye<'_>,
     rule: InitialBandwidth,
@@ -61,10 +64,11 @@ pub fn initial_bandwidths<const MAPS: usize>(
     bandwidths(eye, (rule, widest), seed, pilots, |arena, start| eye.gather_point(arena, start))
 }
 
-/// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path, in three dimensions.
+/// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path,
+/// in three dimensions.
 ///
-/// Where on the way that point lies is chance, and what is true near the eye is not true of the whole way: each pixel takes the median of
-/// those around it, and what bounds it is the picture's width at the surface behind.
+/// Where on the way that point lies is chance, and what is true near the eye is not true of the whole way: each pixel
+/// takes the median of those around it, and what bounds it is the picture's width at the surface behind.
 pub fn initial_volume_bandwidths(
     eye: &Eye<'_>,
     rule: InitialBandwidth,

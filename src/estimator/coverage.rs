@@ -3,7 +3,8 @@
 /// Instances kept per pixel: three cryptomatte layers of two ranks.
 pub const RANKS: usize = 6;
 
-/// Counts of first hits by instance. The first [`RANKS`] instances that show up are kept by name; later ones count as hits only.
+/// Counts of first hits by instance. The first [`RANKS`] instances that show up are kept by name; later ones count as
+/// hits only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     /// Instances; entry `i` means something where `counts[i] > 0`.

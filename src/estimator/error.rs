@@ -1,12 +1,13 @@
 //! The squared error of a pixel's own level, bias included, without a reference.
 //!
-//! The kernel's bias grows with the bandwidth squared \[Knaus and Zwicker 2011, 3\], and the next larger level has twice the
-//! squared bandwidth in every iteration: with bias `b` at level k it has `2 b`. The difference of the two levels'
-//! means therefore expects `b` itself. Squared, it expects `b^2` plus the variance of the difference, which
-//! its own Welford statistics tell; what is left estimates the squared bias. It may come out negative where there
-//! is little bias: sums over pixels keep the sign and stay unbiased, a single pixel cuts it off at zero.
+//! The kernel's bias grows with the bandwidth squared \[Knaus and Zwicker 2011, 3\], and the next larger level has
+//! twice the squared bandwidth in every iteration: with bias `b` at level k it has `2 b`. The difference of the two
+//! levels' means therefore expects `b` itself. Squared, it expects `b^2` plus the variance of the difference, which its
+//! own Welford statistics tell; what is left estimates the squared bias. It may come out negative where there is little
+//! bias: sums over pixels keep the sign and stay unbiased, a single pixel cuts it off at zero.
 //!
-//! In media squared bandwidths are a factor 2^(2/3) apart; the difference is scaled to tell the bias there, too ([`Pixel::add`]).
+//! In media squared bandwidths are a factor 2^(2/3) apart; the difference is scaled to tell the bias there, too
+//! ([`Pixel::add`]).
 //!
 //! This holds where light varies smoothly over the kernel. At edges narrower than the bandwidth the bias falls
 //! more slowly than that, and the estimate is too small.
@@ -52,9 +53,9 @@ mod tests {
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Levels whose bias halves from one to the next and whose noise is uniform: over many pixels the estimates average to the
-    /// bias squared, and to nothing without bias. Over 4000 pixels of 16 iterations the mean of (D^2 - var) has a
-    /// standard error of about 0.0004; a missing variance term would add 0.007.
+    /// Levels whose bias halves from one to the next and whose noise is uniform: over many pixels the estimates average
+    /// to the bias squared, and to nothing without bias. Over 4000 pixels of 16 iterations the mean of (D^2 - var) has
+    /// a standard error of about 0.0004; a missing variance term would add 0.007.
     #[test]
     fn the_squared_bias_is_found_and_noise_is_not_taken_for_it() {
         for bias in [0.0, 0.3] {

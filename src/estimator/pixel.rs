@@ -7,8 +7,9 @@ use crate::random;
 use crate::stat::Welford;
 use crate::transport::{EyeMeasure, MAX_LEVELS};
 
-/// What is added to the differences of levels for light gathered in media, relative: bias grows with the radius squared, which from one level to the next
-/// grows by 2^(2/3) there and by 2 on surfaces. With this, a difference is the bias of the smaller level for both: `1 / (2^(2/3) - 1) - 1`.
+/// What is added to the differences of levels for light gathered in media, relative: bias grows with the radius
+/// squared, which from one level to the next grows by 2^(2/3) there and by 2 on surfaces. With this, a difference is
+/// the bias of the smaller level for both: `1 / (2^(2/3) - 1) - 1`.
 const VOLUME_DIFFERENCE: f32 = 0.702_414_4;
 
 /// Sums over iterations of the additive parts of the level that is the method's own image.
@@ -50,12 +51,14 @@ impl Quarter {
 pub struct Pixel {
     /// Estimates, level 1 (the smallest bandwidth) first.
     pub levels: [Welford; MAX_LEVELS],
-    /// `differences[k]`: level k + 2 minus level k + 1. Neighbours are correlated, so their difference's variance cannot be had
-    /// from theirs. Where photons are gathered in media, scaled there to tell the bias ([`super::SquaredError`]).
+    /// `differences[k]`: level k + 2 minus level k + 1. Neighbours are correlated, so their difference's variance
+    /// cannot be had from theirs. Where photons are gathered in media, scaled there to tell the bias
+    /// ([`super::SquaredError`]).
     pub differences: [Welford; MAX_LEVELS - 1],
     /// Sums of the parts.
     pub parts: Parts,
-    /// The own image by independent groups of iterations, whose points share no scramble: what variance and error are measured by.
+    /// The own image by independent groups of iterations, whose points share no scramble: what variance and error are
+    /// measured by.
     pub quarters: [Quarter; QUARTERS],
     /// Sums of G-buffers over all eye paths.
     pub albedo: DVec3,
@@ -89,8 +92,9 @@ impl Pixel {
         Pixel { bandwidths, z: 1e10, ..Pixel::default() }
     }
 
-    /// Variance of the mean of the own image as the quarters tell it, which is right also where iterations are not independent
-    /// within a quarter: the scatter of group means about their weighted mean, over the degrees of freedom. `None` where a quarter is empty.
+    /// Variance of the mean of the own image as the quarters tell it, which is right also where iterations are not
+    /// independent within a quarter: the scatter of group means about their weighted mean, over the degrees of freedom.
+    /// `None` where a quarter is empty.
     #[inline]
     pub fn variance_by_quarters(&self) -> Option<DVec3> {
         if self.quarters.iter().any(|quarter| quarter.count == 0) {
@@ -105,16 +109,17 @@ impl Pixel {
         Some(scatter.sum::<DVec3>() / ((QUARTERS - 1) as f64 * total))
     }
 
-    /// Looks at the memory that [`Pixel::add`] is about to change, so that the processor waits for that of several pixels at once. Returns
-    /// something that depends on it.
+    /// Looks at the memory that [`Pixel::add`] is about to change, so that the processor waits for that of several
+    /// pixels at once. Returns something that depends on it.
     #[inline]
     pub fn touch(&self) -> f64 {
         let levels: f64 = self.levels.iter().chain(&self.differences).map(|level| level.mean.x).sum();
         levels + self.parts.emission.x + self.parts.indirect.z + self.depth + f64::from(self.bandwidths[0])
     }
 
-    /// Adds iteration `pass` (from 1): level 1 from `independent`, the others from `correlated` (of `count - 1` levels), or all from `independent`
-    /// when they share one eye path. `levels`: their number, and the one (from 0) whose parts are kept.
+    /// Adds iteration `pass` (from 1): level 1 from `independent`, the others from `correlated` (of `count - 1`
+    /// levels), or all from `independent` when they share one eye path. `levels`: their number, and the one (from 0)
+    /// whose parts are kept.
     pub fn add(
         &mut self,
         pass: u64,
@@ -180,7 +185,8 @@ impl Pixel {
 mod tests {
     use super::*;
 
-    /// A bias of r^2 on surfaces and of r^2 in media, whose levels' radii are apart by other factors: differences tell their sum.
+    /// A bias of r^2 on surfaces and of r^2 in media, whose levels' radii are apart by other factors: differences tell
+    /// their sum.
     #[test]
     fn differences_of_levels_are_the_bias_on_surfaces_and_in_media() {
         let biases = |level: i32| (0.01 * 2f32.powi(level), 0.02 * (2.0 / 3.0 * level as f32).exp2());

@@ -1,8 +1,9 @@
 //! What four independent groups of iterations tell of the noise.
 //!
-//! Iterations within a quarter share low-discrepancy points: they are not independent, and Welford's statistics over them tell more
-//! variance than their mean has. Quarters are scrambled apart, so the scatter of their means is right, but has three degrees of freedom a
-//! pixel. The layers take the shape of the noise from Welford and its size, over windows, from the quarters.
+//! Iterations within a quarter share low-discrepancy points: they are not independent, and Welford's statistics over
+//! them tell more variance than their mean has. Quarters are scrambled apart, so the scatter of their means is right,
+//! but has three degrees of freedom a pixel. The layers take the shape of the noise from Welford and its size, over
+//! windows, from the quarters.
 
 use super::{Pixel, SquaredError};
 use rayon::prelude::*;
@@ -10,8 +11,9 @@ use rayon::prelude::*;
 /// Pixels to each side of the windows over which either variance is summed: 81 pixels have 243 degrees of freedom.
 const REACH: usize = 4;
 
-/// Variance by quarters over that by Welford's statistics, of the own image at every pixel over a window; 1 where neither is known
-/// or there is no variance. `own` is the level (from 0) that quarters are of. Pixels row by row, `width` a row.
+/// Variance by quarters over that by Welford's statistics, of the own image at every pixel over a window; 1 where
+/// neither is known or there is no variance. `own` is the level (from 0) that quarters are of. Pixels row by row,
+/// `width` a row.
 pub fn variance_ratio(pixels: &[Pixel], width: usize, own: usize) -> Vec<f32> {
     let of_pixel = |pixel: &Pixel| {
         let welford = SquaredError::of(pixel, own, own + 1).map(|error| error.variance);
@@ -27,7 +29,8 @@ pub fn variance_ratio(pixels: &[Pixel], width: usize, own: usize) -> Vec<f32> {
     sums.par_iter().map(ratio).collect()
 }
 
-/// Sums over windows along lines of values that are `step` apart; `place` is where in its line an index is, and the line's length.
+/// Sums over windows along lines of values that are `step` apart; `place` is where in its line an index is, and the
+/// line's length.
 fn window_sums(values: &[[f64; 2]], place: impl Fn(usize) -> (usize, usize) + Sync, step: usize) -> Vec<[f64; 2]> {
     let sum = |index: usize| {
         let (at, length) = place(index);
@@ -47,7 +50,8 @@ mod tests {
     use crate::random::{Domain, Purpose, QUARTERS, Stream, quarter};
     use crate::transport::EyeMeasure;
 
-    /// A picture whose iterations are uniform; `antithetic` ones of a quarter come in pairs that cancel, as low-discrepancy points do.
+    /// A picture whose iterations are uniform; `antithetic` ones of a quarter come in pairs that cancel, as
+    /// low-discrepancy points do.
     fn picture(antithetic: bool) -> Vec<Pixel> {
         let pixel = |index: u64| {
             let mut pixel = Pixel::new([0.0; 2]);
@@ -64,8 +68,9 @@ mod tests {
         (0..32 * 24).map(pixel).collect()
     }
 
-    /// Independent iterations have a ratio of one: windows have at least 25 pixels of three degrees of freedom each (channels are equal), so a
-    /// ratio is off by more than five of its standard errors of sqrt(2 / 75) with less than 1e-5. Iterations that cancel have none.
+    /// Independent iterations have a ratio of one: windows have at least 25 pixels of three degrees of freedom each
+    /// (channels are equal), so a ratio is off by more than five of its standard errors of sqrt(2 / 75) with less than
+    /// 1e-5. Iterations that cancel have none.
     #[test]
     fn independent_iterations_have_a_ratio_of_one_and_stratified_ones_less() {
         let ratios = variance_ratio(&picture(false), 32, 0);

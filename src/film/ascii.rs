@@ -1,6 +1,7 @@
 //! JSON for headers, which hold ASCII only.
 
-/// JSON in ASCII: other characters, which JSON allows within strings only, become `\u` escapes (surrogate pairs above U+FFFF).
+/// JSON in ASCII: other characters, which JSON allows within strings only, become `\u` escapes (surrogate pairs above
+/// U+FFFF).
 pub fn ascii_json(json: &str) -> String {
     let mut ascii = String::with_capacity(json.len());
     for c in json.chars() {

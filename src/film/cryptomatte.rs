@@ -1,8 +1,8 @@
 //! Cryptomatte: who covers a pixel, and how much of it.
 //!
-//! Friedman and Jones, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency", SIGGRAPH posters 2015, and the
-//! Cryptomatte specification 1.2.0 (github.com/Psyop/Cryptomatte). An id is the hash of a name, stored as the float of the same bits; two
-//! ranks (id, coverage) fit into the four channels of a layer, largest coverage first.
+//! Friedman and Jones, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency", SIGGRAPH posters
+//! 2015, and the Cryptomatte specification 1.2.0 (github.com/Psyop/Cryptomatte). An id is the hash of a name, stored as
+//! the float of the same bits; two ranks (id, coverage) fit into the four channels of a layer, largest coverage first.
 
 use super::ascii::ascii_json;
 use super::layers::{Layer, Plane, Sample};
@@ -16,8 +16,8 @@ pub const RANKS: usize = 6;
 pub struct Id(pub u32);
 
 impl Id {
-    /// MurmurHash3_32 with seed 0 of the name's UTF-8, then the specification's `uint32_to_float32`: where the exponent would be
-    /// all zeros or all ones its lowest bit is flipped, since programs flush denormals and mangle NaN.
+    /// MurmurHash3_32 with seed 0 of the name's UTF-8, then the specification's `uint32_to_float32`: where the exponent
+    /// would be all zeros or all ones its lowest bit is flipped, since programs flush denormals and mangle NaN.
     pub fn of(name: &str) -> Self {
         let bits = murmur(name);
         let exponent = (bits >> 23) & 0xff;
@@ -44,7 +44,8 @@ pub struct Cryptomatte {
 }
 
 impl Cryptomatte {
-    /// Ids for `names`, in their order; things of the same name share an id. `kind` names the layers: `CryptoObject`, `CryptoMaterial`.
+    /// Ids for `names`, in their order; things of the same name share an id. `kind` names the layers: `CryptoObject`,
+    /// `CryptoMaterial`.
     pub fn new(kind: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
         let names: Vec<String> = names.into_iter().collect();
         let ids = names.iter().map(|name| Id::of(name)).collect();
@@ -56,8 +57,8 @@ impl Cryptomatte {
         &self.ids
     }
 
-    /// The header's string attributes, by name: `name`, `hash`, `conversion` and `manifest` under the key that is the first seven hex digits of
-    /// the hash of the layers' name in the file.
+    /// The header's string attributes, by name: `name`, `hash`, `conversion` and `manifest` under the key that is the
+    /// first seven hex digits of the hash of the layers' name in the file.
     pub fn attributes(&self, naming: Naming) -> [(String, String); 4] {
         let name = naming.layer(&self.kind);
         let hash = format!("{:08x}", murmur(&name));
@@ -99,9 +100,10 @@ struct Rank {
 
 /// What covers one pixel so far.
 ///
-/// The weights always sum to all that was added. While at most six ids were seen they are exact; a seventh takes the place of the
-/// least and inherits its weight (Metwally, Agrawal, El Abbadi, "Efficient Computation of Frequent and Top-k Elements in Data Streams", 2005: whatever
-/// covers more than a sixth of the pixel is surely kept, and no weight is too large by more than the least one).
+/// The weights always sum to all that was added. While at most six ids were seen they are exact; a seventh takes the
+/// place of the least and inherits its weight (Metwally, Agrawal, El Abbadi, "Efficient Computation of Frequent and
+/// Top-k Elements in Data Streams", 2005: whatever covers more than a sixth of the pixel is surely kept, and no weight
+/// is too large by more than the least one).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelRanks {
     ranks: [Rank; RANKS],

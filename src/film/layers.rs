@@ -59,8 +59,8 @@ pub enum Role {
 }
 
 impl Layer {
-    /// A layer of float planes from interleaved values: `pixels` yields one array per pixel, row by row from the top, and
-    /// `components` has one letter per element, such as `"RGB"`.
+    /// A layer of float planes from interleaved values: `pixels` yields one array per pixel, row by row from the top,
+    /// and `components` has one letter per element, such as `"RGB"`.
     pub fn interleaved<const N: usize>(
         name: impl Into<String>,
         components: &str,
@@ -91,8 +91,8 @@ impl Layer {
         self.planes.iter().find(|plane| plane.component == component)
     }
 
-    /// The first three planes (`R G B`, `X Y Z`) per pixel; a layer of one or two planes repeats its first in all three, as a
-    /// grey picture does.
+    /// The first three planes (`R G B`, `X Y Z`) per pixel; a layer of one or two planes repeats its first in all
+    /// three, as a grey picture does.
     pub fn triples(&self) -> Vec<[f32; 3]> {
         let [r, g, b] = std::array::from_fn(|i| {
             let index = if self.planes.len() < 3 { 0 } else { i };

@@ -1,8 +1,9 @@
 //! Names of layers: what each means, how it is called in files, and which ones `--layers` picks.
 //!
-//! Nuke splits a channel's name into at most three tokens and turns what is not alphanumeric into `_`; Blender takes the last
-//! token for the component, wants one letter there, and holds names in 64 bytes; older readers stop at 31. So names of
-//! ours are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the component, and at most 31 characters.
+//! Nuke splits a channel's name into at most three tokens and turns what is not alphanumeric into `_`; Blender takes
+//! the last token for the component, wants one letter there, and holds names in 64 bytes; older readers stop at 31. So
+//! names of ours are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the component, and at most 31
+//! characters.
 
 use super::layers::{Layer, LayerSet};
 use crate::error::{Error, Kind, Result};
@@ -106,7 +107,8 @@ pub enum Selection {
 }
 
 impl Selection {
-    /// Reads `all`, `beauty` or names with commas between them. Errors: no name, or one that no layer of ours has, with the nearest.
+    /// Reads `all`, `beauty` or names with commas between them. Errors: no name, or one that no layer of ours has, with
+    /// the nearest.
     pub fn parse(text: &str) -> Result<Self> {
         match text {
             "all" => return Ok(Selection::All),

@@ -1,14 +1,16 @@
 //! From the pixels of a render to its layers.
 //!
-//! - Before two iterations no variance is known. `Variance` then holds the square of the mean and `Error` the mean itself: an error
-//!   of the estimate's own size, which is finite and says that nothing is known. The file's header says `"variance_known": false`.
-//! - `Error` is the estimated standard error of the uncombined image, the layer `Noisy`; the combined picture has no estimate of its own.
-//!   The file's header says `"error_of": "Noisy"`.
-//! - `A` is the fraction of eye paths that hit a surface or are taken by a medium in a mesh; where an environment shines the background is part of the picture,
-//!   and it is 1.
+//! - Before two iterations no variance is known. `Variance` then holds the square of the mean and `Error` the mean
+//!   itself: an error of the estimate's own size, which is finite and says that nothing is known. The file's header
+//!   says `"variance_known": false`.
+//! - `Error` is the estimated standard error of the uncombined image, the layer `Noisy`; the combined picture has no
+//!   estimate of its own. The file's header says `"error_of": "Noisy"`.
+//! - `A` is the fraction of eye paths that hit a surface or are taken by a medium in a mesh; where an environment
+//!   shines the background is part of the picture, and it is 1.
 //! - `Volume` is there only where media scatter, `VolumeRadius` where photons are gathered in them.
 //! - `CausticRadius` is there only where photons of caustics and others are gathered.
-//! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and `normal` are zero there.
+//! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and
+//!   `normal` are zero there.
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;

@@ -4,10 +4,11 @@
 //! out = M + clip(D - M, -c s, c s)
 //! ```
 //!
-//! `M` is the estimate, `D` the denoiser's picture, `s` the larger of the pixel's own standard error and a high percentile of those around
-//! it, which stand in where a pixel has not met the rare bright sample yet. As `s` falls with the iterations, so does the displacement:
-//! whatever `D` is, the picture tends to what `M` tends to (`docs/theory.md`).
-//! The result stays between zero and the brightest estimate around; how often it had to be kept there is counted.
+//! `M` is the estimate, `D` the denoiser's picture, `s` the larger of the pixel's own standard error and a high
+//! percentile of those around it, which stand in where a pixel has not met the rare bright sample yet. As `s` falls
+//! with the iterations, so does the displacement: whatever `D` is, the picture tends to what `M` tends to
+//! (`docs/theory.md`). The result stays between zero and the brightest estimate around; how often it had to be kept
+//! there is counted.
 
 use super::window::{Size, window};
 use rayon::prelude::*;
@@ -19,8 +20,8 @@ pub const REACH: usize = 3;
 /// Share of the window's standard errors that are no larger than the one taken.
 const RANK: f32 = 0.8;
 
-/// The larger of each pixel's standard error and the one of rank `RANK` around it, by channel; not finite ones count as unknown,
-/// larger than all.
+/// The larger of each pixel's standard error and the one of rank `RANK` around it, by channel; not finite ones count as
+/// unknown, larger than all.
 pub fn spread(deviation: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
     let of_pixel = |ranked: &mut Vec<f32>, index: usize| {
         std::array::from_fn(|c| {
@@ -44,7 +45,8 @@ pub struct Clamped {
     pub too_bright: u64,
 }
 
-/// `mean` displaced towards `denoised` by at most [`LIMIT`] of `spread`; not below zero, not above the largest estimate within [`REACH`].
+/// `mean` displaced towards `denoised` by at most [`LIMIT`] of `spread`; not below zero, not above the largest estimate
+/// within [`REACH`].
 ///
 /// A value of `denoised` that is no number changes nothing; where `mean` is none, `denoised` stands alone.
 pub fn bounded(mean: &[[f32; 3]], denoised: &[[f32; 3]], spread: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
@@ -101,7 +103,8 @@ mod tests {
         (0..SIZE.pixels()).map(|index| [of(index), 2.0 * of(index), 0.5 * of(index)]).collect()
     }
 
-    /// A denoiser that returns nonsense moves no pixel by more than the bound, and what it returns where it is not a number is not used.
+    /// A denoiser that returns nonsense moves no pixel by more than the bound, and what it returns where it is not a
+    /// number is not used.
     #[test]
     fn nonsense_is_bounded() {
         let mean = plane(|index| 1.0 + 0.1 * noise(1, index));
@@ -119,8 +122,9 @@ mod tests {
         }
     }
 
-    /// The consistency of `docs/theory.md`: with standard errors that fall as 1/sqrt(n), the squared distance to the truth of the estimate with a
-    /// fixed wrong denoiser falls with a slope of -1 in n over two decades. Without the bound it would not fall at all.
+    /// The consistency of `docs/theory.md`: with standard errors that fall as 1/sqrt(n), the squared distance to the
+    /// truth of the estimate with a fixed wrong denoiser falls with a slope of -1 in n over two decades. Without the
+    /// bound it would not fall at all.
     #[test]
     fn whatever_the_denoiser_the_error_falls_as_that_of_its_input() {
         let wrong = plane(|index| 7.0 * noise(5, index));
@@ -135,7 +139,8 @@ mod tests {
         assert!((slope + 1.0).abs() < 0.05, "{slope}");
     }
 
-    /// A bright sample is let go where the pixel itself is as unsure as it is bright; its neighbours, sure of themselves, do not take it over.
+    /// A bright sample is let go where the pixel itself is as unsure as it is bright; its neighbours, sure of
+    /// themselves, do not take it over.
     #[test]
     fn a_firefly_goes_and_its_neighbours_stay() {
         let at = 15 * SIZE.width + 20;

@@ -1,4 +1,5 @@
-//! What makes the denoised picture `D`: Intel Open Image Denoise where its library is found, else our own statistical filter.
+//! What makes the denoised picture `D`: Intel Open Image Denoise where its library is found, else our own statistical
+//! filter.
 
 use super::Estimate;
 use super::bound::spread;
@@ -41,7 +42,8 @@ pub enum Denoiser {
 }
 
 impl Denoiser {
-    /// The one asked for, with as many threads as the current rayon pool has. With [`DenoiserChoice::Auto`] also why it is not Open Image Denoise.
+    /// The one asked for, with as many threads as the current rayon pool has. With [`DenoiserChoice::Auto`] also why it
+    /// is not Open Image Denoise.
     ///
     /// # Errors
     /// [`Kind::Library`] where [`DenoiserChoice::Oidn`] cannot be had.
@@ -82,8 +84,8 @@ impl Denoiser {
                     .map(|rgb| rgb.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 }))
                     .collect();
                 let mut input = oidn::Input::new(size.width, size.height, &finite);
-                // Normals alone are no guide that it takes. Ours are averages over all eye paths: with `clean_aux` they served as well as denoised ones, and without it
-                // left 1.2 times the error.
+                // Normals alone are no guide that it takes. Ours are averages over all eye paths: with `clean_aux` they
+                // served as well as denoised ones, and without it left 1.2 times the error.
                 input.albedo = albedo;
                 input.normal = normal.filter(|_| albedo.is_some());
                 (input.hdr, input.clean_aux) = (true, albedo.is_some());

@@ -1,12 +1,14 @@
 //! What is delivered: the estimate, denoised within what its own standard errors allow.
 //!
-//! 1. The estimate `M`: the usual single-bandwidth image, or what equation (6) of the 2021 paper combines from levels where its network was asked for.
+//! 1. The estimate `M`: the usual single-bandwidth image, or what equation (6) of the 2021 paper combines from levels
+//!    where its network was asked for.
 //! 2. A denoiser's picture `D` of it ([`denoiser`]).
 //! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent whatever `D` is.
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
 //! 5. The error of the result, told by independent quarters of the iterations ([`told`]).
 //!
-//! All of it reads and writes named layers, so that a stored picture, also one of another renderer, is finished as a fresh one is.
+//! All of it reads and writes named layers, so that a stored picture, also one of another renderer, is finished as a
+//! fresh one is.
 
 pub mod bound;
 pub mod denoiser;
@@ -73,8 +75,9 @@ fn own_level(set: &LayerSet) -> usize {
 }
 
 impl Estimate {
-    /// The estimate in a picture of ours (`Noisy`, `Variance1`, ...), or in one of another renderer: its beauty, and its layer `Variance`
-    /// (of the mean) or two independent halves, `Half1` and `Half2` or `HalfA` and `HalfB`. Albedo and normal by the names that renderers give them.
+    /// The estimate in a picture of ours (`Noisy`, `Variance1`, ...), or in one of another renderer: its beauty, and
+    /// its layer `Variance` (of the mean) or two independent halves, `Half1` and `Half2` or `HalfA` and `HalfB`. Albedo
+    /// and normal by the names that renderers give them.
     ///
     /// # Errors
     /// There is no picture, or nothing tells its noise.
@@ -137,8 +140,8 @@ pub fn quarters(set: &LayerSet) -> Option<[Vec<[f32; 3]>; QUARTERS]> {
 /// The error of a finished picture as its quarters tell it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Told {
-    /// Root of the trimmed relMSE of a picture finished from half of the iterations at the least quality, which the delivered one is better than; zero where noise hides it.
-    /// Bias that all quarters have in common is not in it.
+    /// Root of the trimmed relMSE of a picture finished from half of the iterations at the least quality, which the
+    /// delivered one is better than; zero where noise hides it. Bias that all quarters have in common is not in it.
     pub half: f64,
 }
 
@@ -172,7 +175,8 @@ impl Finish {
         self.denoiser.name()
     }
 
-    /// Denoises a grey picture, so that somebody can see how long that takes; the first time loads what later ones find ready.
+    /// Denoises a grey picture, so that somebody can see how long that takes; the first time loads what later ones find
+    /// ready.
     ///
     /// # Errors
     /// The denoiser fails.
@@ -204,8 +208,9 @@ impl Finish {
         Ok(([picture, spread], clamped))
     }
 
-    /// Finishes the picture of `set` and makes the result its beauty; alpha stays. Adds `CombinedDirect` and the other parts where the picture has
-    /// parts and they are wanted by name. Rows of pixels do not depend on the number of threads, but for what [`caustique_oidn`] says of its own.
+    /// Finishes the picture of `set` and makes the result its beauty; alpha stays. Adds `CombinedDirect` and the other
+    /// parts where the picture has parts and they are wanted by name. Rows of pixels do not depend on the number of
+    /// threads, but for what [`caustique_oidn`] says of its own.
     ///
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is as it was then.
@@ -236,7 +241,8 @@ impl Finish {
         Ok(Account { combined, told, clamped })
     }
 
-    /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is missing or empty.
+    /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is
+    /// missing or empty.
     fn told(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Option<Told>> {
         let Some(quarters) = quarters(set) else { return Ok(None) };
         let quality = std::mem::replace(&mut self.quality, Quality::Fast);
@@ -247,7 +253,8 @@ impl Finish {
         Ok(Some(Told { half: squared.max(0.0).sqrt() }))
     }
 
-    /// The finished parts that are wanted, with their layers' names: all or none are worked out, for they sum to the picture together.
+    /// The finished parts that are wanted, with their layers' names: all or none are worked out, for they sum to the
+    /// picture together.
     fn parts(
         &mut self,
         set: &LayerSet,

@@ -1,7 +1,8 @@
 //! Additive parts of the finished picture.
 //!
-//! Each part is denoised and bounded by the whole picture's standard errors, then all are scaled together so that they sum to the finished picture: a part is
-//! as clean as the whole, never negative, and tends to what its estimate tends to.
+//! Each part is denoised and bounded by the whole picture's standard errors, then all are scaled together so that they
+//! sum to the finished picture: a part is as clean as the whole, never negative, and tends to what its estimate tends
+//! to.
 
 use super::bound::bounded;
 use super::window::Size;
@@ -17,7 +18,8 @@ pub struct Part {
 
 /// Parts that sum to `whole`, in their order; `spread` is that of the whole picture.
 ///
-/// Where no part has light but the whole picture does, which is light that the denoiser has brought from around, the last takes it.
+/// Where no part has light but the whole picture does, which is light that the denoiser has brought from around, the
+/// last takes it.
 pub fn shared(parts: &[Part], whole: &[[f32; 3]], spread: &[[f32; 3]], size: Size) -> Vec<Vec<[f32; 3]>> {
     let mut finished: Vec<Vec<[f32; 3]>> =
         parts.iter().map(|part| bounded(&part.mean, &part.denoised, spread, size)).collect();

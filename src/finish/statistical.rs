@@ -1,8 +1,9 @@
 //! A denoiser without a network: means over neighbours that the noise cannot tell apart.
 //!
-//! Whether two pixels show the same light is asked of their difference and its standard error, as in the membership tests of \[Sakai et al. 2024, "A
-//! Statistical Approach to Monte Carlo Denoising"\]; whether they show the same surface is asked of albedo and normal (a joint bilateral
-//! weight). A first pass asks the noisy estimates, a second one the first's result, in which fainter differences show.
+//! Whether two pixels show the same light is asked of their difference and its standard error, as in the membership
+//! tests of \[Sakai et al. 2024, "A Statistical Approach to Monte Carlo Denoising"\]; whether they show the same
+//! surface is asked of albedo and normal (a joint bilateral weight). A first pass asks the noisy estimates, a second
+//! one the first's result, in which fainter differences show.
 
 use super::window::{Size, window};
 use rayon::prelude::*;
@@ -83,8 +84,8 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// A step twice as bright on one side, with noise of a tenth: the noise goes, the step stays. Averages over 289 pixels with weights that
-    /// keep some 60 of them leave a seventh of the noise.
+    /// A step twice as bright on one side, with noise of a tenth: the noise goes, the step stays. Averages over 289
+    /// pixels with weights that keep some 60 of them leave a seventh of the noise.
     #[test]
     fn noise_goes_and_edges_stay() {
         let size = Size { width: 64, height: 48 };

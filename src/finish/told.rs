@@ -1,14 +1,15 @@
 //! The error of the finished picture, told by independent quarters of the iterations, without a reference.
 //!
-//! With `F` the picture finished from quarters 1 and 2, the product `(F - Q3)(F - Q4)` has the mean `(F - truth)^2` where quarters are
-//! unbiased: the noise of `Q3` and that of `Q4` are independent of each other and of `F`, so they drop out. It is the error of half the iterations;
-//! the whole picture's lies between 0.7 of that and all of it. Where photons are gathered all quarters have the kernel's bias in common, which this cannot see.
+//! With `F` the picture finished from quarters 1 and 2, the product `(F - Q3)(F - Q4)` has the mean `(F - truth)^2`
+//! where quarters are unbiased: the noise of `Q3` and that of `Q4` are independent of each other and of `F`, so they
+//! drop out. It is the error of half the iterations; the whole picture's lies between 0.7 of that and all of it. Where
+//! photons are gathered all quarters have the kernel's bias in common, which this cannot see.
 
 use crate::stat::floor;
 use rayon::prelude::*;
 
-/// Share of the pixels left out, those where the judging quarters differ most: one bright sample in either would rule the mean. Which pixels these are
-/// does not depend on `F`.
+/// Share of the pixels left out, those where the judging quarters differ most: one bright sample in either would rule
+/// the mean. Which pixels these are does not depend on `F`.
 pub const WORST: f64 = 0.005;
 
 /// What two judges tell of a pixel.
@@ -67,8 +68,9 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// A picture that is off by a tenth, judged by halves whose noise is five times that: the error is found with a standard error of 0.0005 (12,000 pixels of
-    /// three equal channels); a judge used twice would tell its own variance, 26 times as much.
+    /// A picture that is off by a tenth, judged by halves whose noise is five times that: the error is found with a
+    /// standard error of 0.0005 (12,000 pixels of three equal channels); a judge used twice would tell its own
+    /// variance, 26 times as much.
     #[test]
     fn errors_far_below_the_judges_noise_are_found() {
         let pixels = 12_000;

@@ -16,7 +16,8 @@ impl Size {
     }
 }
 
-/// Indices of the pixels within `reach` of pixel `index` in x and y, itself among them, row by row; the picture's edge cuts windows off.
+/// Indices of the pixels within `reach` of pixel `index` in x and y, itself among them, row by row; the picture's edge
+/// cuts windows off.
 pub fn window(size: Size, index: usize, reach: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (index % size.width, index / size.width);
     let around = move |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);

@@ -2,7 +2,8 @@
 
 use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
 
-/// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has none.
+/// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has
+/// none.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Name for messages.
@@ -19,7 +20,8 @@ pub struct Mesh {
     pub colors: Vec<Vec4>,
     /// Vertex indices, counter-clockwise seen from the front; every index is below `positions.len()`.
     pub triangles: Vec<[u32; 3]>,
-    /// Every edge (vertices welded by position) is shared by exactly two triangles that run along it in opposite directions.
+    /// Every edge (vertices welded by position) is shared by exactly two triangles that run along it in opposite
+    /// directions.
     pub closed: bool,
 }
 

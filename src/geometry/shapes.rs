@@ -26,8 +26,8 @@ impl Shapes {
         self.instances.iter().map(|instance| self.meshes[instance.mesh as usize].triangles.len()).sum()
     }
 
-    /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of it at once, so that the
-    /// processor waits once. Returns something that depends on it.
+    /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of
+    /// it at once, so that the processor waits once. Returns something that depends on it.
     #[inline]
     pub fn touch(&self, triangles: impl Iterator<Item = (u32, u32)> + Clone) -> f32 {
         let corners = |(instance, primitive): (u32, u32)| {

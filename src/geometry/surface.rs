@@ -13,7 +13,8 @@ pub struct Surface {
     pub ng: Vec3,
     /// Unit shading normal, in the hemisphere of `ng`.
     pub ns: Vec3,
-    /// Direction of growing u in the surface (not orthonormalised; zero when the mesh has neither tangents nor uvs), w = handedness.
+    /// Direction of growing u in the surface (not orthonormalised; zero when the mesh has neither tangents nor uvs), w
+    /// = handedness.
     pub tangent: Vec4,
     /// Texture coordinates, sets 0 and 1.
     pub uv: [Vec2; 2],
@@ -29,8 +30,9 @@ pub struct Surface {
     pub touching: bool,
 }
 
-/// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest coordinate: eight roundings,
-/// where the products and sums of a transform (four), of barycentric coordinates (two), and those of Embree's own corners (two) are.
+/// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest
+/// coordinate: eight roundings, where the products and sums of a transform (four), of barycentric coordinates (two),
+/// and those of Embree's own corners (two) are.
 const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 
 impl Surface {

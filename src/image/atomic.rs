@@ -8,8 +8,8 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, Kind, Result};
 
-/// Writes a file through `fill` so that nobody ever sees half of it: to a temporary file beside it, flushed to disk, then renamed. If
-/// anything fails the temporary file is removed and an older file at `path` stays as it was.
+/// Writes a file through `fill` so that nobody ever sees half of it: to a temporary file beside it, flushed to disk,
+/// then renamed. If anything fails the temporary file is removed and an older file at `path` stays as it was.
 ///
 /// A symbolic link is followed; a device such as `/dev/null` receives the bytes without a rename.
 ///
@@ -29,7 +29,8 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, |file| file.write_all(bytes).map_err(|cause| failure(path, &cause)))
 }
 
-/// Finds out before a long render whether [`write()`] can succeed: the folder exists and takes new files, and `path` is no folder.
+/// Finds out before a long render whether [`write()`] can succeed: the folder exists and takes new files, and `path` is
+/// no folder.
 ///
 /// Errors: the reason, with a remedy.
 pub fn check_writable(path: &Path) -> Result<()> {

@@ -1,9 +1,9 @@
 //! FLIP: how much two pictures differ to an observer who flips between them, 0 (equal) to 1.
 //!
-//! LDR-FLIP: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for Alternating Images", HPG
-//! 2020 (below: FLIP 2020). HDR-FLIP, the largest LDR-FLIP over exposures: Andersson, Nilsson, Shirley, Akenine-Moller, "Visualizing Errors in
-//! Rendered High Dynamic Range Images", Eurographics 2021 (below: HDR-FLIP 2021). With the authors' standard observer: a screen 0.7 m wide of
-//! 3840 pixels, 0.7 m away.
+//! LDR-FLIP: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for
+//! Alternating Images", HPG 2020 (below: FLIP 2020). HDR-FLIP, the largest LDR-FLIP over exposures: Andersson, Nilsson,
+//! Shirley, Akenine-Moller, "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021 (below:
+//! HDR-FLIP 2021). With the authors' standard observer: a screen 0.7 m wide of 3840 pixels, 0.7 m away.
 
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -25,12 +25,13 @@ const DETECTOR_WIDTH: f32 = 0.082;
 /// Exponent of feature differences, FLIP 2020 section 4.2.
 const FEATURE_EXPONENT: f32 = 0.5;
 
-/// HDR-FLIP of `test` against `reference` per pixel, both scene-linear Rec. 709, `width * height` finite pixels each. Negative
-/// channels count as zero.
+/// HDR-FLIP of `test` against `reference` per pixel, both scene-linear Rec. 709, `width * height` finite pixels each.
+/// Negative channels count as zero.
 ///
-/// Exposures go from the one that brings the reference's brightest pixel to 0.85 of the display to the one that does so with its
-/// median luminance (HDR-FLIP 2021 section 3.1), in steps of at most about one stop. Two cases the paper leaves open: if the median is zero, that of the luminances
-/// above zero takes its place; a black reference is looked at as it is.
+/// Exposures go from the one that brings the reference's brightest pixel to 0.85 of the display to the one that does so
+/// with its median luminance (HDR-FLIP 2021 section 3.1), in steps of at most about one stop. Two cases the paper
+/// leaves open: if the median is zero, that of the luminances above zero takes its place; a black reference is looked
+/// at as it is.
 pub fn hdr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
     let (first, last) = exposures(reference);
     let count = (last - first).ceil().max(2.0) as usize;

@@ -110,11 +110,13 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(x[c]) - f64::from(r[c])).powi(2)).sum::<f64>() / 3.0
 }
 
-/// The part of the error of `a` against `b` that neighbours do not share: noise, and edges out of place, but no error that is smooth.
+/// The part of the error of `a` against `b` that neighbours do not share: noise, and edges out of place, but no error
+/// that is smooth.
 ///
-/// The error of a channel less its mean over the 3 x 3 pixels around, fewer at the rim, is squared and weighed as relMSE weighs; the
-/// mean over pixels and channels counts. White noise keeps 8/9 of its relMSE, an offset nothing. Pixels that are not finite in both
-/// pictures are left out, as neighbours too; `None` if there is no other, or if the sizes are not `width * height`.
+/// The error of a channel less its mean over the 3 x 3 pixels around, fewer at the rim, is squared and weighed as
+/// relMSE weighs; the mean over pixels and channels counts. White noise keeps 8/9 of its relMSE, an offset nothing.
+/// Pixels that are not finite in both pictures are left out, as neighbours too; `None` if there is no other, or if the
+/// sizes are not `width * height`.
 pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Option<f64> {
     grain_above(a, b, (width, height), floor::PAPERS)
 }

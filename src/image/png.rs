@@ -7,7 +7,8 @@ use crate::image::atomic;
 use crate::image::tonemap::ToneMap;
 use crate::math::Rgb;
 
-/// Writes `pixels`, display values from 0 to 1, rows from the top, as an 8-bit RGB PNG, atomically (see [`atomic::write`]). What is not a number is black.
+/// Writes `pixels`, display values from 0 to 1, rows from the top, as an 8-bit RGB PNG, atomically (see
+/// [`atomic::write`]). What is not a number is black.
 ///
 /// Errors: a number of pixels that is not `width * height`, or none; the file system.
 pub fn write(path: &Path, width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>) -> Result<()> {

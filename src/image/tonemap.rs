@@ -17,8 +17,8 @@ pub enum ToneMap {
 }
 
 impl ToneMap {
-    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A channel that is
-    /// not a number is black; infinity is as bright as light gets.
+    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A
+    /// channel that is not a number is black; infinity is as bright as light gets.
     pub fn display(self, colour: Rgb, ev: f32) -> Rgb {
         // f32::max and clamp would let NaN through; Vec3's max does not.
         let clean = colour.to_array().map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1e30) });
@@ -56,10 +56,11 @@ pub(super) fn aces(x: f32) -> f32 {
 
 /// AgX, the base look as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.
 ///
-/// In Rec. 2020: an inset moves the primaries towards white, log2 of 16.5 stops around middle grey 0.18 goes through a sigmoid, its power
-/// of 2.4 is undone, hues that the curve turned go three fifths of the way back, and an outset restores colourfulness. After T. Sobotka
-/// (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen, whose "mix percent" is 40); matrices rounded as Filament has them. Blender's
-/// guard against colours outside Rec. 709 is left out: channels clip instead.
+/// In Rec. 2020: an inset moves the primaries towards white, log2 of 16.5 stops around middle grey 0.18 goes through a
+/// sigmoid, its power of 2.4 is undone, hues that the curve turned go three fifths of the way back, and an outset
+/// restores colourfulness. After T. Sobotka (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen,
+/// whose "mix percent" is 40); matrices rounded as Filament has them. Blender's guard against colours outside Rec. 709
+/// is left out: channels clip instead.
 fn agx(colour: Rgb) -> Rgb {
     /// Rows of Rec. 709 to Rec. 2020 (ITU-R BT.2087).
     const TO_2020: [[f32; 3]; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];

@@ -1,8 +1,9 @@
 //! Aiming light from infinity: half of its paths start over the objects that can make caustics.
 //!
-//! Light from infinity enters through a disc as large as the scene, and of a small glass on a wide floor it would hardly
-//! hit anything. Paths are drawn from a mixture of the whole disc and of the discs of the targets' bounding spheres; each carries the
-//! flux that its density in the mixture asks for, so the estimate is the same and no path is lost.
+//! Light from infinity enters through a disc as large as the scene, and of a small glass on a wide floor it would
+//! hardly hit anything. Paths are drawn from a mixture of the whole disc and of the discs of the targets' bounding
+//! spheres; each carries the flux that its density in the mixture asks for, so the estimate is the same and no path is
+//! lost.
 
 use super::{Cdf, EmissionSample, Entry, Region, Sky};
 use crate::geometry::Shapes;
@@ -81,7 +82,8 @@ fn halved(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     groups.into_iter().filter_map(|group| group.into_iter().reduce(join)).collect()
 }
 
-/// At most `most` spheres: the two whose joint sphere is smallest are joined until there are so many, so that what is small and alone stays so.
+/// At most `most` spheres: the two whose joint sphere is smallest are joined until there are so many, so that what is
+/// small and alone stays so.
 fn gathered(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     // The best partner of each among those after it; only what has lost its own is looked at again.
     let partner = |spheres: &[(Vec3, f32)], i: usize| {
@@ -130,8 +132,8 @@ impl Targets {
         Targets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
     }
 
-    /// Turns the start of a path from infinity, drawn uniformly over the scene's disc, into one drawn from the mixture. `u` decides
-    /// whether it is aimed, and at which target; `point` where on its disc.
+    /// Turns the start of a path from infinity, drawn uniformly over the scene's disc, into one drawn from the mixture.
+    /// `u` decides whether it is aimed, and at which target; `point` where on its disc.
     pub fn aim(&self, sky: &Sky, emission: &mut EmissionSample, u: f32, point: Vec2) {
         let Some(choice) = &self.choice else { return };
         if u < AIMED {
@@ -142,7 +144,8 @@ impl Targets {
         }
     }
 
-    /// The same, and part of the paths through the disc of a region. Flux and density are those without the region: [`Targets::lit`] has the mixture's.
+    /// The same, and part of the paths through the disc of a region. Flux and density are those without the region:
+    /// [`Targets::lit`] has the mixture's.
     pub fn aim_or_light(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
         let lit = self.share_lit();
         if u < lit {
@@ -159,7 +162,8 @@ impl Targets {
         if self.choice.is_none() { LIT.0 } else { LIT.1 }
     }
 
-    /// Density of an aimed start in the mixture with a region, and the part of it that all light has: without the targets.
+    /// Density of an aimed start in the mixture with a region, and the part of it that all light has: without the
+    /// targets.
     pub fn lit(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
         let lit = self.share_lit();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
@@ -253,8 +257,9 @@ mod tests {
         }
     }
 
-    /// The flux that passes any place is the same with and without aiming and with a region of interest, and so is what goes on of it after it is thinned to the share of
-    /// paths that light everything: here through small discs that a target or the region overlaps in part.
+    /// The flux that passes any place is the same with and without aiming and with a region of interest, and so is what
+    /// goes on of it after it is thinned to the share of paths that light everything: here through small discs that a
+    /// target or the region overlaps in part.
     #[test]
     fn aiming_keeps_the_flux() {
         let spheres = vec![(Vec3::new(0.3, 0.0, 0.1), 0.2), (Vec3::new(0.2, 0.1, -0.4), 0.25), (Vec3::X, 0.1)];
@@ -303,7 +308,8 @@ mod tests {
                 let mean = sum / n as f64;
                 let error = ((squares / n as f64 - mean * mean) / n as f64).sqrt();
                 let expected = f64::from(PI * radius * radius);
-                // Two-sided 4 sigma over eighteen fluxes: one false alarm in 870 seeds; an aimed path that forgot the uniform share is off by far more.
+                // Two-sided 4 sigma over eighteen fluxes: one false alarm in 870 seeds; an aimed path that forgot the
+                // uniform share is off by far more.
                 assert!((mean - expected).abs() < 4.0 * error, "{mean} +- {error}, expected {expected}, {region:?}");
                 assert!((mean * 1.5 - expected).abs() > 4.0 * error, "half as much again goes unnoticed");
             }

@@ -4,7 +4,8 @@
 /// bits can tell apart. Sums in f32 have an unequal 2^24, and the weaker of a million lamps none of them.
 const STEPS: u64 = 1 << 32;
 
-/// A discrete distribution, inverted by a guide table \[Chen and Asau 1974\]: unlike an alias table it keeps the strata of its input.
+/// A discrete distribution, inverted by a guide table \[Chen and Asau 1974\]: unlike an alias table it keeps the strata
+/// of its input.
 #[derive(Clone, Debug)]
 pub struct Cdf {
     /// The first step after an index, which are as many as go into its weight, and one at least where it has any; from

@@ -33,7 +33,8 @@ impl Cone {
         height >= 0.0 && self.cos2 * off.length_squared() <= self.sin2 * height * height
     }
 
-    /// Between which distances the ray from `origin` along the unit `direction` is within, no further than `distance`, which may be infinite.
+    /// Between which distances the ray from `origin` along the unit `direction` is within, no further than `distance`,
+    /// which may be infinite.
     #[inline]
     pub fn within(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<[f32; 2]> {
         // Where the ray meets the double cone: sin^2 (f . axis)^2 = cos^2 |off|^2 for f = from + t direction, off what
@@ -44,7 +45,8 @@ impl Cone {
         let b = self.sin2 * along * height - self.cos2 * aside.dot(off);
         let c = self.sin2 * height * height - self.cos2 * off.length_squared();
         let root = (b * b - a * c).max(0.0).sqrt();
-        // The form that cancels nothing; with a parallel to the side one of them is infinite or no number, and met nowhere.
+        // The form that cancels nothing; with a parallel to the side one of them is infinite or no number, and met
+        // nowhere.
         let q = -(b + root.copysign(b));
         let (s, t) = (q / a, c / q);
         let meets = |t: f32| if t > 0.0 && t < distance { t } else { 0.0 };
@@ -68,7 +70,8 @@ mod tests {
     use crate::math::{Vec2, warp};
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Random cones and rays: points of the part, and no others, are in the cone but for those within a thousandth of its side.
+    /// Random cones and rays: points of the part, and no others, are in the cone but for those within a thousandth of
+    /// its side.
     #[test]
     fn parts_are_what_the_cone_holds() {
         let (mut inside, mut outside) = (0, 0);

@@ -15,20 +15,23 @@ pub struct DirectSample {
     pub pdf_w: f32,
     /// The light cannot be hit by a ray.
     pub delta: bool,
-    /// Density per area of a surface that faces `wi` with which light paths emitted from this point of the light (from this direction, if it is
-    /// at infinity) arrive, times the probability of choosing the light for emission over that of choosing it here.
+    /// Density per area of a surface that faces `wi` with which light paths emitted from this point of the light (from
+    /// this direction, if it is at infinity) arrive, times the probability of choosing the light for emission over that
+    /// of choosing it here.
     pub arrival_pdf_a: f32,
 }
 
 /// Densities with which a light path starts, all that multiple importance sampling asks of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionDensity {
-    /// Density of [`Lights::sample_direct`](super::Lights::sample_direct): of the point per area, or of the direction per solid angle for light from infinity; for a delta
-    /// light the probability of choosing it. It differs from `start` by the choice of the light alone, which depends on the receiver.
+    /// Density of [`Lights::sample_direct`](super::Lights::sample_direct): of the point per area, or of the direction
+    /// per solid angle for light from infinity; for a delta light the probability of choosing it. It differs from
+    /// `start` by the choice of the light alone, which depends on the receiver.
     pub direct: f32,
     /// The same of [`Lights::sample_emission`](super::Lights::sample_emission).
     pub start: f32,
-    /// Density of the rest of emission: of the direction per solid angle, or of the entry per area for light from infinity.
+    /// Density of the rest of emission: of the direction per solid angle, or of the entry per area for light from
+    /// infinity.
     pub onward: f32,
     /// Cosine at the light; 1 at infinity and for points.
     pub cos: f32,
@@ -39,8 +42,8 @@ pub struct EmissionDensity {
 }
 
 impl EmissionDensity {
-    /// Density of the ray that leaves the light, per area that faces it and per solid angle: the same all along the ray, and behind mirrors and clear glass in
-    /// the same medium.
+    /// Density of the ray that leaves the light, per area that faces it and per solid angle: the same all along the
+    /// ray, and behind mirrors and clear glass in the same medium.
     #[inline]
     pub fn of_rays(&self) -> f32 {
         self.start * self.onward / self.cos
@@ -82,7 +85,8 @@ pub struct EmissionSample {
 }
 
 impl EmissionSample {
-    /// The same start, drawn with the density `mixed` onward instead of its own, and its flux over that before; `None` where nothing is left of it.
+    /// The same start, drawn with the density `mixed` onward instead of its own, and its flux over that before; `None`
+    /// where nothing is left of it.
     #[inline]
     pub fn drawn_with(self, mixed: f32) -> Option<(EmissionSample, f32)> {
         let ratio = self.density.onward / mixed;

@@ -22,8 +22,8 @@ pub enum Emitter {
         radiance: Rgb,
         /// How it falls off with the angle.
         spread: Spread,
-        /// Unit normal of its front and the plane's distance from the origin along it. This and the next are here so that light sampling, which
-        /// asks every time, finds all it needs in one place.
+        /// Unit normal of its front and the plane's distance from the origin along it. This and the next are here so
+        /// that light sampling, which asks every time, finds all it needs in one place.
         plane: Vec4,
         /// A corner, and the edges to the others (m).
         corners: [Vec3; 3],
@@ -117,7 +117,8 @@ impl SpotEdge {
         match self {
             SpotEdge::Squared => share.cbrt(),
             SpotEdge::Smooth => {
-                // Newton's iteration for 2 t^3 - t^4 = share, which is convex: after its first step it comes down to the root.
+                // Newton's iteration for 2 t^3 - t^4 = share, which is convex: after its first step it comes down to
+                // the root.
                 let mut t = (0.5 * share).cbrt();
                 for _ in 0..5 {
                     let slope = t * t * (6.0 - 4.0 * t);

@@ -27,10 +27,11 @@ pub struct ImageEnvironment {
 }
 
 impl ImageEnvironment {
-    /// From texels (finite, not negative; `width * height` of them) already scaled by the strength. `None` if all are black.
+    /// From texels (finite, not negative; `width * height` of them) already scaled by the strength. `None` if all are
+    /// black.
     pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>, rotation: f32) -> Option<ImageEnvironment> {
-        // Radiance is read bilinearly, so a texel sheds light over its neighbours' cells: the sampling weight of a cell is the
-        // mean over its 3x3 neighbourhood with the tent's weights, positive wherever radiance is.
+        // Radiance is read bilinearly, so a texel sheds light over its neighbours' cells: the sampling weight of a cell
+        // is the mean over its 3x3 neighbourhood with the tent's weights, positive wherever radiance is.
         let value = |x: usize, y: usize| f64::from(luminance(Vec3::from_array(radiance[y * width + x])));
         let smooth = |x: usize, y: usize| {
             let mut sum = 0.0;
@@ -179,8 +180,8 @@ mod tests {
         Environment::Image(Arc::new(ImageEnvironment::new(w, h, texels, rotation).unwrap()))
     }
 
-    /// The estimate of the total irradiation by importance sampling equals uniform sampling's, and the density of each sample
-    /// is the one `pdf_w` reports.
+    /// The estimate of the total irradiation by importance sampling equals uniform sampling's, and the density of each
+    /// sample is the one `pdf_w` reports.
     #[test]
     fn samples_follow_their_density() {
         let environment = image(0.7);

@@ -1,10 +1,13 @@
-//! Guided emission: most light paths start toward what makes caustics, from the lights that reach it, and the rest from the lights that light the picture.
+//! Guided emission: most light paths start toward what makes caustics, from the lights that reach it, and the rest from
+//! the lights that light the picture.
 //!
-//! A start is drawn from a mixture: with probability [`Guide::unguided`] as [`Lights::sample_emission`] draws it, else from a cell, a lamp alone or a pair of
-//! a lamp and a target. The lamp gives the origin; toward a target the direction is uniform in the cone that its bounding sphere fills from there (for light
-//! from infinity, the line is uniform over the sphere's disc), else it is the lamp's own. Whatever component made it, a start carries its native flux times the ratio of its native
-//! density to its density in the mixture \[Veach 1997, (9.15), the balance heuristic\], at most 1 / unguided (half as much again where part of
-//! the unguided ones go to a region of interest): the mean is that of unguided emission.
+//! A start is drawn from a mixture: with probability [`Guide::unguided`] as [`Lights::sample_emission`] draws it, else
+//! from a cell, a lamp alone or a pair of a lamp and a target. The lamp gives the origin; toward a target the direction
+//! is uniform in the cone that its bounding sphere fills from there (for light from infinity, the line is uniform over
+//! the sphere's disc), else it is the lamp's own. Whatever component made it, a start carries its native flux times the
+//! ratio of its native density to its density in the mixture \[Veach 1997, (9.15), the balance heuristic\], at most 1 /
+//! unguided (half as much again where part of the unguided ones go to a region of interest): the mean is that of
+//! unguided emission.
 //!
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
@@ -19,8 +22,9 @@ use std::ops::Range;
 
 /// Least share of unguided light paths: what the guide has never seen keeps its photons.
 const LEAST_UNGUIDED: f64 = 0.2;
-/// Most of the paths that go to targets where they are for all light: with bandwidths that neighbours set, more of them would be paid for with wider
-/// bandwidths for all that is no caustic. A few, sent where they matter, are many times what came there by chance.
+/// Most of the paths that go to targets where they are for all light: with bandwidths that neighbours set, more of them
+/// would be paid for with wider bandwidths for all that is no caustic. A few, sent where they matter, are many times
+/// what came there by chance.
 const MOST_TARGETED: f64 = 0.2;
 /// Share of the guided paths that all cells keep, by their lamps' power.
 const PRIOR: f64 = 0.1;
@@ -71,8 +75,8 @@ pub struct Guided {
 }
 
 impl Guide {
-    /// Every pair of a lamp and a target, lamps by power; `all`: light paths are for more than caustics, and each of several lamps has a cell of its own for
-    /// that. `None` where there would be nothing to choose, or nothing shines.
+    /// Every pair of a lamp and a target, lamps by power; `all`: light paths are for more than caustics, and each of
+    /// several lamps has a cell of its own for that. `None` where there would be nothing to choose, or nothing shines.
     pub fn new(lights: &Lights, all: bool) -> Option<Guide> {
         let choice = lights.choice()?;
         let targets = lights.targets().spheres().len();
@@ -127,9 +131,10 @@ impl Guide {
         self.choice.pdf(UNGUIDED)
     }
 
-    /// Makes a cell as probable as leaves the least error after as much work: `error[c]` is the sum of the squared relative errors that its photons left in
-    /// the picture, made by `paths[c]` light paths at the cost of `work[c]` in all. Of strata with n paths each the sum of `error * paths / n` is least,
-    /// where the sum of `n * work / paths` is given, for n in proportion to `sqrt(error * paths / (work / paths))`.
+    /// Makes a cell as probable as leaves the least error after as much work: `error[c]` is the sum of the squared
+    /// relative errors that its photons left in the picture, made by `paths[c]` light paths at the cost of `work[c]` in
+    /// all. Of strata with n paths each the sum of `error * paths / n` is least, where the sum of `n * work / paths` is
+    /// given, for n in proportion to `sqrt(error * paths / (work / paths))`.
     pub fn learn(&mut self, error: &[f64], paths: &[f64], work: &[f64]) {
         let best = |(&error, (&paths, &work)): (&f64, (&f64, &f64))| {
             if work > 0.0 { (error * paths * paths / work).sqrt() } else { 0.0 }
@@ -180,7 +185,8 @@ impl Guide {
         }
     }
 
-    /// A start; unguided ones from infinity are in part sent through a region, if there is one. `choice`, `point` and `direction` are uniform on the unit square.
+    /// A start; unguided ones from infinity are in part sent through a region, if there is one. `choice`, `point` and
+    /// `direction` are uniform on the unit square.
     #[inline]
     pub fn emit(
         &self,
@@ -221,7 +227,8 @@ impl Guide {
         Some(Guided { emission, cell, ratio, weight: plain / mixed, unaimed: untargeted * unaimed / mixed })
     }
 
-    /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give it there.
+    /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give
+    /// it there.
     fn turn(
         &self,
         lights: &Lights,
@@ -246,7 +253,8 @@ impl Guide {
         Some(emission)
     }
 
-    /// Density of the start's direction (of its line, from infinity) toward a target; `inside`: it was drawn from there, whatever rounding says.
+    /// Density of the start's direction (of its line, from infinity) toward a target; `inside`: it was drawn from
+    /// there, whatever rounding says.
     #[inline]
     fn density(lights: &Lights, emission: &EmissionSample, target: usize, inside: bool) -> f32 {
         let (center, radius) = lights.targets().spheres()[target];

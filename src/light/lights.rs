@@ -25,8 +25,8 @@ const LEAST_COSINE: f32 = 1e-6;
 pub struct Lights {
     emitters: Vec<Emitter>,
     choice: Option<LightSampler>,
-    /// Index of the first emitter of an instance, `u32::MAX` for instances that do not emit; and then the emitter of each
-    /// of its triangles, relative to it (`u32::MAX` for those without area).
+    /// Index of the first emitter of an instance, `u32::MAX` for instances that do not emit; and then the emitter of
+    /// each of its triangles, relative to it (`u32::MAX` for those without area).
     first: Vec<u32>,
     relative: Vec<Vec<u32>>,
     /// Suns of finite size.
@@ -111,8 +111,9 @@ impl Lights {
             .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
             .collect();
         let powers: Vec<f64> = emitters.iter().map(|e| e.power(&sky)).collect();
-        // A lamp beside the sun is weak as seen from the whole scene, and the brightest thing on its own table: a share of the paths goes
-        // to all lights alike. It also keeps every probability above the resolution of the random numbers.
+        // A lamp beside the sun is weak as seen from the whole scene, and the brightest thing on its own table: a share
+        // of the paths goes to all lights alike. It also keeps every probability above the resolution of the random
+        // numbers.
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
         let choice = LightSampler::new(&emitters, &sky, floored);
@@ -151,7 +152,8 @@ impl Lights {
         choice.pdf(receiver, light as usize) / choice.power().pdf(light as usize)
     }
 
-    /// The emitters of every lamp, the triangles of an instance or a light alone, and the probability of choosing one of them.
+    /// The emitters of every lamp, the triangles of an instance or a light alone, and the probability of choosing one
+    /// of them.
     pub(super) fn lamps(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
         let same = |a: &Emitter, b: &Emitter| match (a, b) {
             (Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }) => a == b,
@@ -168,8 +170,8 @@ impl Lights {
         })
     }
 
-    /// Density per solid angle of emission along `d` from any point of a light that is not at infinity, and the cosine there; `None` where nothing
-    /// leaves it.
+    /// Density per solid angle of emission along `d` from any point of a light that is not at infinity, and the cosine
+    /// there; `None` where nothing leaves it.
     #[inline]
     pub(super) fn onward(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
         match &self.emitters[index] {
@@ -216,8 +218,8 @@ impl Lights {
     ) -> Option<DirectSample> {
         match &self.emitters[index] {
             Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
-                // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near the plane rounding
-                // decides.
+                // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near
+                // the plane rounding decides.
                 let ng = plane.truncate();
                 if !*two_sided && ng.dot(p) <= plane.w {
                     return None;
@@ -289,8 +291,8 @@ impl Lights {
         }
     }
 
-    /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers, and the cone that the light stays in. `None` for
-    /// light from infinity.
+    /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers, and
+    /// the cone that the light stays in. `None` for light from infinity.
     #[inline]
     pub fn point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
@@ -324,7 +326,8 @@ impl Lights {
         spread.pdf_w(cos) * if two_sided { 0.5 } else { 1.0 }
     }
 
-    /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p` towards the light, `wi`.
+    /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p`
+    /// towards the light, `wi`.
     #[inline]
     pub fn entry_pdf_a(&self, p: Vec3, wi: Vec3) -> f32 {
         self.targets.density(&self.sky, p, wi)
@@ -362,8 +365,9 @@ impl Lights {
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
-    /// Calls `each(radiance, direct, start)` for every light at infinity that a ray leaving the scene from a receiver along `d` meets, with the densities of
-    /// [`EmissionDensity`]; a camera's own ray does not meet those that are hidden from cameras.
+    /// Calls `each(radiance, direct, start)` for every light at infinity that a ray leaving the scene from a receiver
+    /// along `d` meets, with the densities of [`EmissionDensity`]; a camera's own ray does not meet those that are
+    /// hidden from cameras.
     #[inline]
     pub fn escape(&self, from: &Receiver, d: Vec3, camera: bool, mut each: impl FnMut(Rgb, f32, f32)) {
         let Some(choice) = &self.choice else { return };
@@ -401,7 +405,8 @@ impl Lights {
     ) -> Option<EmissionSample> {
         let (index, probability, rest) = self.choice()?.sample(choice);
         let emitter = &self.emitters[index];
-        // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine at the light.
+        // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine
+        // at the light.
         let (origin, d, flux, [direct, onward, cos]) = match emitter {
             Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
                 let b = warp::triangle_uniform(point);
@@ -423,8 +428,8 @@ impl Lights {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])
             }
             Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } => {
-                // Full cone and penumbra are chosen by their flux; inside the penumbra the falloff's integral is inverted, so
-                // every path carries the same flux.
+                // Full cone and penumbra are chosen by their flux; inside the penumbra the falloff's integral is
+                // inverted, so every path carries the same flux.
                 let penumbra = (outer - inner) * edge.mean();
                 let x = direction.x * (inner + penumbra);
                 let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
@@ -471,7 +476,8 @@ impl Lights {
         })
     }
 
-    /// Aims the start of a path from infinity at what can make caustics (see [`Targets::aim`]); others stay as they are.
+    /// Aims the start of a path from infinity at what can make caustics (see [`Targets::aim`]); others stay as they
+    /// are.
     #[inline]
     pub fn aim(&self, emission: &mut EmissionSample, u: f32, point: Vec2) {
         if emission.infinite {
@@ -479,7 +485,8 @@ impl Lights {
         }
     }
 
-    /// The same, and part of the paths from infinity through the disc of a region of interest, if there is one. Flux and density are those without the region.
+    /// The same, and part of the paths from infinity through the disc of a region of interest, if there is one. Flux
+    /// and density are those without the region.
     #[inline]
     pub fn aim_or_light(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) {
         match region {
@@ -496,8 +503,8 @@ impl Lights {
         if emission.infinite { 1.0 / (PI * self.sky.radius * self.sky.radius) } else { emission.density.onward }
     }
 
-    /// Density that an aimed start has with the region in the mixture, and the part of it that paths of all light have: those through the whole scene and the
-    /// region, without what is aimed.
+    /// Density that an aimed start has with the region in the mixture, and the part of it that paths of all light have:
+    /// those through the whole scene and the region, without what is aimed.
     #[inline]
     pub fn lit(&self, emission: &EmissionSample, region: Option<Region>) -> (f32, f32) {
         let onward = emission.density.onward;

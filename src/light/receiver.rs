@@ -9,8 +9,8 @@ pub struct Receiver {
     pub p: Vec3,
     /// Unit normal on the side that light has to come from; zero where it may come from anywhere.
     pub n: Vec3,
-    /// It is in a medium. Lights are chosen for it by power alone: points on the way through a medium are drawn by the lamp, which has
-    /// to be chosen before them.
+    /// It is in a medium. Lights are chosen for it by power alone: points on the way through a medium are drawn by the
+    /// lamp, which has to be chosen before them.
     pub in_medium: bool,
 }
 

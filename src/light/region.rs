@@ -1,8 +1,10 @@
-//! A sphere that holds most of what a picture shows, and what lights it: in a wide scene, few of the paths that light all of it would come there.
+//! A sphere that holds most of what a picture shows, and what lights it: in a wide scene, few of the paths that light
+//! all of it would come there.
 //!
-//! What is around it lights it, too, the less the farther away, but there is more of that: light from ground at distances d to 2 d counts for about as much as
-//! from d / 2 to d. So the rest of the paths goes through discs each twice as wide as the one before, in equal shares. Without them, photons
-//! that come from just outside are few, and glare.
+//! What is around it lights it, too, the less the farther away, but there is more of that: light from ground at
+//! distances d to 2 d counts for about as much as from d / 2 to d. So the rest of the paths goes through discs each
+//! twice as wide as the one before, in equal shares. Without them, photons that come from just outside are few, and
+//! glare.
 
 use crate::math::Vec3;
 use std::f32::consts::PI;

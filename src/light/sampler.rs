@@ -7,7 +7,8 @@ use super::tree::LightTree;
 use crate::math::luminance;
 use std::f32::consts::PI;
 
-/// Share of the choices that go by power wherever the light is received: what a near lamp behind a wall takes from the others has this bound.
+/// Share of the choices that go by power wherever the light is received: what a near lamp behind a wall takes from the
+/// others has this bound.
 const BY_POWER: f64 = 0.1;
 /// Least share of the other choices for lights at infinity, and for all others, where there are both.
 const LEAST_SHARE: f32 = 0.0625;

@@ -4,8 +4,8 @@ use crate::math::{Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
 /// The radiance of a glowing surface by its angle to the normal, over the mean that its flux tells (flux is pi times
-/// radiance times area). Into a cone of half angle h it is (tan h - tan x) / (tan h - h), x the angle: that of a Lambertian
-/// emitter behind a fine honeycomb, which all the flux leaves all the same.
+/// radiance times area). Into a cone of half angle h it is (tan h - tan x) / (tan h - h), x the angle: that of a
+/// Lambertian emitter behind a fine honeycomb, which all the flux leaves all the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Tangent of the half angle.

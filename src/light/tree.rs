@@ -1,10 +1,10 @@
-//! Choosing lights by what they may bring to a point: a tree of clusters, each with a bound on where it shines [Conty and Kulla, "Importance
-//! Sampling of Many Lights with Adaptive Tree Splitting", 2018].
+//! Choosing lights by what they may bring to a point: a tree of clusters, each with a bound on where it shines [Conty
+//! and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018].
 //!
-//! A cluster is a sphere around its lights and a cone around their axes. A choice goes from the root to a leaf, at each step by how much
-//! light each half may send to the point: intensity by the least angle to an axis over the distance squared. What is
-//! certain to send nothing is never chosen. Where a cluster is small and far away and all its lights look one way, it makes no difference how it is divided: there
-//! the choice goes by power.
+//! A cluster is a sphere around its lights and a cone around their axes. A choice goes from the root to a leaf, at each
+//! step by how much light each half may send to the point: intensity by the least angle to an axis over the distance
+//! squared. What is certain to send nothing is never chosen. Where a cluster is small and far away and all its lights
+//! look one way, it makes no difference how it is divided: there the choice goes by power.
 
 mod bounds;
 
@@ -17,7 +17,8 @@ use std::ops::Range;
 
 /// Nearer lights (m2) count as if they were that far, so that sums stay finite.
 const LEAST_DISTANCE2: f32 = 1e-12;
-/// What light along a surface counts for over light from above, since it may be reflected well; and from behind, where a normal is no longer sure.
+/// What light along a surface counts for over light from above, since it may be reflected well; and from behind, where
+/// a normal is no longer sure.
 const GRAZING: f32 = 0.1;
 const BEHIND: f32 = 0.01;
 /// A cluster is small and far where its squared radius is less than this of its squared distance,
@@ -74,7 +75,8 @@ impl Node {
         self.cos_spread > ONE_WAY && self.radius2 < SMALL * at.p.distance_squared(self.center)
     }
 
-    /// Irradiance that the cluster may bring to a receiver (W/m2, luminance), about; 0 only where it is certain to bring none.
+    /// Irradiance that the cluster may bring to a receiver (W/m2, luminance), about; 0 only where it is certain to
+    /// bring none.
     #[inline]
     fn importance(&self, at: &Receiver) -> f32 {
         let to = at.p - self.center;

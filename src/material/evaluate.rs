@@ -34,8 +34,8 @@ impl Material {
         Vec4::from_array(self.base_color) * surface.color * look_up(&self.base_color_texture, surface, textures)
     }
 
-    /// What of the scattering model may change without a change of the interface: base colour, share of metal, share of the
-    /// dielectric that transmits. All in `[0, 1]`.
+    /// What of the scattering model may change without a change of the interface: base colour, share of metal, share of
+    /// the dielectric that transmits. All in `[0, 1]`.
     #[inline]
     pub fn base_and_shares(&self, surface: &Surface, textures: &[Texture]) -> (Rgb, f32, f32) {
         let base = unit_color(self.base(surface, textures).truncate());
@@ -78,7 +78,8 @@ impl Material {
         textures.iter().all(|texture| texture.is_none())
     }
 
-    /// The parameters of the scattering model; `eta` is the index of refraction behind the surface (its back) over the one before it.
+    /// The parameters of the scattering model; `eta` is the index of refraction behind the surface (its back) over the
+    /// one before it.
     #[inline]
     pub fn parameters(&self, surface: &Surface, textures: &[Texture], eta: f32) -> Parameters {
         if self.unlit {
@@ -127,8 +128,9 @@ impl Material {
         p
     }
 
-    /// The shading frame: z the interpolated normal, turned by the normal map and kept on the side of the geometric normal; x along the
-    /// direction of anisotropy. Where the mesh has no tangents, a normal map has no frame to be read in and is ignored.
+    /// The shading frame: z the interpolated normal, turned by the normal map and kept on the side of the geometric
+    /// normal; x along the direction of anisotropy. Where the mesh has no tangents, a normal map has no frame to be
+    /// read in and is ignored.
     #[inline]
     pub fn shading_frame(&self, surface: &Surface, textures: &[Texture]) -> Frame {
         if self.has_plain_frame() {

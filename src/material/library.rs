@@ -75,7 +75,8 @@ impl Material {
         (any(&is_perfect), any(&|roughness| !is_perfect(roughness) && roughness < WIDEST_ROUGHNESS))
     }
 
-    /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light of its own to show.
+    /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light
+    /// of its own to show.
     pub fn is_clear(&self) -> bool {
         let perfect = is_perfect(self.roughness) && self.metallic_roughness_texture.is_none();
         let glass = self.transmission == 1.0 && self.transmission_texture.is_none() && self.metallic == 0.0;
@@ -114,8 +115,8 @@ impl Material {
         self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.is_solid_glass()
     }
 
-    /// Index of refraction at a wavelength (nm), where it disperses: Cauchy's equation with the Abbe number's lines of 486.1, 587.6 and 656.3 nm
-    /// \[KHR_materials_dispersion\].
+    /// Index of refraction at a wavelength (nm), where it disperses: Cauchy's equation with the Abbe number's lines of
+    /// 486.1, 587.6 and 656.3 nm \[KHR_materials_dispersion\].
     #[inline]
     pub fn ior_at(&self, nm: f32) -> f32 {
         let spread = (self.ior - 1.0) * self.dispersion * (1.0 / 20.0);

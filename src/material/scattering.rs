@@ -19,7 +19,8 @@ struct Ready {
     unlit: bool,
     /// It has neither a normal map nor a direction.
     plain_frame: bool,
-    /// Base colour before vertex colours, share of metal, share of the dielectric that transmits; `None` where textures say.
+    /// Base colour before vertex colours, share of metal, share of the dielectric that transmits; `None` where textures
+    /// say.
     shares: Option<(Vec4, f32, f32)>,
     /// The interface with the open space and its relative index of refraction; none where textures change it.
     open: Option<(f32, Interface)>,
@@ -92,8 +93,8 @@ impl Scattering {
         Scattering::with(Arc::new(EnergyTables::for_materials(materials)), materials)
     }
 
-    /// For the scene with other materials, which have no indices of refraction and no coverings that the first ones lack: the tables, which take
-    /// a thirtieth of a core-second for each pair of indices, are shared.
+    /// For the scene with other materials, which have no indices of refraction and no coverings that the first ones
+    /// lack: the tables, which take a thirtieth of a core-second for each pair of indices, are shared.
     pub fn again(&self, materials: &[Material]) -> Scattering {
         Scattering::with(Arc::clone(&self.tables), materials)
     }
@@ -116,8 +117,8 @@ impl Scattering {
         Scattering { tables, of_materials }
     }
 
-    /// Scattering at a surface seen along the unit direction `wo`; `eta` is the index of refraction behind the surface (its back) over the one before it. An
-    /// interface that textures change is made in `arena`.
+    /// Scattering at a surface seen along the unit direction `wo`; `eta` is the index of refraction behind the surface
+    /// (its back) over the one before it. An interface that textures change is made in `arena`.
     #[inline(always)]
     pub fn shading<'a>(
         &'a self,

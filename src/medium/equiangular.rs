@@ -1,14 +1,15 @@
-//! Equiangular sampling: distances on a ray in proportion to the angle that they take up as seen from a lamp, so that the inverse square of the
-//! distance from it cancels \[Kulla and Fajardo 2012, "Importance sampling techniques for path tracing in participating media", section 4\].
+//! Equiangular sampling: distances on a ray in proportion to the angle that they take up as seen from a lamp, so that
+//! the inverse square of the distance from it cancels \[Kulla and Fajardo 2012, "Importance sampling techniques for
+//! path tracing in participating media", section 4\].
 
 use crate::math::Vec3;
 
-/// Least distance of a lamp from a ray over that from its origin: where rounding would decide. A density that takes it to be further away is
-/// as right, and only as even as that.
+/// Least distance of a lamp from a ray over that from its origin: where rounding would decide. A density that takes it
+/// to be further away is as right, and only as even as that.
 const LEAST_ASIDE: f32 = 1e-4;
 
-/// A lamp at the distance D from the middle of a way of length L is near below this D / L. Of evenly drawn points the inverse square has a relative
-/// variance of about L / (2 pi D) - 1: here 0.3, less than other noise.
+/// A lamp at the distance D from the middle of a way of length L is near below this D / L. Of evenly drawn points the
+/// inverse square has a relative variance of about L / (2 pi D) - 1: here 0.3, less than other noise.
 const NEAR: f32 = 0.125;
 
 /// Light on less than this of the way is worth points of its own, wherever it comes from.
@@ -28,7 +29,8 @@ pub struct Equiangular {
 }
 
 impl Equiangular {
-    /// The part of the ray from `origin` along the unit `direction` between two distances, the latter maybe infinite, seen from `lamp`. `None` where that is no angle.
+    /// The part of the ray from `origin` along the unit `direction` between two distances, the latter maybe infinite,
+    /// seen from `lamp`. `None` where that is no angle.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3, part: [f32; 2], lamp: Vec3) -> Option<Equiangular> {
         let to = lamp - (origin + direction * part[0]);
@@ -40,7 +42,8 @@ impl Equiangular {
         (aside > 0.0 && angle > 0.0).then_some(Equiangular { part, along, aside, angle })
     }
 
-    /// Whether the lamp is so near that its inverse square varies far more than the light scattered over the next `length` would.
+    /// Whether the lamp is so near that its inverse square varies far more than the light scattered over the next
+    /// `length` would.
     #[inline]
     pub fn is_near(&self, length: f32) -> bool {
         self.aside < NEAR * length
@@ -91,8 +94,8 @@ mod tests {
         assert!(seen.is_short(10.1) && !seen.is_short(9.9));
     }
 
-    /// Near and far lamps, beside the way, before and beyond it, ways without end: what is drawn is distributed as the density says, by its closed form
-    /// at quantiles of u, and lies on the way.
+    /// Near and far lamps, beside the way, before and beyond it, ways without end: what is drawn is distributed as the
+    /// density says, by its closed form at quantiles of u, and lies on the way.
     #[test]
     fn samples_follow_the_density() {
         for lamp in [Vec3::new(1.0, 0.5, 0.0), Vec3::new(-20.0, 0.01, 0.0), Vec3::new(300.0, 1.0, 2.0), Vec3::X * 0.3] {

@@ -1,12 +1,14 @@
 //! Free flight: where on a ray a medium scatters, drawn with all three channels in mind.
 //!
-//! One channel is drawn and its distance of flight sampled; the density is that of the mixture over the channels, so every channel has a share
-//! in every sample \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4; "spectral MIS"\]. Channels are drawn in proportion to what
-//! they have to lose: then no weight makes the sum over channels of a path's throughput grow, however often and however differently they
-//! scatter, and none can be starved, for a sample's density is at least the channel's own.
+//! One channel is drawn and its distance of flight sampled; the density is that of the mixture over the channels, so
+//! every channel has a share in every sample \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4;
+//! "spectral MIS"\]. Channels are drawn in proportion to what they have to lose: then no weight makes the sum over
+//! channels of a path's throughput grow, however often and however differently they scatter, and none can be starved,
+//! for a sample's density is at least the channel's own.
 //!
-//! MIS between whole paths must know the densities of paths it has not walked, and cannot ask for the throughput they would have had. It
-//! takes the even mixture of the channels in its place ([`Flight`]): the weights still sum to one, which is all that they must.
+//! MIS between whole paths must know the densities of paths it has not walked, and cannot ask for the throughput they
+//! would have had. It takes the even mixture of the channels in its place ([`Flight`]): the weights still sum to one,
+//! which is all that they must.
 
 use super::{Equiangular, MediumParameters};
 use crate::math::{Rgb, Vec2, is_lit};
@@ -23,7 +25,8 @@ pub struct Collision {
 /// How a ray fares in a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fate {
-    /// It gets to the end, and what it carries is multiplied by this: transmittance over the probability of getting there.
+    /// It gets to the end, and what it carries is multiplied by this: transmittance over the probability of getting
+    /// there.
     Passed(Rgb),
     /// It collides.
     Collided(Collision),
@@ -33,7 +36,8 @@ pub enum Fate {
 const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 
 impl MediumParameters {
-    /// Draws how a ray of `throughput` fares on the next `distance` (maybe infinite). `u` is uniform on the unit square.
+    /// Draws how a ray of `throughput` fares on the next `distance` (maybe infinite). `u` is uniform on the unit
+    /// square.
     #[inline]
     pub fn fly(&self, throughput: Rgb, distance: f32, u: Vec2) -> Fate {
         let sigma = self.sigma_t();
@@ -49,8 +53,8 @@ impl MediumParameters {
         }
     }
 
-    /// The points of the next `distance` (maybe infinite) at which a ray of `throughput` is scattered, as if it had to be. `None` where
-    /// nothing is scattered.
+    /// The points of the next `distance` (maybe infinite) at which a ray of `throughput` is scattered, as if it had to
+    /// be. `None` where nothing is scattered.
     #[inline]
     pub fn collisions(&self, throughput: Rgb, distance: f32) -> Option<Collisions<'_>> {
         let sigma = self.sigma_t();
@@ -134,8 +138,8 @@ fn pick(of: Rgb, share: Rgb, u: f32) -> f32 {
     }
 }
 
-/// Densities of flight along one segment, both ways, with the even mixture of the channels: per length where the end it flies to lies in a
-/// scattering medium, else the probability of getting there.
+/// Densities of flight along one segment, both ways, with the even mixture of the channels: per length where the end it
+/// flies to lies in a scattering medium, else the probability of getting there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
     /// From the start to the end.
@@ -148,7 +152,8 @@ impl Flight {
     /// Nothing on the way scatters.
     pub const FREE: Flight = Flight { forward: 1.0, reverse: 1.0 };
 
-    /// Goes on through `distance` of `medium`. `starts`, `ends`: the segment starts or ends in here, at a vertex of the medium.
+    /// Goes on through `distance` of `medium`. `starts`, `ends`: the segment starts or ends in here, at a vertex of the
+    /// medium.
     #[must_use]
     #[inline]
     pub fn through(self, medium: &MediumParameters, distance: f32, starts: bool, ends: bool) -> Flight {
@@ -183,9 +188,10 @@ mod tests {
         ]
     }
 
-    /// Means over draws of both outcomes of a flight against their closed forms, per channel: passing gives the transmittance, colliding (with
-    /// `f(t) = t`, so that distances count) the integral of `t T(t)`, however points are drawn, when both ways share it, and when one
-    /// of them draws on a part of the ray only. Returns the largest deviation in standard errors.
+    /// Means over draws of both outcomes of a flight against their closed forms, per channel: passing gives the
+    /// transmittance, colliding (with `f(t) = t`, so that distances count) the integral of `t T(t)`, however points are
+    /// drawn, when both ways share it, and when one of them draws on a part of the ray only. Returns the largest
+    /// deviation in standard errors.
     fn flight_error(bug: impl Fn(Collision, Rgb) -> Rgb) -> f64 {
         let mut worst = 0.0f64;
         let lamp = Vec3::new(0.1, 0.4, 0.0);

@@ -1,8 +1,8 @@
 //! The phase function of Henyey and Greenstein \[1941, "Diffuse radiation in the galaxy"\].
 //!
-//! Like a BSDF it is told the directions away from the vertex: `wo` back along the path, `wi` onward. Light that flies straight on has
-//! `wi = -wo`. It is normalised and symmetric, so drawing it has weight 1, both ways have one density, and light and importance scatter
-//! alike.
+//! Like a BSDF it is told the directions away from the vertex: `wo` back along the path, `wi` onward. Light that flies
+//! straight on has `wi = -wo`. It is normalised and symmetric, so drawing it has weight 1, both ways have one density,
+//! and light and importance scatter alike.
 
 use crate::math::{Frame, Vec2, Vec3, one_minus_cos};
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -15,8 +15,8 @@ pub struct HenyeyGreenstein {
 }
 
 impl HenyeyGreenstein {
-    /// The value for `wo` and `wi` (per sr), and at once the density with which [`HenyeyGreenstein::sample`] draws `wi`:
-    /// `(1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2))`, cos between the old and the new direction of flight.
+    /// The value for `wo` and `wi` (per sr), and at once the density with which [`HenyeyGreenstein::sample`] draws
+    /// `wi`: `(1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2))`, cos between the old and the new direction of flight.
     #[inline]
     pub fn pdf_w(&self, wo: Vec3, wi: Vec3) -> f32 {
         let (g, ahead) = self.forward(wo);

@@ -1,8 +1,8 @@
 //! Kernels of density estimation: how much a photon counts by its distance.
 //!
-//! All have the bandwidth as the radius of their support, and the squared distance over the squared bandwidth, `s` in [0, 1), as their argument.
-//! What is written here is a kernel over the box kernel: on surfaces, times 1 / (pi r^2) it integrates to one over the disc of radius r; in media,
-//! times 3 / (4 pi r^3), over the ball.
+//! All have the bandwidth as the radius of their support, and the squared distance over the squared bandwidth, `s` in
+//! [0, 1), as their argument. What is written here is a kernel over the box kernel: on surfaces, times 1 / (pi r^2) it
+//! integrates to one over the disc of radius r; in media, times 3 / (4 pi r^3), over the ball.
 
 use std::f32::consts::PI;
 use wide::f32x8;
@@ -82,8 +82,9 @@ impl Kernel for Gaussian {
     }
 }
 
-/// Second derivatives of a smooth kernel, the triweight `4 / pi (1 - s)^3`, summed over both axes: the Laplacian of what photons estimate. Per
-/// photon at `s` within the squared bandwidth; in 1/m4 for a bandwidth of 1 m, else over its fourth power.
+/// Second derivatives of a smooth kernel, the triweight `4 / pi (1 - s)^3`, summed over both axes: the Laplacian of
+/// what photons estimate. Per photon at `s` within the squared bandwidth; in 1/m4 for a bandwidth of 1 m, else over its
+/// fourth power.
 #[inline]
 pub fn laplacian(s: f32x8) -> f32x8 {
     (f32x8::ONE - s) * (s * 3.0 - 1.0) * (48.0 / PI)

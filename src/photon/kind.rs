@@ -2,8 +2,9 @@
 
 use super::map::PhotonMap;
 
-/// What a photon has come through. Photons of caustics are dense where they are and have paths of their own sent to make them; all others are sparse and
-/// even. Bandwidths that the one kind sets would be too small or too wide for the other, so each has a map and bandwidths of its own.
+/// What a photon has come through. Photons of caustics are dense where they are and have paths of their own sent to
+/// make them; all others are sparse and even. Bandwidths that the one kind sets would be too small or too wide for the
+/// other, so each has a map and bandwidths of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// At least one broad lobe or medium.

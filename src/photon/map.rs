@@ -1,8 +1,8 @@
 //! Photons sorted along a Morton curve, eight to a leaf, under a complete 8-ary tree of bounding boxes.
 //!
-//! The tree has no pointers: node `i` of a level has the nodes `8 i .. 8 i + 8` of the level below as children. A query tests
-//! the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid it does not
-//! care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
+//! The tree has no pointers: node `i` of a level has the nodes `8 i .. 8 i + 8` of the level below as children. A query
+//! tests the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid it
+//! does not care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
 
 use super::Mark;
 use crate::math::{Rgb, Vec3};
@@ -17,9 +17,11 @@ const MAX_LEVELS: usize = 10;
 /// Bits per axis of the Morton code.
 const MORTON_BITS: u32 = 21;
 
-/// What kind of light path left a photon: how hard to find its light is for eye paths, where all bounces so far were delta; nothing is known of others.
+/// What kind of light path left a photon: how hard to find its light is for eye paths, where all bounces so far were
+/// delta; nothing is known of others.
 ///
-/// A byte: 1 if the light is a delta light, else twice the exponent of the density of emission, which so is known to a factor of two and no number is 1.
+/// A byte: 1 if the light is a delta light, else twice the exponent of the density of emission, which so is known to a
+/// factor of two and no number is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct PhotonFlags(u8);
 
@@ -174,8 +176,9 @@ impl Aabb {
 }
 
 impl<P: Located> PhotonMap<P> {
-    /// Builds a map. `photons` come in a fixed order (by path, then vertex); photons that share a Morton cell keep it, so the
-    /// map and every query's order of visits depend on the photons alone. Photons that are not finite are left out.
+    /// Builds a map. `photons` come in a fixed order (by path, then vertex); photons that share a Morton cell keep it,
+    /// so the map and every query's order of visits depend on the photons alone. Photons that are not finite are left
+    /// out.
     pub fn build(mut photons: Vec<P>) -> PhotonMap<P> {
         photons.retain(P::is_finite);
         let bounds = photons.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb::of(p)));
@@ -254,7 +257,8 @@ impl<P: Located> PhotonMap<P> {
         &self.photons[at.saturating_sub(reach)..(at + reach).min(self.photons.len())]
     }
 
-    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p`, in Morton order.
+    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p`, in Morton
+    /// order.
     #[inline]
     pub fn within(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
         self.traverse(p, radius2, |photon, distance2, radius2| {

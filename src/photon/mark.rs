@@ -2,10 +2,11 @@
 
 /// The weight of a photon and its rank among those of any weight.
 ///
-/// Where light paths are sent more often than their light asks for, each carries less: its weight is what it carries over what it would if starts were drawn
-/// by power alone. A rank is the weight over a number that is uniform on (0, 1), so that of photons of weight w those with a rank above W are a share
-/// `min(1, w / W)`, each on its own: a Poisson process, thinned \[Lewis and Shedler 1979\]. With W no less than any weight, they are as dense as photons
-/// that all weigh W and bring the same light.
+/// Where light paths are sent more often than their light asks for, each carries less: its weight is what it carries
+/// over what it would if starts were drawn by power alone. A rank is the weight over a number that is uniform on (0,
+/// 1), so that of photons of weight w those with a rank above W are a share `min(1, w / W)`, each on its own: a Poisson
+/// process, thinned \[Lewis and Shedler 1979\]. With W no less than any weight, they are as dense as photons that all
+/// weigh W and bring the same light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mark(u32);
 

@@ -1,7 +1,7 @@
 //! Queries that follow one another closely: photons around a place are kept and scanned, instead of looked for again.
 //!
-//! The eye paths of neighbouring pixels gather within a fraction of the bandwidth of each other. What a scan visits, and in which order, is
-//! what the tree would have visited, so nothing depends on what happens to be kept.
+//! The eye paths of neighbouring pixels gather within a fraction of the bandwidth of each other. What a scan visits,
+//! and in which order, is what the tree would have visited, so nothing depends on what happens to be kept.
 
 use super::map::{Located, PhotonMap};
 use crate::math::Vec3;
@@ -63,8 +63,8 @@ impl<P> Default for Near<P> {
 }
 
 impl<P: Located> PhotonMap<P> {
-    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p` whose surface is that of
-    /// normal `ng`, in Morton order.
+    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p` whose
+    /// surface is that of normal `ng`, in Morton order.
     #[inline]
     pub fn gather(&self, near: &mut Near<P>, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
         let radius = radius2.sqrt();

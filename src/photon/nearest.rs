@@ -27,8 +27,8 @@ impl<P> Default for Nearest<P> {
 }
 
 impl<P: Located> Nearest<P> {
-    /// Squared distance from `p` to its `k`-th nearest photon among those whose surface is that of normal `ng` and that lie nearer than
-    /// `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
+    /// Squared distance from `p` to its `k`-th nearest photon among those whose surface is that of normal `ng` and that
+    /// lie nearer than `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
     pub fn radius2(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
         let guess2 = (self.last2 * (GUESS * GUESS)).min(limit2);
         let mut found = None;

@@ -11,8 +11,8 @@ pub struct VolumePhoton {
     pub p: Vec3,
     /// Unit direction towards where the light came from.
     pub wi: Vec3,
-    /// Flux times length (W m), already divided by the number of light paths of the pass: summed over a volume and divided by it, it
-    /// is the fluence there, whatever the medium.
+    /// Flux times length (W m), already divided by the number of light paths of the pass: summed over a volume and
+    /// divided by it, it is the fluence there, whatever the medium.
     pub flux: Rgb,
     /// Which medium it is in: gathering points in others do not see it.
     pub medium: u32,

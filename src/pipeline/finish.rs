@@ -36,7 +36,8 @@ struct Network {
     training: String,
 }
 
-/// Finds the libraries and loads the network; the current rayon pool says how many threads they get. `levels`: as many as the render will have.
+/// Finds the libraries and loads the network; the current rayon pool says how many threads they get. `levels`: as many
+/// as the render will have.
 ///
 /// # Errors
 /// A library that was asked for by name is missing, or the network takes other levels.
@@ -72,8 +73,9 @@ impl Ready {
         &mut self.finish
     }
 
-    /// Chooses the quality for a render that may take so many seconds, and returns how many of them the finish will take, with so many parts: by timing the
-    /// denoiser on a small picture. This clock is a stop condition's: it decides when a render ends and how well its one picture is denoised, nothing else.
+    /// Chooses the quality for a render that may take so many seconds, and returns how many of them the finish will
+    /// take, with so many parts: by timing the denoiser on a small picture. This clock is a stop condition's: it
+    /// decides when a render ends and how well its one picture is denoised, nothing else.
     ///
     /// # Errors
     /// The denoiser fails.

@@ -1,6 +1,7 @@
-//! A render from beginning to end: load -> plan -> choose -> render -> finish -> deliver. Each step takes what the one before gave, plain data in
-//! and out. What asks for a render (the command line, a host program) fills an [`Order`], looks on through a [`Watch`] and gets a
-//! [`Delivery`]; none of it parses, prints, or knows of files other than those that are read.
+//! A render from beginning to end: load -> plan -> choose -> render -> finish -> deliver. Each step takes what the one
+//! before gave, plain data in and out. What asks for a render (the command line, a host program) fills an [`Order`],
+//! looks on through a [`Watch`] and gets a [`Delivery`]; none of it parses, prints, or knows of files other than those
+//! that are read.
 
 pub mod check;
 pub mod finish;
@@ -127,7 +128,8 @@ pub struct Delivery {
     pub refusal: Option<Error>,
 }
 
-/// Renders. All that can be wrong is found before the first light path, but for a finish that fails, which loses no picture ([`Delivery::refusal`]).
+/// Renders. All that can be wrong is found before the first light path, but for a finish that fails, which loses no
+/// picture ([`Delivery::refusal`]).
 ///
 /// # Errors
 /// The scene, options that contradict it, memory, or an end that was asked for before the first iteration.

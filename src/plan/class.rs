@@ -1,8 +1,9 @@
 //! Classes of light paths, in the manner of Heckbert: every path is in exactly one.
 //!
-//! A path is what happens at its vertices from the camera to the light, a letter each ([`Event`]): `C` a perfect mirror or clear glass, `M` the perfect
-//! mirror of a surface that also scatters otherwise (a coat), `S` a sharp lobe, `B` a broad one, `V` a medium. `N` is any of `C M S`, `G` one of `M S`,
-//! `D` one of `C M`. It ends on a light that has a size, `L`, or none, `P`; the table says `L` where that makes no difference.
+//! A path is what happens at its vertices from the camera to the light, a letter each ([`Event`]): `C` a perfect mirror
+//! or clear glass, `M` the perfect mirror of a surface that also scatters otherwise (a coat), `S` a sharp lobe, `B` a
+//! broad one, `V` a medium. `N` is any of `C M S`, `G` one of `M S`, `D` one of `C M`. It ends on a light that has a
+//! size, `L`, or none, `P`; the table says `L` where that makes no difference.
 //!
 //! | class | path | effect | part |
 //! | --- | --- | --- | --- |
@@ -21,10 +22,12 @@
 //! | `Single` | `C* V L` | volume | volume |
 //! | `Volume` | `C* V` and whatever follows | volume | volume |
 //!
-//! So the effect *glossy* is what narrow lobes show, caustics excepted: first of all events that are not clear there is a narrow lobe. Nobody sees a light
-//! without size but by a lobe that has a width: where only perfect mirrors and glass are between the two, that lobe, if it is sharp, shows a caustic.
+//! So the effect *glossy* is what narrow lobes show, caustics excepted: first of all events that are not clear there is
+//! a narrow lobe. Nobody sees a light without size but by a lobe that has a width: where only perfect mirrors and glass
+//! are between the two, that lobe, if it is sharp, shows a caustic.
 //!
-//! [`EyeSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class ([`EyeSuffix::receives`]).
+//! [`EyeSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class
+//! ([`EyeSuffix::receives`]).
 
 mod present;
 mod sight;

@@ -67,7 +67,8 @@ impl Effect {
         }
     }
 
-    /// Whether it is a class of light paths; the others are properties of the scene, and without them it is another scene.
+    /// Whether it is a class of light paths; the others are properties of the scene, and without them it is another
+    /// scene.
     pub fn is_class(self) -> bool {
         self <= Effect::Sds
     }

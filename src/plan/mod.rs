@@ -1,8 +1,10 @@
-//! The plan of a render: which effects the scene calls for, because of what, which are simulated and how, and what looks like a mistake.
+//! The plan of a render: which effects the scene calls for, because of what, which are simulated and how, and what
+//! looks like a mistake.
 //!
-//! [`PathClass`] is the class of a light path, and [`Search::owner`] says who brings its light. `presence` says what the scene calls for, `search` what a method finds of it, [`switch`] leaves out what the user does without, `diagnosis` says why
-//! something may be missing that was hoped for. None of it traces a path: what effects weigh and cost is measured by a pilot, which fills
-//! the figures of [`EffectPlan`].
+//! [`PathClass`] is the class of a light path, and [`Search::owner`] says who brings its light. `presence` says what
+//! the scene calls for, `search` what a method finds of it, [`switch`] leaves out what the user does without,
+//! `diagnosis` says why something may be missing that was hoped for. None of it traces a path: what effects weigh and
+//! cost is measured by a pilot, which fills the figures of [`EffectPlan`].
 
 mod class;
 mod diagnosis;
@@ -57,11 +59,11 @@ pub struct Plan {
     pub because: String,
     /// All effects, in their order.
     pub effects: Vec<EffectPlan>,
-    /// Bound on the relative error (the root of relMSE) by light that the scene calls for and is left out: none where some is, for nothing bounds that
-    /// ([`EffectPlan::error_if_off`] tells what a pilot has seen of it).
+    /// Bound on the relative error (the root of relMSE) by light that the scene calls for and is left out: none where
+    /// some is, for nothing bounds that ([`EffectPlan::error_if_off`] tells what a pilot has seen of it).
     pub left_out_at_most: Option<f64>,
-    /// What is missing from the picture and what may be a mistake in the scene, each with a remedy. What reading the scene has found is in
-    /// [`Scene::warnings`].
+    /// What is missing from the picture and what may be a mistake in the scene, each with a remedy. What reading the
+    /// scene has found is in [`Scene::warnings`].
     pub warnings: Vec<String>,
 }
 

@@ -14,8 +14,8 @@ pub struct Presence {
 }
 
 impl Presence {
-    /// Looks at what the scene wears and what lights it. An effect is present rather too often than too seldom: whether its light
-    /// comes through is for a render to find out.
+    /// Looks at what the scene wears and what lights it. An effect is present rather too often than too seldom: whether
+    /// its light comes through is for a render to find out.
     pub fn of(scene: &Scene, camera: &Camera) -> Presence {
         let all = lights(scene, |_| true);
         let lit = |reasons: Vec<String>| if all.is_empty() { vec![] } else { reasons };

@@ -30,7 +30,8 @@ pub enum Search {
 pub enum Owner {
     /// Eye paths that run into lights.
     Hits,
-    /// Connections to lights, and eye paths that run into them; where these come from a sharp lobe by mirrors and clear glass, photons of caustics as well.
+    /// Connections to lights, and eye paths that run into them; where these come from a sharp lobe by mirrors and clear
+    /// glass, photons of caustics as well.
     Lit,
     /// Photons, gathered or merged.
     Photons,
@@ -64,8 +65,8 @@ impl Search {
         PathClass::ALL.into_iter().filter(|class| self.owner(*class) == Some(owner)).collect()
     }
 
-    /// Whether it finds all light of an effect. A light without size is hit by no path: without photons it shows no light behind glass, where it
-    /// could be neither connected to nor run into.
+    /// Whether it finds all light of an effect. A light without size is hit by no path: without photons it shows no
+    /// light behind glass, where it could be neither connected to nor run into.
     pub(super) fn finds(self, effect: Effect, sizeless_lights: bool, media_scatter: bool) -> bool {
         match (self, effect) {
             (Search::EyePaths, Effect::Caustic | Effect::Sds) => !sizeless_lights,

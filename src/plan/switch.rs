@@ -1,4 +1,5 @@
-//! `--effects`: leaves effects that are properties of the scene out of its description, before anything is built of it, or out of the scene, to see what they mean to it.
+//! `--effects`: leaves effects that are properties of the scene out of its description, before anything is built of it,
+//! or out of the scene, to see what they mean to it.
 
 use super::effect::{Effect, EffectSet};
 use super::names::{cut_list, worn};
@@ -50,8 +51,8 @@ fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
     cut_list(because)
 }
 
-/// The scene without an effect that is a property of it, as [`off`] leaves it out of its description; what is the same is shared. Lenses are the camera's
-/// ([`crate::camera::Camera::pinhole`]).
+/// The scene without an effect that is a property of it, as [`off`] leaves it out of its description; what is the same
+/// is shared. Lenses are the camera's ([`crate::camera::Camera::pinhole`]).
 ///
 /// # Errors
 /// Without cut-outs shapes are committed to Embree again, which may be out of memory.
@@ -110,7 +111,8 @@ fn mask_of(texture: &Texture) -> Texture {
     Texture { texels, ..texture.clone() }
 }
 
-/// Multiplies the factors of a material by the means of their textures, which it then lacks; `keep_alpha`: the alpha stays with its texture.
+/// Multiplies the factors of a material by the means of their textures, which it then lacks; `keep_alpha`: the alpha
+/// stays with its texture.
 fn flatten(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, keep_alpha: bool) {
     let take = |texture: &mut Option<TextureRef>| texture.take().map_or(Vec4::ONE, &mean);
     let mut base = take(&mut material.base_color_texture);

@@ -1,12 +1,12 @@
-//! One iteration of the methods made of whole paths: path tracing, light tracing, bidirectional path tracing, bidirectional
-//! photon mapping, vertex connection and merging.
+//! One iteration of the methods made of whole paths: path tracing, light tracing, bidirectional path tracing,
+//! bidirectional photon mapping, vertex connection and merging.
 //!
-//! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its pixels. What light paths
-//! send to the film is a list per tile, added in the order of tiles, so the sums do not depend on threads; photons
-//! are likewise concatenated and wait for the next iteration.
+//! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its
+//! pixels. What light paths send to the film is a list per tile, added in the order of tiles, so the sums do not depend
+//! on threads; photons are likewise concatenated and wait for the next iteration.
 //!
-//! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone, the other levels of the
-//! second. They share nothing but the photons, those of both light paths.
+//! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone,
+//! the other levels of the second. They share nothing but the photons, those of both light paths.
 
 use super::clock::cpu_seconds;
 use super::guiding::learnt;
@@ -63,7 +63,8 @@ pub struct Passes<'a> {
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     /// Pictures per technique, by tile, if asked for.
     techniques: Option<Vec<TilePictures>>,
-    /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it covers.
+    /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it
+    /// covers.
     covered: f32,
 }
 
@@ -121,8 +122,8 @@ impl<'a> Passes<'a> {
         let (width, height) = self.camera.size();
         let Settings { seed, max_depth, .. } = *self.settings;
         let pass = LightPass::new(seed, i, pair.light, width * height, max_depth).guided(guide);
-        // Others put paths together of one hue alone, whichever it is. There each light path is its pixel's own, and its
-        // passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
+        // Others put paths together of one hue alone, whichever it is. There each light path is its pixel's own, and
+        // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
         let merges = self.shared.is_some_and(|shared| shared.strategies.merge);
         if merges { pass.with(Comb::slow(seed, i)) } else { pass.drawing(Streams::in_sequence(seed, i, pair.light)) }
     }

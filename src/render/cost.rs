@@ -1,5 +1,5 @@
-//! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on (`scripts/figures.sh cost`); choices depend
-//! on their ratios.
+//! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on
+//! (`scripts/figures.sh cost`); choices depend on their ratios.
 
 use super::method::Method;
 use super::settings::Settings;
@@ -36,7 +36,8 @@ const LOOK: f64 = 0.155e-6;
 const MERGE: f64 = 0.039e-6;
 /// What counting photons adds to gathering them.
 const COUNTING: f64 = 0.04e-6;
-/// A vertex in a medium of an eye path; of either path where both are kept; a point that an eye path looks at on its way through a medium, with the photons around it.
+/// A vertex in a medium of an eye path; of either path where both are kept; a point that an eye path looks at on its
+/// way through a medium, with the photons around it.
 const EYE_MEDIUM: f64 = 0.89e-6;
 const TWO_WAY_MEDIUM: f64 = 1.05e-6;
 const ON_THE_WAY: f64 = 1.04e-6;
@@ -49,7 +50,8 @@ const TRIANGLES: f64 = 50_000.0;
 const POWER: f64 = 0.1;
 /// What the start of a guided light path costs, in vertices of one.
 pub(super) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
-/// Light that was scattered broadly, or in a medium, before it is where the eye looks; and where the eye looks by narrow lobes.
+/// Light that was scattered broadly, or in a medium, before it is where the eye looks; and where the eye looks by
+/// narrow lobes.
 const SCATTERED: ClassSet = ClassSet::one(PathClass::Indirect)
     .and(ClassSet::one(PathClass::IndirectFocus))
     .and(ClassSet::one(PathClass::Volume));

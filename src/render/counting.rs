@@ -1,5 +1,5 @@
-//! The methods whose bandwidths follow from the photons found: the passes of stochastic progressive photon mapping with a state of its own for every
-//! pixel, kind of photons and level, and a [`CountingRule`] that says what becomes of it.
+//! The methods whose bandwidths follow from the photons found: the passes of stochastic progressive photon mapping with
+//! a state of its own for every pixel, kind of photons and level, and a [`CountingRule`] that says what becomes of it.
 //!
 //! In media the rules are not defined, and bandwidths follow the memoryless rule of volumes.
 //!
@@ -186,9 +186,11 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         Counting { sppm, settings, rule, kernel, channels, layout, bandwidths: Vec::new(), counts: Vec::new() }
     }
 
-    /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all else.
+    /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all
+    /// else.
     fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
-        // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: what one point of the film sees, all of it if it is by glass.
+        // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: what one point of the film sees,
+        // all of it if it is by glass.
         let film = if self.settings.method == Method::Ppm { 1 } else { i };
         [film, i].map(|pass| Streams::in_sequence(self.settings.seed, pass, domain))
     }
@@ -241,7 +243,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let own = if correlated.is_some() { 0..1 } else { 0..count };
                 let mut first = measure(pixel, start, 0, own.clone());
                 let mut others = correlated.map(|start| measure(pixel, start, 0, 1..count));
-                // The same eye paths each time: only the photons differ, and those of one channel bring light to it alone.
+                // The same eye paths each time: only the photons differ, and those of one channel bring light to it
+                // alone.
                 for channel in 1..maps.len() {
                     add_photons(&mut first, &measure(pixel, start, channel, own.clone()));
                     if let (Some(others), Some(start)) = (&mut others, correlated) {

@@ -13,10 +13,11 @@ use crate::scene::Scene;
 /// told.
 pub const LEAST: u64 = 2 * QUARTERS as u64;
 
-/// Renders. `observe` is called after every iteration and may stop the render; it also gets the pixels, to show or save them.
+/// Renders. `observe` is called after every iteration and may stop the render; it also gets the pixels, to show or save
+/// them.
 ///
-/// Methods without bandwidth levels write one. With [`Method::Path`](super::Method::Path) and the methods that merge or connect,
-/// `settings.photons` is not used: there are as many light paths as eye paths, or none.
+/// Methods without bandwidth levels write one. With [`Method::Path`](super::Method::Path) and the methods that merge or
+/// connect, `settings.photons` is not used: there are as many light paths as eye paths, or none.
 pub fn render(
     scene: &Scene,
     camera: &Camera,

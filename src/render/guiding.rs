@@ -1,10 +1,11 @@
 //! Learning where light paths are to start: rounds of a few light paths and eye paths before the first iteration.
 //!
-//! A round draws light paths by what the rounds before it have learnt, gathers their photons where eye paths look, and adds up by cell of the guide how
-//! much squared relative error every photon leaves in the picture: its own share of the pixel, squared, for it is there or not. The pixel's value is
-//! what the round itself finds there.
+//! A round draws light paths by what the rounds before it have learnt, gathers their photons where eye paths look, and
+//! adds up by cell of the guide how much squared relative error every photon leaves in the picture: its own share of
+//! the pixel, squared, for it is there or not. The pixel's value is what the round itself finds there.
 //!
-//! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once learnt, does not leave less, there is none.
+//! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once
+//! learnt, does not leave less, there is none.
 
 use super::chunks::chunks;
 use super::cost::{Cost, GUIDED_START};
@@ -37,7 +38,8 @@ const NEIGHBOURS: usize = 16;
 /// radiance: it decides how well light paths are guided, not what is reported.
 const DARK: f32 = 0.01;
 
-/// A guide that leaves more than this of what unguided light paths leave of squared error, times what an iteration costs, is no gain.
+/// A guide that leaves more than this of what unguided light paths leave of squared error, times what an iteration
+/// costs, is no gain.
 const WORTH: f64 = 0.9;
 
 /// A photon and the component of the guide that has made it.
@@ -84,7 +86,8 @@ pub(super) fn learnt(
     Some(guide)
 }
 
-/// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once, and are longer.
+/// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once,
+/// and are longer.
 fn dearer(eye: &Eye<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = eye.camera.size();
     let cost = |guide: Option<&Guide>| {
@@ -147,7 +150,8 @@ fn photons(
 /// Sums over a round's eye paths of the squared relative errors that photons leave.
 struct CellErrors {
     of_cells: Vec<f64>,
-    /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w unguided ones, each 1 / w times as bright.
+    /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w
+    /// unguided ones, each 1 / w times as bright.
     unguided: f64,
 }
 

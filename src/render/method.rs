@@ -12,7 +12,8 @@ pub const DEFAULT_PHOTONS: u32 = 100_000;
 pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
 /// Neighbours whose distance is its bandwidth.
 pub const DEFAULT_MAP_KNN: usize = 100;
-/// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with one.
+/// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with
+/// one.
 pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
 /// How light is found.
@@ -104,8 +105,8 @@ impl Method {
         matches!(self, Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm)
     }
 
-    /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have one for every eye path,
-    /// or none.
+    /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have
+    /// one for every eye path, or none.
     pub fn counts_photons(self) -> bool {
         self.gathers() || self == Method::Pm
     }
@@ -129,7 +130,8 @@ impl Method {
         }
     }
 
-    /// Reduction rate of the memoryless rule where none is asked for \[Georgiev et al. 2012 for merging with connections\].
+    /// Reduction rate of the memoryless rule where none is asked for \[Georgiev et al. 2012 for merging with
+    /// connections\].
     pub fn alpha(self) -> f64 {
         match self {
             Method::Bpm | Method::Vcm => 0.75,

@@ -33,8 +33,9 @@ impl Rendered {
         output::layers((self.width, self.height), &self.pixels, &self.bandwidths, &shape, wanted)
     }
 
-    /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know: arguments,
-    /// warnings, the combiner, the peak of memory. `threads` is `None` for a reproducible file, which has no clocks, no memory and no threads in it.
+    /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know:
+    /// arguments, warnings, the combiner, the peak of memory. `threads` is `None` for a reproducible file, which has no
+    /// clocks, no memory and no threads in it.
     pub fn account(&self, threads: Option<usize>) -> Map<String, Value> {
         let shard = self.settings.shard;
         let mut account = Map::new();

@@ -1,14 +1,16 @@
-//! Classical photon mapping \[Jensen 1996\]: photons traced once, and the nearest of caustics and of all others around every point that an eye path sees.
+//! Classical photon mapping \[Jensen 1996\]: photons traced once, and the nearest of caustics and of all others around
+//! every point that an eye path sees.
 //!
-//! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by next-event estimation, caustics and
-//! all other indirect light from the maps. Eye paths accumulate over iterations, the maps stay. So the picture tends to their
-//! own blurred and blotched one, never to the truth: only more photons help, and memory bounds their number. The
-//! estimated error, which is told from differences between iterations, does not know of it.
+//! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by
+//! next-event estimation, caustics and all other indirect light from the maps. Eye paths accumulate over iterations,
+//! the maps stay. So the picture tends to their own blurred and blotched one, never to the truth: only more photons
+//! help, and memory bounds their number. The estimated error, which is told from differences between iterations, does
+//! not know of it.
 //!
 //! Of light in media it has single scattering alone, no photons: not for scenes whose media scatter.
 //!
-//! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the number of paths that were
-//! traced.
+//! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
+//! number of paths that were traced.
 
 use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
@@ -28,10 +30,12 @@ use rayon::prelude::*;
 
 /// Light paths traced between two looks at the memory.
 const BATCH: u32 = 1 << 16;
-/// Bytes per photon while the map is built: the photon as traced and as sorted, its place on the curve, its share of the tree.
+/// Bytes per photon while the map is built: the photon as traced and as sorted, its place on the curve, its share of
+/// the tree.
 pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
-/// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by it.
+/// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by
+/// it.
 fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (ByKind<Vec<Photon>>, u32) {
     let (mut photons, mut traced): (ByKind<Vec<Photon>>, _) = (ByKind::default(), 0);
     while traced < pass.paths() {
@@ -62,7 +66,8 @@ fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usi
     (photons, traced)
 }
 
-/// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this area holds on average.
+/// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this
+/// area holds on average.
 struct Neighbours<'a> {
     count: usize,
     nearest: &'a mut ByKind<Nearest>,

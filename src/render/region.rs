@@ -1,4 +1,5 @@
-//! The region that a picture shows, for light from infinity: of a lamp as wide as the scene few paths would come where anybody looks.
+//! The region that a picture shows, for light from infinity: of a lamp as wide as the scene few paths would come where
+//! anybody looks.
 
 use crate::camera::{band, par_pixels};
 use crate::light::Region;

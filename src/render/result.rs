@@ -68,11 +68,11 @@ impl Rendered {
     /// A surface that could show light and has shown none is not known to be dark: by Laplace's rule of succession the
     /// next of n iterations brings it light with probability 1 / (n + 2), and then its zero was wholly wrong (1).
     ///
-    /// A pixel with fewer than two finite samples where others have them is taken for wholly wrong (1), for nothing is known of it; `None` if
-    /// this holds for all.
+    /// A pixel with fewer than two finite samples where others have them is taken for wholly wrong (1), for nothing is
+    /// known of it; `None` if this holds for all.
     ///
-    /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance is
-    /// large: where such pixels rule the error, the estimate is too small until they have been seen several times.
+    /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance
+    /// is large: where such pixels rule the error, the estimate is too small until they have been seen several times.
     pub fn relative_error(&self) -> Option<f64> {
         error_estimate(&self.pixels, &self.settings).map(|error| error.root())
     }

@@ -77,7 +77,8 @@ impl<'a> Session<'a> {
         Session::after(stage, Spent::default())
     }
 
-    /// The same of a render on which some time has been spent already, by choosing its settings, which counts as its own.
+    /// The same of a render on which some time has been spent already, by choosing its settings, which counts as its
+    /// own.
     pub fn after(stage: &'a Stage<'a>, mut spent: Spent) -> Session<'a> {
         let Stage { scene, camera, settings, surroundings } = stage;
         let (passes, pixels) = spent.during(|| {
@@ -254,7 +255,8 @@ impl<'a> Session<'a> {
 }
 
 impl Settings {
-    /// Seconds to go, when that can be told: after `done` of `total` iterations and `seconds`, of which the pilot took `pilot`.
+    /// Seconds to go, when that can be told: after `done` of `total` iterations and `seconds`, of which the pilot took
+    /// `pilot`.
     pub(super) fn remaining(&self, done: u64, total: Option<u64>, seconds: f64, pilot: f64) -> Option<f64> {
         let by_count = total.map(|n| (n - done) as f64 * (seconds - pilot) / done as f64);
         let by_time = self.time.map(|t| (t - seconds).max(0.0));

@@ -33,8 +33,8 @@ pub struct Shard {
 pub struct Levels {
     /// Number of levels, 1 to [`MAX_LEVELS`].
     pub count: usize,
-    /// Trace a second eye path that decorrelates level 1 from the others \[post-reconstruction 2021, 3\], which equation (6) wants; without it
-    /// all levels share one path, which costs a little more than half as much.
+    /// Trace a second eye path that decorrelates level 1 from the others \[post-reconstruction 2021, 3\], which
+    /// equation (6) wants; without it all levels share one path, which costs a little more than half as much.
     pub two_paths: bool,
 }
 
@@ -49,8 +49,8 @@ impl Levels {
         Levels { two_paths: count > 1, ..Levels::new(count) }
     }
 
-    /// The level (from 0) that is the method's own image: the second largest, whose bandwidth is the usual one (k = 10 where the
-    /// largest is set by k = 20).
+    /// The level (from 0) that is the method's own image: the second largest, whose bandwidth is the usual one (k = 10
+    /// where the largest is set by k = 20).
     pub fn own(&self) -> usize {
         self.count.saturating_sub(2)
     }
@@ -93,13 +93,15 @@ pub struct Settings {
     pub indirect: Indirect,
     /// Classes of light paths to be found.
     pub classes: ClassSet,
-    /// Light paths start toward what makes caustics, where a pilot has found them to matter. The methods that count photons have none of it.
+    /// Light paths start toward what makes caustics, where a pilot has found them to matter. The methods that count
+    /// photons have none of it.
     pub guided: bool,
     /// Bandwidth levels.
     pub levels: Levels,
     /// Also make a picture per sampling technique ([`Method::has_techniques`]).
     pub techniques: bool,
-    /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is its bandwidth.
+    /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is
+    /// its bandwidth.
     pub initial: InitialBandwidth,
     /// Largest initial bandwidth over the picture's width: on surfaces and in media.
     pub widest: [f32; 2],
@@ -109,7 +111,8 @@ pub struct Settings {
     pub volume_alpha: f64,
     /// Rule of [`Method::Sppm`].
     pub radius_rule: RadiusRule,
-    /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]; the other methods have the box kernel.
+    /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]; the other methods have the box
+    /// kernel.
     pub kernel: KernelChoice,
     /// Parameters of [`Method::Cppm`]'s rule.
     pub chi_squared: ChiSquaredSettings,
@@ -174,8 +177,9 @@ impl Settings {
         }
     }
 
-    /// Light paths of an iteration of a picture of that size where no number is asked for. Where they bring caustics alone, eye paths bring the rest and are what most of the error
-    /// is left by: guided ones, which meet glass at once and take several times as long, are no more than those.
+    /// Light paths of an iteration of a picture of that size where no number is asked for. Where they bring caustics
+    /// alone, eye paths bring the rest and are what most of the error is left by: guided ones, which meet glass at once
+    /// and take several times as long, are no more than those.
     pub fn usual_photons(&self, (width, height): (u32, u32)) -> u32 {
         let usual = self.method.photons();
         if self.guided && self.indirect == Indirect::Paths { usual.min(width.saturating_mul(height)) } else { usual }
@@ -219,7 +223,8 @@ impl Settings {
         }
     }
 
-    /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any order.
+    /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any
+    /// order.
     pub fn is_memoryless(&self) -> bool {
         match self.method {
             Method::Ppm | Method::Cppm | Method::Appm => false,
@@ -228,8 +233,8 @@ impl Settings {
         }
     }
 
-    /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on its own, those up to the
-    /// method's own image, which leaves none to compare it with.
+    /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on
+    /// its own, those up to the method's own image, which leaves none to compare it with.
     pub fn compared_levels(&self) -> usize {
         if self.is_memoryless() || self.method == Method::Appm { self.levels.count } else { self.levels.own() + 1 }
     }

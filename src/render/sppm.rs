@@ -214,7 +214,8 @@ impl<'a> Sppm<'a> {
         (maps, Work { light_paths: u64::from(pass.paths()), photons })
     }
 
-    /// Maps of the photons of iteration `i`, and of how many light paths, if sharp lobes may merge them: those of caustics, if they are sent.
+    /// Maps of the photons of iteration `i`, and of how many light paths, if sharp lobes may merge them: those of
+    /// caustics, if they are sent.
     fn build(&self, photons: Photons, paths: u32, i: u64) -> Maps {
         let scatters = self.eye.scene.survey.scattering;
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));

@@ -15,11 +15,11 @@ pub struct Strategy {
 }
 
 impl Strategy {
-    /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is left to a
-    /// technique that finds it badly.
+    /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is
+    /// left to a technique that finds it badly.
     pub const USUAL: Strategy = Strategy::plain(Method::Vcm);
-    /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where others would have found the
-    /// glass, and without which it is hardly found where it is small.
+    /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where
+    /// others would have found the glass, and without which it is hardly found where it is small.
     pub const FOCUSED: Strategy = Strategy { guided: true, ..Strategy::USUAL };
     /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
     pub const GATHERING: Strategy = Strategy::plain(Method::Sppm);

@@ -1,6 +1,8 @@
-//! A picture per sampling technique, weighted and unweighted: how the strategies of a method share its light \[Veach 1997, 10.4\].
+//! A picture per sampling technique, weighted and unweighted: how the strategies of a method share its light \[Veach
+//! 1997, 10.4\].
 //!
-//! Tiles keep their own pictures, so that they need no locks and sums do not depend on threads. Light that is not finite is left out.
+//! Tiles keep their own pictures, so that they need no locks and sums do not depend on threads. Light that is not
+//! finite is left out.
 
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::math::Rgb;
@@ -16,15 +18,18 @@ pub const MAX_TECHNIQUES: usize = 3 * DEPTHS + 2 * DEPTHS * DEPTHS;
 pub struct TechniquePicture {
     /// Which one.
     pub technique: Technique,
-    /// Radiance per pixel, row by row from the top: its share of the method's picture. The shares of all techniques sum to it.
+    /// Radiance per pixel, row by row from the top: its share of the method's picture. The shares of all techniques sum
+    /// to it.
     pub weighted: Vec<[f32; 3]>,
-    /// The same without weights: what the technique would give alone (merging: with the kernel of the method's own bandwidth).
+    /// The same without weights: what the technique would give alone (merging: with the kernel of the method's own
+    /// bandwidth).
     pub unweighted: Vec<[f32; 3]>,
 }
 
 impl TechniquePicture {
-    /// A name for files: what is done, and as in \[Veach 1997\] the number of vertices `s` of the light's walk and `t` of the eye's,
-    /// both ends counted; `up` where deeper walks are in it, too. A merged photon is a vertex of both walks.
+    /// A name for files: what is done, and as in \[Veach 1997\] the number of vertices `s` of the light's walk and `t`
+    /// of the eye's, both ends counted; `up` where deeper walks are in it, too. A merged photon is a vertex of both
+    /// walks.
     pub fn name(&self) -> String {
         let count = |depth: u32| format!("{}{}", depth + 1, if depth >= DEEPEST { "up" } else { "" });
         match self.technique {

@@ -59,8 +59,8 @@ fn relative_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     if error.is_nan() { 1.0 } else { error.min(1.0) }
 }
 
-/// Up to `count` windows, apart from each other, in which the mean error of the worst picture exceeds that of the best by most; with one
-/// picture those in which it is largest.
+/// Up to `count` windows, apart from each other, in which the mean error of the worst picture exceeds that of the best
+/// by most; with one picture those in which it is largest.
 pub fn choose(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], size: (usize, usize), count: usize) -> Vec<Window> {
     let (width, height) = size;
     let least = width.min(height);
@@ -106,7 +106,8 @@ fn integral(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize) -> Vec<f
     table
 }
 
-/// The relative error that is shown as the largest: the 95th percentile over all pictures within the windows, so that fireflies do not turn all else black.
+/// The relative error that is shown as the largest: the 95th percentile over all pictures within the windows, so that
+/// fireflies do not turn all else black.
 pub fn scale(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], width: usize, windows: &[Window]) -> f64 {
     let pixels = windows.iter().flat_map(|window| window.indices(width));
     let mut errors: Vec<f64> =

@@ -118,8 +118,8 @@ impl Curve {
         Curve::from_seeds(by_seed.into_iter().map(|(_, spots)| spots).collect(), own)
     }
 
-    /// The mean of curves, as far as all of them go. Those that a clock has stopped end after different numbers of iterations: a curve without a moment
-    /// that another has is interpolated there.
+    /// The mean of curves, as far as all of them go. Those that a clock has stopped end after different numbers of
+    /// iterations: a curve without a moment that another has is interpolated there.
     pub fn from_seeds(by_seed: Vec<Vec<Spot>>, own: f64) -> Curve {
         let mut moments: Vec<u64> = by_seed.iter().flatten().map(|spot| spot.iterations).collect();
         moments.sort_unstable();

@@ -1,6 +1,8 @@
-//! The race: one iteration of the run that has used the least so far, and so on, so that a noisy machine hurts all alike.
+//! The race: one iteration of the run that has used the least so far, and so on, so that a noisy machine hurts all
+//! alike.
 //!
-//! Clocks decide the order and the end, never a picture: after so many iterations it is the one that `caustique render` makes.
+//! Clocks decide the order and the end, never a picture: after so many iterations it is the one that `caustique render`
+//! makes.
 
 use super::entry::{Entry, Moments};
 use super::reference::Reference;
@@ -43,8 +45,8 @@ pub struct Point {
     pub seconds: f64,
     /// Processor seconds, likewise.
     pub cpu_seconds: f64,
-    /// Wall-clock seconds of the finish and its layers, of runs that have one: the median of all its uses with this seed, which do the same
-    /// work.
+    /// Wall-clock seconds of the finish and its layers, of runs that have one: the median of all its uses with this
+    /// seed, which do the same work.
     pub finish_seconds: Option<f64>,
     /// Its error as measured against the reference, the reference's own included.
     pub errors: Errors,
@@ -154,8 +156,8 @@ impl Lane<'_> {
     }
 }
 
-/// Races all entries, with each seed in turn. `finishes` are as many as entries. Pictures of the first seed are kept in `folder` until the outcome is
-/// dropped. `observe` is called after every step and may stop the race.
+/// Races all entries, with each seed in turn. `finishes` are as many as entries. Pictures of the first seed are kept in
+/// `folder` until the outcome is dropped. `observe` is called after every step and may stop the race.
 ///
 /// # Errors
 /// The file system, before anything is rendered.
@@ -242,7 +244,8 @@ fn next(lanes: &[Lane<'_>], rules: &Rules) -> Option<usize> {
     open.min_by(|&a, &b| lanes[a].used(rules).total_cmp(&lanes[b].used(rules)))
 }
 
-/// The median by wall clock. The first use of a network is slower than those after it, and so is one that the machine disturbs.
+/// The median by wall clock. The first use of a network is slower than those after it, and so is one that the machine
+/// disturbs.
 fn median(times: &[Spent]) -> Option<Spent> {
     let mut times = times.to_vec();
     times.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));

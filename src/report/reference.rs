@@ -1,8 +1,9 @@
 //! The picture that all others are judged by, and how wrong it is itself.
 //!
-//! A reference made here is the mean `(a + b) / 2` of two independent halves of as many iterations each. If a half has the variance `v`, the mean has `v / 2`, and
-//! `(a - b)^2` expects `2 v`: a quarter of the halves' squared difference estimates the squared error of the mean. What both
-//! halves have in common, the bias of a method that has some, does not show in it.
+//! A reference made here is the mean `(a + b) / 2` of two independent halves of as many iterations each. If a half has
+//! the variance `v`, the mean has `v / 2`, and `(a - b)^2` expects `2 v`: a quarter of the halves' squared difference
+//! estimates the squared error of the mean. What both halves have in common, the bias of a method that has some, does
+//! not show in it.
 
 use super::entry::Metric;
 use crate::camera::Camera;
@@ -65,8 +66,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// A picture's error without the reference's own, in a metric; `None` where too little is left: no figure below the reference's own error is
-    /// reported.
+    /// A picture's error without the reference's own, in a metric; `None` where too little is left: no figure below the
+    /// reference's own error is reported.
     ///
     /// Errors of the picture and of the reference are independent, so their squares add in what is measured.
     pub fn figure(&self, metric: Metric, errors: &Errors) -> Option<f64> {
@@ -147,8 +148,8 @@ pub struct Halves {
 }
 
 impl Halves {
-    /// Renders both in turns until `settings` say stop, iterations counting for each and time for both together; at least two iterations.
-    /// `observe` gets iterations of each and seconds, and may stop it.
+    /// Renders both in turns until `settings` say stop, iterations counting for each and time for both together; at
+    /// least two iterations. `observe` gets iterations of each and seconds, and may stop it.
     pub fn render(
         scene: &Scene,
         camera: &Camera,
@@ -208,8 +209,8 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Pictures of known truth and noise: the stated error is that against the truth. Over 20000 pixels its standard error is below one
-    /// percent; the halves' difference itself would be four times as much, half of it twice.
+    /// Pictures of known truth and noise: the stated error is that against the truth. Over 20000 pixels its standard
+    /// error is below one percent; the halves' difference itself would be four times as much, half of it twice.
     #[test]
     fn the_stated_error_of_two_halves_is_their_means_error() {
         let noisy = |seed: u64| -> Vec<[f32; 3]> {

@@ -1,4 +1,5 @@
-//! A race with all that is told from it: what [`data`](super::data), [`plot`](super::plot) and [`page`](super::page) write down.
+//! A race with all that is told from it: what [`data`](super::data), [`plot`](super::plot) and [`page`](super::page)
+//! write down.
 
 use super::crop::{self, Look, Window};
 use super::curve::{Axis, Curve, Slope};

@@ -31,7 +31,8 @@ pub enum Reached {
     Unknown,
 }
 
-/// From where on a curve stays at or below `target`: iterations, seconds, and whether it always was. Between two moments the error is a power of each.
+/// From where on a curve stays at or below `target`: iterations, seconds, and whether it always was. Between two
+/// moments the error is a power of each.
 pub fn fall(curve: &Curve, target: f64) -> Option<(f64, f64, bool)> {
     let spots = &curve.mean;
     let Some(last_above) = spots.iter().rposition(|spot| spot.figure > target) else {
@@ -45,7 +46,8 @@ pub fn fall(curve: &Curve, target: f64) -> Option<(f64, f64, bool)> {
     Some((iterations, between(before.seconds, after.seconds, t), false))
 }
 
-/// When a run reaches a target: of the mean curve, with the jackknife's standard error, for which each seed is left out in turn.
+/// When a run reaches a target: of the mean curve, with the jackknife's standard error, for which each seed is left out
+/// in turn.
 pub fn reach(curve: &Curve, target: f64) -> Reached {
     if target <= curve.own {
         return Reached::BelowReference;
@@ -68,7 +70,8 @@ pub fn reach(curve: &Curve, target: f64) -> Reached {
     }
 }
 
-/// Targets where none are asked for: at most four errors of 1, 2, 5 times a power of ten, the smallest that two runs reach (one, if it is alone).
+/// Targets where none are asked for: at most four errors of 1, 2, 5 times a power of ten, the smallest that two runs
+/// reach (one, if it is alone).
 pub fn usual(curves: &[Curve], own: f64) -> Vec<Target> {
     let reported = |curve: &Curve| curve.mean.iter().filter(|spot| spot.reported).map(|s| s.figure).collect::<Vec<_>>();
     let figures: Vec<Vec<f64>> = curves.iter().map(reported).collect();

@@ -13,8 +13,9 @@ pub struct Theory {
 
 /// What theory says of a method; `None` where it says nothing in closed form.
 ///
-/// With squared bandwidths that shrink as i^(alpha - 1) the variance of the mean falls as N^-alpha and its squared bias as N^(2 alpha - 2) \[Knaus and Zwicker
-/// 2011\]; the slower of the two is the exponent, best at alpha = 2/3 \[Kaplanyan and Dachsbacher 2013\].
+/// With squared bandwidths that shrink as i^(alpha - 1) the variance of the mean falls as N^-alpha and its squared bias
+/// as N^(2 alpha - 2) \[Knaus and Zwicker 2011\]; the slower of the two is the exponent, best at alpha = 2/3
+/// \[Kaplanyan and Dachsbacher 2013\].
 pub fn theory(settings: &Settings) -> Option<Theory> {
     let kernel = -settings.alpha.min(2.0 - 2.0 * settings.alpha);
     let (exponent, because) = match settings.method {

@@ -10,7 +10,8 @@ use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::trace::{CAMERA, MeetsTest, Tracer};
 use std::sync::Arc;
 
-/// Farther from the origin than this many scene radii, coordinates are moved to the scene's centre: f32 would lose the digits.
+/// Farther from the origin than this many scene radii, coordinates are moved to the scene's centre: f32 would lose the
+/// digits.
 const FAR_FROM_ORIGIN: f64 = 8.0;
 
 /// Builds the scene.
@@ -234,7 +235,8 @@ fn asks(material: &Material) -> (Alpha, bool) {
     (material.alpha, material.null_bsdf)
 }
 
-/// Commits shapes to Embree, with what rays pass of them: what has a body, and what glows without one, if anything does.
+/// Commits shapes to Embree, with what rays pass of them: what has a body, and what glows without one, if anything
+/// does.
 fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {
     let of = |instance: &Instance| &materials.list[instance.material as usize];
     let asked = |null_bsdf: bool| {

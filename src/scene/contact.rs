@@ -1,16 +1,17 @@
 //! Surfaces that lie on each other: a glass on a table, a liquid in a glass, sheets in a stack.
 //!
-//! A ray goes on a little past the surface it leaves ([`error`]), for rounding decides about what is nearer; so whatever lies in
-//! that little way has to be met by other means. Where light passes a triangle that others may lie on
-//! ([`Contacts`](super::Contacts)), all others there are looked for, and taken to lie on each other in this order, whichever
-//! Embree finds first:
+//! A ray goes on a little past the surface it leaves ([`error`]), for rounding decides about what is nearer; so
+//! whatever lies in that little way has to be met by other means. Where light passes a triangle that others may lie on
+//! ([`Contacts`](super::Contacts)), all others there are looked for, and taken to lie on each other in this order,
+//! whichever Embree finds first:
 //!
 //! - what lets no light pass comes first: glass and the table that it stands on are in contact;
-//! - a solid is entered before another is left, so that solids overlap, and nested dielectrics (`transport/interior.rs`) say what fills the space:
-//!   liquid and glass are in contact, without air between them;
+//! - a solid is entered before another is left, so that solids overlap, and nested dielectrics
+//!   (`transport/interior.rs`) say what fills the space: liquid and glass are in contact, without air between them;
 //! - what has no inside is behind solids that are in front of it.
 //!
-//! Seen from the other side, the order is the reverse, but for the opaque, which nothing passes: light and importance go the same ways.
+//! Seen from the other side, the order is the reverse, but for the opaque, which nothing passes: light and importance
+//! go the same ways.
 
 use super::Scene;
 use super::contacts::face_each_other;
@@ -85,7 +86,8 @@ fn others(scene: &Scene, at: &Place, token: u32) -> Others {
     others
 }
 
-/// The first of the surfaces that lie where a ray along `direction` has met one that light passes; `None` where that is alone.
+/// The first of the surfaces that lie where a ray along `direction` has met one that light passes; `None` where that is
+/// alone.
 #[inline(never)]
 fn first(scene: &Scene, met: Place, hit: Hit, direction: Vec3, token: u32) -> Option<Hit> {
     let others = others(scene, &met, token);

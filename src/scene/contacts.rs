@@ -1,5 +1,5 @@
-//! Which triangles that light passes may have others lying on them: only there does a ray look for more than what it hits
-//! (`scene/contact.rs`).
+//! Which triangles that light passes may have others lying on them: only there does a ray look for more than what it
+//! hits (`scene/contact.rs`).
 
 use crate::geometry::{Shapes, error};
 use crate::material::Materials;
@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
 use std::collections::BTreeMap;
 
-/// Surfaces lie on each other where they are as good as parallel: cosine of the angle between them, or more. Where they cross, they do along
-/// a line, which no ray meets.
+/// Surfaces lie on each other where they are as good as parallel: cosine of the angle between them, or more. Where they
+/// cross, they do along a line, which no ray meets.
 const PARALLEL: f32 = 0.99;
 
 /// In a scene of more triangles than this, copies counted, any that light passes is taken to have others on it.
 const MOST: usize = 1 << 26;
 
-/// Whether two surfaces of one mesh that are at one place lie on each other there. Those that do not are neighbours, one surface where
-/// they meet.
+/// Whether two surfaces of one mesh that are at one place lie on each other there. Those that do not are neighbours,
+/// one surface where they meet.
 pub(super) fn face_each_other(a: Vec3, b: Vec3) -> bool {
     a.dot(b) < -PARALLEL
 }
@@ -46,7 +46,8 @@ impl Triangle {
 }
 
 impl Triangle {
-    /// Whether another of the same mesh lies on it, all of it, facing it: two sides of a pane that positions cannot tell apart.
+    /// Whether another of the same mesh lies on it, all of it, facing it: two sides of a pane that positions cannot
+    /// tell apart.
     fn is_one_with(&self, other: &Triangle) -> bool {
         let reach = self.error + other.error;
         let within = |corner: Vec3| (corner - self.corners[0]).dot(self.normal).abs() <= reach;
@@ -154,7 +155,8 @@ mod tests {
         Triangle { corners, normal, error: 1e-6, instance, primitive: 0 }
     }
 
-    /// What lies on a triangle touches it, from either side; what stands above it, crosses it or goes on from it does not.
+    /// What lies on a triangle touches it, from either side; what stands above it, crosses it or goes on from it does
+    /// not.
     #[test]
     fn what_lies_on_a_triangle_touches_it() {
         let flat = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 0);

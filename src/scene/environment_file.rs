@@ -18,8 +18,8 @@ const BRIGHTEST: f32 = 65_504.0;
 /// Width, height and texels, top row first.
 type Pixels = (u32, u32, Vec<[f32; 3]>);
 
-/// Reads the radiance of an environment from an `.exr` or `.hdr` file (told apart by what they hold, not by their names).
-/// Texels that are negative or not finite are clamped, with a warning.
+/// Reads the radiance of an environment from an `.exr` or `.hdr` file (told apart by what they hold, not by their
+/// names). Texels that are negative or not finite are clamped, with a warning.
 ///
 /// # Errors
 /// The file cannot be opened, is neither, is damaged, or is absurdly large.

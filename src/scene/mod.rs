@@ -80,7 +80,8 @@ impl Scene {
         build::build(description, threads)
     }
 
-    /// The same shapes and lamps with other materials, in another medium and environment. The materials have indices of refraction and coverings of those here.
+    /// The same shapes and lamps with other materials, in another medium and environment. The materials have indices of
+    /// refraction and coverings of those here.
     ///
     /// # Errors
     /// Embree is out of memory.

@@ -3,8 +3,8 @@
 use super::WavelengthSample;
 use crate::random::mix;
 
-/// One wavelength in each band, at the same place in all of them. Whatever paths of a pass meet, if they are of one band, they are of one wavelength. Over all
-/// seeds the place is uniform in every pass.
+/// One wavelength in each band, at the same place in all of them. Whatever paths of a pass meet, if they are of one
+/// band, they are of one wavelength. Over all seeds the place is uniform in every pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Comb {
     offset: f32,
@@ -17,8 +17,9 @@ impl Comb {
         Comb { offset: ((pass as f64 * GOLDEN + start(seed)) % 1.0) as f32 }
     }
 
-    /// For passes whose paths meet photons of the pass before: places move to and fro with the square root of the number of passes. Over a render they
-    /// are everywhere, and their steps shrink as bandwidths do, and with them the difference of wavelengths that meet.
+    /// For passes whose paths meet photons of the pass before: places move to and fro with the square root of the
+    /// number of passes. Over a render they are everywhere, and their steps shrink as bandwidths do, and with them the
+    /// difference of wavelengths that meet.
     pub fn slow(seed: u64, pass: u64) -> Comb {
         let at = ((pass as f64).sqrt() + 2.0 * start(seed)) % 2.0;
         Comb { offset: (if at < 1.0 { at } else { 2.0 - at }) as f32 }

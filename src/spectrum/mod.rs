@@ -1,12 +1,13 @@
 //! Wavelengths, for paths through glass whose index of refraction depends on them.
 //!
-//! Scenes are RGB, and so are paths. One that meets dispersive glass takes a wavelength, the only one it stands for from then on \[hero
-//! wavelength, Wilkie et al. 2014, without companions\], and its weight is multiplied by a colour ([`observer`]) whose mean over all wavelengths
-//! is white: light that is not dispersed stays as it is.
+//! Scenes are RGB, and so are paths. One that meets dispersive glass takes a wavelength, the only one it stands for
+//! from then on \[hero wavelength, Wilkie et al. 2014, without companions\], and its weight is multiplied by a colour
+//! ([`observer`]) whose mean over all wavelengths is white: light that is not dispersed stays as it is.
 //!
-//! Two paths that are put together must not have taken different wavelengths, nor count a colour twice. So the spectrum is divided into
-//! [`BANDS`] of equal probability, paths of different bands do not meet, and those of one band count [`BANDS`] times: of two bands drawn independently, one
-//! in so many pairs is equal. Within a pass all paths of a band take the same wavelength ([`Comb`]), so nothing is blurred.
+//! Two paths that are put together must not have taken different wavelengths, nor count a colour twice. So the spectrum
+//! is divided into [`BANDS`] of equal probability, paths of different bands do not meet, and those of one band count
+//! [`BANDS`] times: of two bands drawn independently, one in so many pairs is equal. Within a pass all paths of a band
+//! take the same wavelength ([`Comb`]), so nothing is blurred.
 
 mod comb;
 pub mod observer;
@@ -15,8 +16,8 @@ pub use comb::Comb;
 
 use crate::math::Rgb;
 
-/// Number of bands. More of them would waste more photons where light comes through dispersive glass and is seen through it; fewer would show in
-/// the colours of a single pass.
+/// Number of bands. More of them would waste more photons where light comes through dispersive glass and is seen
+/// through it; fewer would show in the colours of a single pass.
 pub const BANDS: u8 = 8;
 
 /// Weights below this are none: their light is not seen in this colour.
@@ -53,8 +54,9 @@ impl WavelengthSample {
         Wavelength { nm, weight, band: Band(self.band().0 + 1) }
     }
 
-    /// A wavelength for a path that carries one channel (0 to 2) alone, drawn from its bands by `u` in proportion to what they weigh in this channel: so
-    /// all such paths weigh the same. Its weight is that of the channel, in all channels; 1 on average.
+    /// A wavelength for a path that carries one channel (0 to 2) alone, drawn from its bands by `u` in proportion to
+    /// what they weigh in this channel: so all such paths weigh the same. Its weight is that of the channel, in all
+    /// channels; 1 on average.
     #[inline]
     pub fn wavelength_of(self, channel: usize, u: f32) -> Wavelength {
         let offset = self.band().1;
@@ -105,8 +107,8 @@ impl Wavelength {
         Rgb::select(self.weight.cmpgt(Rgb::splat(LEAST_WEIGHT)), self.weight.recip(), Rgb::ZERO)
     }
 
-    /// What light of a path of some band is multiplied with where this path meets it, both drawn independently; `None`: they do not
-    /// meet.
+    /// What light of a path of some band is multiplied with where this path meets it, both drawn independently; `None`:
+    /// they do not meet.
     #[inline]
     pub fn meets(&self, band: Band) -> Option<Rgb> {
         if band == Band::WHITE { Some(Rgb::ONE) } else { (band == self.band).then(|| self.once() * f32::from(BANDS)) }

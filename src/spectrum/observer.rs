@@ -1,10 +1,11 @@
 //! The colours of wavelengths.
 //!
-//! The CIE 1931 standard observer \[multi-lobe fits of Wyman, Sloan, Shirley 2013, "Simple Analytic Approximations to the CIE XYZ Color Matching
-//! Functions"\] in linear Rec. 709. What most wavelengths are there is no colour that a screen can show: some channel is
-//! negative. It is cut off at zero, and the three curves are scaled to one integral. Light of flat spectrum stays white, as lamps of RGB scenes have no other;
-//! a photon's flux stays positive, as roulette and the statistics of photons want it; and what is lost is saturation that no picture
-//! could hold. Wavelengths are drawn in proportion to the mean of the three curves, so no channel weighs more than 3.
+//! The CIE 1931 standard observer \[multi-lobe fits of Wyman, Sloan, Shirley 2013, "Simple Analytic Approximations to
+//! the CIE XYZ Color Matching Functions"\] in linear Rec. 709. What most wavelengths are there is no colour that a
+//! screen can show: some channel is negative. It is cut off at zero, and the three curves are scaled to one integral.
+//! Light of flat spectrum stays white, as lamps of RGB scenes have no other; a photon's flux stays positive, as
+//! roulette and the statistics of photons want it; and what is lost is saturation that no picture could hold.
+//! Wavelengths are drawn in proportion to the mean of the three curves, so no channel weighs more than 3.
 
 use crate::math::Rgb;
 use std::sync::LazyLock;

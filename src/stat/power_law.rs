@@ -12,7 +12,8 @@ pub struct PowerLaw {
 }
 
 impl PowerLaw {
-    /// Fits points `(x, y)`; those that are not finite and above zero do not count. `None` with fewer than three, or all at one `x`.
+    /// Fits points `(x, y)`; those that are not finite and above zero do not count. `None` with fewer than three, or
+    /// all at one `x`.
     pub fn fit(points: impl IntoIterator<Item = (f64, f64)>) -> Option<PowerLaw> {
         let usable = |v: f64| v.is_finite() && v > 0.0;
         let logs: Vec<(f64, f64)> =
@@ -43,8 +44,8 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// 400 fits of 8 points with 10 % noise. The standard error must be that of the exponents found, and a wrong exponent must be
-    /// far outside.
+    /// 400 fits of 8 points with 10 % noise. The standard error must be that of the exponents found, and a wrong
+    /// exponent must be far outside.
     #[test]
     fn planted_exponents_come_back_within_their_standard_error() {
         for planted in [-1.0, -2.0 / 3.0, -0.5] {

@@ -2,7 +2,8 @@
 
 use crate::math::{DVec3, Rgb};
 
-/// Running mean and sum of squared deviations of an RGB quantity; the count is kept by the owner, which has many of these.
+/// Running mean and sum of squared deviations of an RGB quantity; the count is kept by the owner, which has many of
+/// these.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Welford {
     /// Mean of the values so far.

@@ -119,7 +119,8 @@ impl Texture {
         (sum / (width * height) as f64).as_vec4()
     }
 
-    /// Linear RGBA at (u, v); v runs downwards from the top row, as in glTF. Coordinates that are not finite read texel 0.
+    /// Linear RGBA at (u, v); v runs downwards from the top row, as in glTF. Coordinates that are not finite read texel
+    /// 0.
     #[inline]
     pub fn sample(&self, uv: Vec2) -> Vec4 {
         if !uv.is_finite() {

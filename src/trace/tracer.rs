@@ -49,12 +49,12 @@ impl From<embree::Hit> for Hit {
     }
 }
 
-/// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs, and what is
-/// hidden from cameras. A pure function.
+/// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs, and
+/// what is hidden from cameras. A pure function.
 pub type MeetsTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
-/// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are faster there than
-/// through an instance's own tree, whose box overlaps its neighbours'.
+/// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are
+/// faster there than through an instance's own tree, whose box overlaps its neighbours'.
 const MOST_COPIED: usize = 1 << 17;
 
 /// Geometry committed to Embree; clones share it.
@@ -76,8 +76,8 @@ fn column_major(m: &Affine3A) -> [f32; 12] {
 }
 
 impl Tracer {
-    /// Commits those of `shapes` for which there is an answer in `asked`, by instance: whether hits of it are put to the
-    /// test `meets`.
+    /// Commits those of `shapes` for which there is an answer in `asked`, by instance: whether hits of it are put to
+    /// the test `meets`.
     ///
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.
@@ -154,8 +154,8 @@ impl Tracer {
         self.scene.intersect(&Self::ray(ray)).map(Hit::from)
     }
 
-    /// Calls `each` with the nearest hits of up to eight rays that go much the same way. Which rays are given together may decide between
-    /// triangles that share an edge.
+    /// Calls `each` with the nearest hits of up to eight rays that go much the same way. Which rays are given together
+    /// may decide between triangles that share an edge.
     #[inline]
     pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
         self.scene.intersect8(|k| ray(k).as_ref().map(Self::ray), |k, hit| each(k, hit.into()));

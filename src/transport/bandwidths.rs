@@ -35,8 +35,8 @@ impl LevelRadii {
         radii
     }
 
-    /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that sees no photons has a large one, and
-    /// its path may come to where they are dense, which nobody sees sharply.
+    /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that
+    /// sees no photons has a large one, and its path may come to where they are dense, which nobody sees sharply.
     #[inline]
     #[must_use]
     pub fn later(self, later2: f32) -> LevelRadii {

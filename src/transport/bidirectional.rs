@@ -1,8 +1,9 @@
 //! Bidirectional light transport: which strategies find a path, and what its two walks share.
 //!
-//! One presets-and-parts module serves light tracing, bidirectional path tracing \[Veach 1997, 10\], bidirectional photon mapping
-//! and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves splats (its vertices connected to the
-//! camera), vertices for the one eye path it belongs to, and photons for all eye paths of the next pass. No light vertex outlives its pixel.
+//! One presets-and-parts module serves light tracing, bidirectional path tracing \[Veach 1997, 10\], bidirectional
+//! photon mapping and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves
+//! splats (its vertices connected to the camera), vertices for the one eye path it belongs to, and photons for all eye
+//! paths of the next pass. No light vertex outlives its pixel.
 
 use super::eye::Eye;
 use super::mis::{Eta, Merges, Ratios, one_merge};
@@ -30,8 +31,8 @@ impl Strategies {
     /// Bidirectional photon mapping: every vertex merges, even direct light.
     pub const BPM: Strategies = Strategies { camera: false, connect: false, merge: true, first_merged: [1, 1] };
 
-    /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly, if it can be connected to: other strategies do
-    /// both better, without bias.
+    /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly, if it can be
+    /// connected to: other strategies do both better, without bias.
     pub fn vcm(camera_connects: bool) -> Strategies {
         Strategies { camera: true, connect: true, merge: true, first_merged: [2, if camera_connects { 2 } else { 1 }] }
     }
@@ -54,7 +55,8 @@ impl Strategies {
         if self.eye_merges(depth) { one_merge(clear) } else { Merges::ZERO }
     }
 
-    /// The merge that weights count at a light path's vertex at `depth`, if any: the eye path's vertex behind it is not delta.
+    /// The merge that weights count at a light path's vertex at `depth`, if any: the eye path's vertex behind it is not
+    /// delta.
     #[inline]
     pub fn light_merge(&self, depth: u32) -> Merges {
         if self.light_merges(depth) { one_merge(false) } else { Merges::ZERO }
@@ -85,7 +87,8 @@ impl Bidirectional<'_> {
     }
 }
 
-/// Which strategy found a path; `light` and `eye` are depths of the last vertices of the two walks it was put together from.
+/// Which strategy found a path; `light` and `eye` are depths of the last vertices of the two walks it was put together
+/// from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Technique {
     /// The eye path ran into a light with its segment number `eye`.
@@ -121,15 +124,15 @@ pub enum Technique {
 
 /// Looks over the shoulder of the walks: for pictures per technique, and for tests. `()` costs nothing.
 pub trait Record {
-    /// `technique` has found light: `value` unweighted (without visibility), `from` the point connected to or merged, and the ratios its
-    /// weight comes from.
+    /// `technique` has found light: `value` unweighted (without visibility), `from` the point connected to or merged,
+    /// and the ratios its weight comes from.
     #[inline]
     fn contribution(&mut self, technique: Technique, value: Rgb, from: Vec3, ratios: Ratios) {
         let _ = (technique, value, from, ratios);
     }
 
-    /// `technique` brings light to the eye path's own pixel: on a `level`, `value` unweighted, with visibility and kernel, and its weight.
-    /// Depths count from 1, also for light from infinity.
+    /// `technique` brings light to the eye path's own pixel: on a `level`, `value` unweighted, with visibility and
+    /// kernel, and its weight. Depths count from 1, also for light from infinity.
     #[inline]
     fn arrival(&mut self, technique: Technique, level: usize, value: Rgb, weight: f32) {
         let _ = (technique, level, value, weight);

@@ -1,4 +1,5 @@
-//! Eye paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass before.
+//! Eye paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass
+//! before.
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};

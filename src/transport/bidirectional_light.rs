@@ -151,7 +151,8 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         );
         let lobes = vertex.shading.bsdf.lobes();
         self.lobes = Some(lobes);
-        // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders of materials.
+        // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders
+        // of materials.
         if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
             let flux = vertex.throughput / *merged_paths;
             self.left.photons.push(MergePhoton::new(vertex, flux, self.beam, &self.mis));

@@ -1,9 +1,11 @@
-//! Direct light at a vertex: next-event estimation, and its second strategy, weighted by the balance heuristic \[Veach 1997, 9.2\].
+//! Direct light at a vertex: next-event estimation, and its second strategy, weighted by the balance heuristic \[Veach
+//! 1997, 9.2\].
 //!
-//! At a vertex the lobes fall into two sets that never share light: those that gather photons (`gather`), whose path ends
-//! here, and those the path goes on with (`onward`). Both are lit by one light sample. The second strategy of the gathering lobes is
-//! a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the path itself, which
-//! goes on with probability `survival`. A strategy tried with probability n has density n p in the balance heuristic.
+//! At a vertex the lobes fall into two sets that never share light: those that gather photons (`gather`), whose path
+//! ends here, and those the path goes on with (`onward`). Both are lit by one light sample. The second strategy of the
+//! gathering lobes is a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the
+//! path itself, which goes on with probability `survival`. A strategy tried with probability n has density n p in the
+//! balance heuristic.
 
 use super::glow::glows;
 use super::segment::{End, Start, next_surface, token};
@@ -13,8 +15,9 @@ use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;
 use crate::scene::Scene;
 
-/// Probability of tracing the gathering lobes' own ray. They are wide, so the light sample is nearly always the better one; the ray
-/// bounds what remains near large lights. One in sixteen instead of one in eight changes the estimated error of no scene of ours by more than 0.6 %, and saves 3 %.
+/// Probability of tracing the gathering lobes' own ray. They are wide, so the light sample is nearly always the better
+/// one; the ray bounds what remains near large lights. One in sixteen instead of one in eight changes the estimated
+/// error of no scene of ours by more than 0.6 %, and saves 3 %.
 pub const SECOND_STRATEGY: f32 = 0.0625;
 
 /// Balance heuristic of a density against another.
@@ -30,8 +33,8 @@ pub fn balance(pdf: f32, other: f32) -> f32 {
     }
 }
 
-/// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival` is the
-/// probability of going on with `onward`.
+/// Light that reaches `vertex` straight from a light, scattered towards `vertex.wo`, per unit of throughput. `survival`
+/// is the probability of going on with `onward`.
 #[inline]
 pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
     if scene.lights.is_empty() {
@@ -44,7 +47,8 @@ pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, 
     light
 }
 
-/// Light straight from a light for some sets of lobes, each with the probability of trying its second strategy, which is not done here.
+/// Light straight from a light for some sets of lobes, each with the probability of trying its second strategy, which
+/// is not done here.
 #[inline]
 pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f32); 2]) -> Rgb {
     let draws = vertex.draws();
@@ -56,7 +60,8 @@ pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f3
     };
     let mut scattered = Rgb::ZERO;
     for (set, tries) in sets {
-        // Delta lobes scatter nothing towards a light sample, but they take their share of the directions drawn from the set.
+        // Delta lobes scatter nothing towards a light sample, but they take their share of the directions drawn from
+        // the set.
         if !set.has(LobeSet::SMOOTH) {
             continue;
         }

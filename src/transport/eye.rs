@@ -1,18 +1,22 @@
 //! Eye paths that gather photons: what one path of a pixel measures at every bandwidth level.
 //!
-//! Who carries which light, so that every path is counted once (X is the vertex where photons may be gathered, seen from the light):
+//! Who carries which light, so that every path is counted once (X is the vertex where photons may be gathered, seen
+//! from the light):
 //! - a light, then X: next-event estimation at X and its second strategy ([`direct_light`]), whatever the lobes of X;
-//! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself, which goes on;
-//! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find that light;
+//! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself,
+//!   which goes on;
+//! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find
+//!   that light;
 //! - another light, delta bounces only, then the sharp lobes of X: both, weighed ([`super::glint`]).
 //!
-//! Where only caustics are left to photons ([`Indirect::Paths`]), the eye path goes on with the broad lobes of X, too. Between its last broad bounce and a
-//! light there is then at least one vertex:
+//! Where only caustics are left to photons ([`Indirect::Paths`]), the eye path goes on with the broad lobes of X, too.
+//! Between its last broad bounce and a light there is then at least one vertex:
 //! - one that scatters the light broadly: next-event estimation there and its second strategy, the eye path;
-//! - narrow lobes alone: photons of caustics, at every vertex of the eye path, for its broad lobes. The eye path itself does not count such light.
+//! - narrow lobes alone: photons of caustics, at every vertex of the eye path, for its broad lobes. The eye path itself
+//!   does not count such light.
 //!
-//! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the surface behind as well
-//! ([`super::flight`]).
+//! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the
+//! surface behind as well ([`super::flight`]).
 
 use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
@@ -134,8 +138,8 @@ struct Gather<'a, B, K, const PATHS: bool> {
 }
 
 impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
-    /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with
-    /// which next-event estimation at the last vertex would have found it, `density` that of light paths that begin there.
+    /// Adds radiance that arrives from an emitter which the path has run into. `pdf_light` is the density with which
+    /// next-event estimation at the last vertex would have found it, `density` that of light paths that begin there.
     #[inline]
     fn run_into(
         &mut self,
@@ -177,7 +181,8 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         scattered.map_or(self.sight, |scattered| self.sight.then(Event::of(scattered.lobe, self.lobes)))
     }
 
-    /// The lobes that are lit at a vertex, broad ones and those that the path goes on with: all, but for classes that are switched off.
+    /// The lobes that are lit at a vertex, broad ones and those that the path goes on with: all, but for classes that
+    /// are switched off.
     #[inline]
     fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
         let on = |event: Event| self.classes.is_all() || self.classes.has(self.sight.then(event).lit(false));
@@ -239,8 +244,8 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         }
     }
 
-    /// Photons around the vertex: kernel density estimation, all levels of a kind from one query [post-reconstruction 2021, (2) and (3)]. The path goes on by the lobes
-    /// of `onward` with probability `going`.
+    /// Photons around the vertex: kernel density estimation, all levels of a kind from one query [post-reconstruction
+    /// 2021, (2) and (3)]. The path goes on by the lobes of `onward` with probability `going`.
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: LobeSet, going: f32) {
         // What a photon of a light without size makes of sharp lobes is in the same class.
@@ -324,7 +329,8 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     }
 }
 
-/// The photons around a vertex that its path meets, weighted where both have taken a wavelength. Out of the way of paths that have none.
+/// The photons around a vertex that its path meets, weighted where both have taken a wavelength. Out of the way of
+/// paths that have none.
 #[inline(never)]
 fn gather_dispersed(
     photons: &PhotonMap,
@@ -550,8 +556,8 @@ impl Eye<'_> {
         starts
     }
 
-    /// Traces one eye path and measures all levels of `bandwidths`, and of `volume` where media scatter, with `kernel`. `scratch` has served no other
-    /// photons.
+    /// Traces one eye path and measures all levels of `bandwidths`, and of `volume` where media scatter, with `kernel`.
+    /// `scratch` has served no other photons.
     #[inline]
     pub fn measure(
         &self,

@@ -1,13 +1,15 @@
 //! How walks take media: by chance, or by splitting.
 //!
-//! A walk by chance ([`Fly`]) draws where it is scattered and is there or goes past: paths as long as they come. A walk that splits
-//! ([`Split`]) shows its visitor one vertex in every medium on its way and goes on to the surface behind, attenuated. Such a vertex is measured,
-//! not scattered from; it suits eye paths that gather, for which a vertex in a medium is an end.
+//! A walk by chance ([`Fly`]) draws where it is scattered and is there or goes past: paths as long as they come. A walk
+//! that splits ([`Split`]) shows its visitor one vertex in every medium on its way and goes on to the surface behind,
+//! attenuated. Such a vertex is measured, not scattered from; it suits eye paths that gather, for which a vertex in a
+//! medium is an end.
 //!
-//! Such a vertex is drawn by how much of the ray is scattered where, as suits all light but that straight from a lamp nearby, which falls off with
-//! the distance squared. Where one is near there is a second vertex for that alone, drawn by the angle as seen from the lamp ([`Equiangular`]), and both share
-//! next-event estimation by the balance heuristic. They share its random numbers, too, so the lamp's point is the same for both. Given these numbers both
-//! densities are known, and the shares sum to one: nothing is biased, however lights are chosen.
+//! Such a vertex is drawn by how much of the ray is scattered where, as suits all light but that straight from a lamp
+//! nearby, which falls off with the distance squared. Where one is near there is a second vertex for that alone, drawn
+//! by the angle as seen from the lamp ([`Equiangular`]), and both share next-event estimation by the balance heuristic.
+//! They share its random numbers, too, so the lamp's point is the same for both. Given these numbers both densities are
+//! known, and the shares sum to one: nothing is biased, however lights are chosen.
 
 use super::direct::balance;
 use super::segment::{MediumArrival, Passage, Span, Through};
@@ -82,7 +84,8 @@ pub(super) struct Split<'a, V> {
 }
 
 impl<V> Split<'_, V> {
-    /// The way as seen from the point of a light to which next-event estimation goes, if that is near or shines on little of it.
+    /// The way as seen from the point of a light to which next-event estimation goes, if that is near or shines on
+    /// little of it.
     #[inline]
     fn lamp(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));

@@ -21,7 +21,8 @@ pub struct Scratch {
     pub(super) waiting: Waiting,
 }
 
-/// Photons that are waiting, copied as they are: it takes two stores, and their columns are had by shuffles when eight are together.
+/// Photons that are waiting, copied as they are: it takes two stores, and their columns are had by shuffles when eight
+/// are together.
 #[derive(Default)]
 pub(super) struct Waiting {
     photons: [Photon; 8],
@@ -72,7 +73,8 @@ pub(super) struct Batch<'a, 's, K> {
 }
 
 impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
-    /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else finds.
+    /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else
+    /// finds.
     #[inline]
     pub fn new(
         _: K,

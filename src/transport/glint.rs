@@ -1,15 +1,18 @@
-//! Light of lamps that have a size, sent by perfect mirrors and clear glass to the sharp lobes of a vertex X. Eye paths that go on find it, and so do photons: each
-//! well where the other does not. A bulb behind glass that a varnished door shows is met by one eye path in thousands, which then is a bright spot; the photons
-//! around X know of it. A sharp highlight is found by every other eye path and blurred by photons.
+//! Light of lamps that have a size, sent by perfect mirrors and clear glass to the sharp lobes of a vertex X. Eye paths
+//! that go on find it, and so do photons: each well where the other does not. A bulb behind glass that a varnished door
+//! shows is met by one eye path in thousands, which then is a bright spot; the photons around X know of it. A sharp
+//! highlight is found by every other eye path and blurred by photons.
 //!
-//! Both are weighed by the balance heuristic, as vertex merging and unidirectional sampling are \[Georgiev et al. 2012, (10)\]. An eye path goes from X along a direction with a density `pdf` per solid
-//! angle. Light paths leave the lamp along the same ray with a density e per area that faces it and per solid angle; as mirrors and clear glass keep the area times the solid angle
-//! of light, they come to X along it with `e cos` per area and solid angle. So within the squared radius r^2 of X there are, of n light paths,
+//! Both are weighed by the balance heuristic, as vertex merging and unidirectional sampling are \[Georgiev et al. 2012,
+//! (10)\]. An eye path goes from X along a direction with a density `pdf` per solid angle. Light paths leave the lamp
+//! along the same ray with a density e per area that faces it and per solid angle; as mirrors and clear glass keep the
+//! area times the solid angle of light, they come to X along it with `e cos` per area and solid angle. So within the
+//! squared radius r^2 of X there are, of n light paths,
 //!
 //! `n pi r^2 e cos / pdf`
 //!
-//! photons for every eye path. What one of them brings is bounded, however small r is. Weights need only be the same function of the whole path on either side: of e both know the leading power of two
-//! ([`PhotonFlags::density`]).
+//! photons for every eye path. What one of them brings is bounded, however small r is. Weights need only be the same
+//! function of the whole path on either side: of e both know the leading power of two ([`PhotonFlags::density`]).
 
 use super::bandwidths::{LevelRadii, MAX_LEVELS};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
@@ -18,7 +21,8 @@ use crate::math::{Rgb, Vec3};
 use crate::photon::{Kernel, Photon, PhotonFlags, PhotonMap};
 use std::f32::consts::PI;
 
-/// Share of the area in which other photons are gathered: merging is one of two strategies, and as small a kernel suffices.
+/// Share of the area in which other photons are gathered: merging is one of two strategies, and as small a kernel
+/// suffices.
 const AREA: f32 = 1.0 / 4.0;
 
 /// How many photons are merged at a vertex: `n pi r^2` by level.
@@ -56,7 +60,8 @@ impl Glints {
         self.here.count = 0;
     }
 
-    /// Photons of a map are merged at this vertex, from which the path goes on by `onward`, sharp lobes and delta ones, with a probability.
+    /// Photons of a map are merged at this vertex, from which the path goes on by `onward`, sharp lobes and delta ones,
+    /// with a probability.
     #[inline]
     pub fn merge<'s, K: Kernel>(
         &mut self,
@@ -135,7 +140,8 @@ impl<K: Kernel> Merging<'_, K> {
         self.reach2 = self.reach2.max(reach2);
     }
 
-    /// Adds a photon at a distance squared, if it is one of these. Returns what it would bring to the largest kernel from within, before it is divided by an area.
+    /// Adds a photon at a distance squared, if it is one of these. Returns what it would bring to the largest kernel
+    /// from within, before it is divided by an area.
     #[inline(always)]
     pub fn push(&mut self, photon: &Photon, distance2: f32) -> Rgb {
         if distance2 < self.reach2 && photon.flags.density() > 0.0 { self.add(photon, distance2) } else { Rgb::ZERO }
@@ -183,7 +189,8 @@ mod tests {
     const PATHS: u32 = 5000;
     const GOING: f32 = 0.6;
 
-    /// For the same path the weights of either strategy sum to one: at all bandwidths, seen from anywhere, of metal and varnish, with a bent shading normal.
+    /// For the same path the weights of either strategy sum to one: at all bandwidths, seen from anywhere, of metal and
+    /// varnish, with a bent shading normal.
     #[test]
     fn weights_sum_to_one() {
         let tables = EnergyTables::new([1.5], Coverings { coat: false, sheen: false });
@@ -271,7 +278,8 @@ mod tests {
         }
     }
 
-    /// Powers of two stay, others are rounded down, what is beyond the range is at its ends; no density is taken for none or for a delta light.
+    /// Powers of two stay, others are rounded down, what is beyond the range is at its ends; no density is taken for
+    /// none or for a delta light.
     #[test]
     fn densities_are_known_to_a_factor_of_two() {
         for exponent in -62..63 {

@@ -1,8 +1,8 @@
 //! What glows without a body: lamps that light passes as if they were not there, as area lamps of Cycles and Blender.
 //!
-//! Eye paths alone ask for them, on each of their segments: what they emit is added, and the path goes on to what is behind.
-//! Light paths start from them and next-event estimation samples them as any other lamp; shadow rays and light paths do
-//! not meet them. So all strategies see the same paths, with the same densities.
+//! Eye paths alone ask for them, on each of their segments: what they emit is added, and the path goes on to what is
+//! behind. Light paths start from them and next-event estimation samples them as any other lamp; shadow rays and light
+//! paths do not meet them. So all strategies see the same paths, with the same densities.
 
 use super::segment::{Between, Start, shadow_ray};
 use crate::geometry::Surface;
@@ -27,8 +27,8 @@ pub struct Glow {
     pub flight: Flight,
 }
 
-/// Calls `each` with every lamp without a body that a ray meets within `reach`, how far it is, what is left of its light and
-/// the densities of flight. Whether a medium scatters a walk on the way is not drawn: light comes attenuated.
+/// Calls `each` with every lamp without a body that a ray meets within `reach`, how far it is, what is left of its
+/// light and the densities of flight. Whether a medium scatters a walk on the way is not drawn: light comes attenuated.
 #[inline]
 pub(super) fn glows(
     scene: &Scene,

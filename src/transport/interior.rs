@@ -1,10 +1,10 @@
 //! Nested dielectrics: which solids a path is inside of.
 //!
 //! The rule: a path keeps the solids it has entered and not left. Where several overlap, the one of highest priority
-//! (`extras.caustique.priority`, 0 by default) fills the space, and among equals the one entered last. A surface is a boundary
-//! only if what fills the space differs on its two sides; otherwise, and where both sides are of one material, it is no bounce at all
-//! \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path that leaves a solid it never entered
-//! (the eye or a lamp was inside) is taken to have been in it.
+//! (`extras.caustique.priority`, 0 by default) fills the space, and among equals the one entered last. A surface is a
+//! boundary only if what fills the space differs on its two sides; otherwise, and where both sides are of one material,
+//! it is no bounce at all \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path that
+//! leaves a solid it never entered (the eye or a lamp was inside) is taken to have been in it.
 
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
@@ -243,7 +243,8 @@ impl Crossing {
         [self.before, self.after].into_iter().flatten().any(|m| scene.materials.list[m as usize].disperses())
     }
 
-    /// Index of refraction behind the surface (its back) over the one before it at a wavelength; `entering`: the path comes from its front.
+    /// Index of refraction behind the surface (its back) over the one before it at a wavelength; `entering`: the path
+    /// comes from its front.
     #[inline]
     pub fn eta(&self, scene: &Scene, entering: bool, wavelength: &Wavelength) -> f32 {
         let ior = |material: Option<u32>| match material.map(|m| &scene.materials.list[m as usize]) {

@@ -34,8 +34,8 @@ pub struct Lengths {
     pub eye_open: f64,
     /// The same of a light path.
     pub light_open: f64,
-    /// Vertices in media that scatter: of an eye path and of a light path that go on whatever the lobes, and of an eye path that ends at broad lobes and passes through media, looking
-    /// at points on its way.
+    /// Vertices in media that scatter: of an eye path and of a light path that go on whatever the lobes, and of an eye
+    /// path that ends at broad lobes and passes through media, looking at points on its way.
     pub eye_media: f64,
     /// The same of a light path.
     pub light_media: f64,
@@ -68,7 +68,8 @@ impl Located for Open {
     }
 }
 
-/// Counts vertices, those up to the first with broad lobes, and lists those that are no perfect mirrors or clear glass. `THROUGH`: goes straight through media.
+/// Counts vertices, those up to the first with broad lobes, and lists those that are no perfect mirrors or clear glass.
+/// `THROUGH`: goes straight through media.
 struct Count<'a, const THROUGH: bool> {
     scene: &'a Scene,
     all: u32,
@@ -88,7 +89,8 @@ impl<const THROUGH: bool> Count<'_, THROUGH> {
         Count { scene, all: 0, to_broad: 0, media: 0, media_to_broad: 0, textured: 0, open, narrow: true, length: 0.0 }
     }
 
-    /// Vertices, those up to the first with broad lobes, those that are listed, those in media and those of them up to the first with broad lobes, and those with textures.
+    /// Vertices, those up to the first with broad lobes, those that are listed, those in media and those of them up to
+    /// the first with broad lobes, and those with textures.
     fn counts(&self) -> [f64; 6] {
         [self.all, self.to_broad, self.open.len() as u32, self.media, self.media_to_broad, self.textured].map(f64::from)
     }
@@ -132,8 +134,8 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
 }
 
 impl Lengths {
-    /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which an eye path merges that is so long up to where
-    /// it first may.
+    /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which an eye path
+    /// merges that is so long up to where it first may.
     pub fn new(
         eye: &Eye<'_>,
         surroundings: &Surroundings,

@@ -90,7 +90,8 @@ impl<'a> LightPass<'a> {
         LightPass { streams, ..self }
     }
 
-    /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those of caustics, or with those alone.
+    /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those
+    /// of caustics, or with those alone.
     #[must_use]
     pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPass<'a> {
         LightPass { paths: if wanted.is_empty() { 0 } else { self.paths }, kinds: indirect.kinds(wanted), ..self }
@@ -183,7 +184,8 @@ pub struct Photons {
     pub volume: Vec<VolumePhoton>,
 }
 
-/// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or clear glass.
+/// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or
+/// clear glass.
 ///
 /// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is
 /// one among those that light everything: it goes on with a probability, their share of the density of its start, and
@@ -269,8 +271,8 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         if !self.arrives(scattered) {
             return Next::Stop;
         }
-        // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders of
-        // materials and dark texels.
+        // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders
+        // of materials and dark texels.
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
@@ -308,8 +310,8 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 }
 
-/// Traces light path `index` of the pass and appends its photons. Returns the component of the guide that made it, if it began at all, and how many vertices
-/// it had.
+/// Traces light path `index` of the pass and appends its photons. Returns the component of the guide that made it, if
+/// it began at all, and how many vertices it had.
 #[inline]
 pub fn light_path(
     scene: &Scene,
@@ -326,8 +328,9 @@ pub fn light_path(
     Some((emitted.cell, vertices))
 }
 
-/// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path would lose is the probability that
-/// it ends. So photons differ in number only, and their density alone tells where light varies \[CPPM 2020, 9.4\].
+/// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path
+/// would lose is the probability that it ends. So photons differ in number only, and their density alone tells where
+/// light varies \[CPPM 2020, 9.4\].
 #[derive(Clone, Copy, Debug)]
 pub struct EqualFlux {
     channel: usize,
@@ -351,7 +354,8 @@ impl EqualFlux {
         (flux > 0.0).then_some(EqualFlux { channel, flux: flux as f32 })
     }
 
-    /// Traces what light path `index` of the pass stands for: copies of it, as many as the common flux goes into its own on average.
+    /// Traces what light path `index` of the pass stands for: copies of it, as many as the common flux goes into its
+    /// own on average.
     pub fn light_path(
         &self,
         scene: &Scene,

@@ -1,26 +1,29 @@
 //! Multiple importance sampling of vertex connection and merging, accumulated along the walk.
 //!
-//! One function per equation of Georgiev, "Implementing Vertex Connection and Merging" (2012), numbers in brackets; it knows no scene. With
-//! the balance heuristic all partial sums are affine in `eta = pi r^2 n_VM / n_VC`, the one number that holds the merging radius. We
-//! keep the two coefficients apart and put `eta` in when a weight is evaluated, so the radius may differ by pixel, level and pass, and photons
-//! of one pass may be merged in the next. Since `dVM = dVC / eta` holds at the start and is kept by (34) to (36), one pair of coefficients
-//! serves both. [`Eta::NONE`] is bidirectional path tracing; [`Eta::MERGE_ONLY`] leaves merging as the only strategy.
+//! One function per equation of Georgiev, "Implementing Vertex Connection and Merging" (2012), numbers in brackets; it
+//! knows no scene. With the balance heuristic all partial sums are affine in `eta = pi r^2 n_VM / n_VC`, the one number
+//! that holds the merging radius. We keep the two coefficients apart and put `eta` in when a weight is evaluated, so
+//! the radius may differ by pixel, level and pass, and photons of one pass may be merged in the next. Since
+//! `dVM = dVC / eta` holds at the start and is kept by (34) to (36), one pair of coefficients serves both.
+//! [`Eta::NONE`] is bidirectional path tracing; [`Eta::MERGE_ONLY`] leaves merging as the only strategy.
 //!
-//! All photons merged at one vertex share the eye path up to there, and the balance heuristic counts them as if they did not. Given the eye path
-//! they are independent: with `X` what one of `n` light paths brings, `E[(sum X)^2] = n E[X^2] + n (n - 1) E[E[X | eye path]^2]`. `X` is nothing but
-//! where the light path lands in the disc, with probability `N / n`, so the second term is about `N` times the first, and those merges are
-//! worth `1 / (1 + N)` of what they are counted for: correlation-aware MIS \[Grittmann et al. 2021\]. Where all earlier vertices of the eye path are
-//! delta, other eye paths of the pixel come to the same disc, nothing varies with them, and a merge counts in full. So merges have two
-//! coefficients, [`Merges`]. Light paths know but one: behind each of their vertices but the last merged the eye path has a vertex that is not delta.
+//! All photons merged at one vertex share the eye path up to there, and the balance heuristic counts them as if they
+//! did not. Given the eye path they are independent: with `X` what one of `n` light paths brings,
+//! `E[(sum X)^2] = n E[X^2] + n (n - 1) E[E[X | eye path]^2]`. `X` is nothing but where the light path lands in the
+//! disc, with probability `N / n`, so the second term is about `N` times the first, and those merges are worth
+//! `1 / (1 + N)` of what they are counted for: correlation-aware MIS \[Grittmann et al. 2021\]. Where all earlier
+//! vertices of the eye path are delta, other eye paths of the pixel come to the same disc, nothing varies with them,
+//! and a merge counts in full. So merges have two coefficients, [`Merges`]. Light paths know but one: behind each of
+//! their vertices but the last merged the eye path has a vertex that is not delta.
 //!
-//! An eye path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at its last vertex must not
-//! count when it is: [`MisState::last`] keeps that term apart for one more vertex.
+//! An eye path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at
+//! its last vertex must not count when it is: [`MisState::last`] keeps that term apart for one more vertex.
 //!
-//! A vertex in a medium is one whose cosine is 1, whose densities are per volume, and where nothing is merged; flight through media
-//! multiplies the densities of both its ends ([`MisState::fly`]).
+//! A vertex in a medium is one whose cosine is 1, whose densities are per volume, and where nothing is merged; flight
+//! through media multiplies the densities of both its ends ([`MisState::fly`]).
 //!
-//! Roulette is left out of all densities: weights need only sum to one. Delta lobes count as if their forward and reverse densities
-//! were equal \[(53) to (55)\], which neglects n^2 ratios, the same for all strategies.
+//! Roulette is left out of all densities: weights need only sum to one. Delta lobes count as if their forward and
+//! reverse densities were equal \[(53) to (55)\], which neglects n^2 ratios, the same for all strategies.
 
 use crate::light::EmissionDensity;
 use crate::math::Vec2;
@@ -37,7 +40,8 @@ pub struct Eta {
     worth: Merges,
 }
 
-/// A number each for merges where all earlier vertices of the eye path are delta (`x`), and for those that share a path which might have gone elsewhere (`y`).
+/// A number each for merges where all earlier vertices of the eye path are delta (`x`), and for those that share a path
+/// which might have gone elsewhere (`y`).
 pub type Merges = Vec2;
 
 /// The merge of a vertex: `clear` says that all earlier vertices of the eye path are delta.
@@ -110,24 +114,24 @@ pub struct MisState {
 }
 
 impl MisState {
-    /// A light path's start \[(31), (32), (48) to (52)\]; next-event estimation is as probable as emission until [`MisState::received`] says otherwise.
-    /// A delta light cannot be run into.
+    /// A light path's start \[(31), (32), (48) to (52)\]; next-event estimation is as probable as emission until
+    /// [`MisState::received`] says otherwise. A delta light cannot be run into.
     #[inline]
     pub fn light(start: &EmissionDensity) -> MisState {
         let plain = if start.delta { 0.0 } else { start.cos / (start.start * start.onward) };
         MisState { d_vcm: 1.0 / start.onward, plain, ..MisState::default() }
     }
 
-    /// An eye path's start \[(31)\]: light paths that are connected to the camera for every eye path of a pixel, over the density per solid
-    /// angle of that eye path; 0 when the camera cannot be connected to.
+    /// An eye path's start \[(31)\]: light paths that are connected to the camera for every eye path of a pixel, over
+    /// the density per solid angle of that eye path; 0 when the camera cannot be connected to.
     #[inline]
     pub fn camera(light_paths: f32, camera_pdf_w: f32) -> MisState {
         let d_vcm = if camera_pdf_w > 0.0 { light_paths / camera_pdf_w } else { 0.0 };
         MisState { d_vcm, ..MisState::default() }
     }
 
-    /// Arrival at a vertex \[(31) to (33), the conversion of measures\]: distance squared (1 on the first segment of light from infinity) and the
-    /// cosine there, 1 in a medium.
+    /// Arrival at a vertex \[(31) to (33), the conversion of measures\]: distance squared (1 on the first segment of
+    /// light from infinity) and the cosine there, 1 in a medium.
     #[must_use]
     #[inline]
     pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
@@ -141,16 +145,17 @@ impl MisState {
         }
     }
 
-    /// At the first vertex: `chosen` is the probability that next-event estimation from there chooses the light over that of emission.
+    /// At the first vertex: `chosen` is the probability that next-event estimation from there chooses the light over
+    /// that of emission.
     #[must_use]
     #[inline]
     pub fn received(self, chosen: f32) -> MisState {
         MisState { d_vcm: self.d_vcm * chosen, ..self }
     }
 
-    /// Flight through media to where the path has arrived: densities per length, or probabilities, that all it takes besides direction has in
-    /// both ways. They belong to the densities per area (per volume) of the vertices at both ends \[Georgiev (2), with the flight's factor as in Lafortune
-    /// and Willems 1996\].
+    /// Flight through media to where the path has arrived: densities per length, or probabilities, that all it takes
+    /// besides direction has in both ways. They belong to the densities per area (per volume) of the vertices at both
+    /// ends \[Georgiev (2), with the flight's factor as in Lafortune and Willems 1996\].
     #[must_use]
     #[inline]
     pub fn fly(self, flight: Flight) -> MisState {
@@ -163,8 +168,8 @@ impl MisState {
         }
     }
 
-    /// Departure by a lobe that is not delta \[(34), (35)\]: cosine, and densities per solid angle of the direction and of its reverse.
-    /// `merges`: the [`one_merge`] of this vertex, or none.
+    /// Departure by a lobe that is not delta \[(34), (35)\]: cosine, and densities per solid angle of the direction and
+    /// of its reverse. `merges`: the [`one_merge`] of this vertex, or none.
     #[must_use]
     #[inline]
     pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: Merges) -> MisState {
@@ -184,8 +189,8 @@ impl MisState {
         MisState { d_vcm: 0.0, plain: self.plain * cos, merged: (self.merged + self.last) * cos, last: Vec2::ZERO }
     }
 
-    /// Densities of all strategies that end this side earlier, over that of ending here; `reverse_pdf_w` is the density of scattering back
-    /// along the path.
+    /// Densities of all strategies that end this side earlier, over that of ending here; `reverse_pdf_w` is the density
+    /// of scattering back along the path.
     #[inline]
     fn earlier(&self, reverse_pdf_w: f32) -> Side {
         Side { plain: self.d_vcm + self.plain * reverse_pdf_w, merged: (self.merged + self.last) * reverse_pdf_w }
@@ -199,7 +204,8 @@ struct Side {
     merged: Merges,
 }
 
-/// An eye path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is never merged.
+/// An eye path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is
+/// never merged.
 #[inline]
 pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
     let emission = light.start * light.onward;
@@ -209,9 +215,10 @@ pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
 
 /// Next-event estimation \[(44), (45)\].
 ///
-/// `pdf_w`, `reverse_pdf_w`: densities at the eye vertex of the direction to the light and back; `light_pdf_w`: that of next-event
-/// estimation (the choice of the light included); `arrival_pdf_a`: of emission from the light's point per area of the eye vertex, the choice of the light over that of next-event estimation included. A delta light
-/// cannot be run into. Direct light is never merged.
+/// `pdf_w`, `reverse_pdf_w`: densities at the eye vertex of the direction to the light and back; `light_pdf_w`: that of
+/// next-event estimation (the choice of the light included); `arrival_pdf_a`: of emission from the light's point per
+/// area of the eye vertex, the choice of the light over that of next-event estimation included. A delta light cannot be
+/// run into. Direct light is never merged.
 #[inline]
 pub fn next_event(
     eye: &MisState,
@@ -224,8 +231,9 @@ pub fn next_event(
     Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: eye.merged * arrival_pdf_a, own: Vec2::ZERO }
 }
 
-/// A light vertex connected to the camera \[(46), (47)\]: density of an eye path's arrival per area there, over the number of light paths
-/// connected; density of scattering back along the light path. What the camera sees directly is not merged.
+/// A light vertex connected to the camera \[(46), (47)\]: density of an eye path's arrival per area there, over the
+/// number of light paths connected; density of scattering back along the light path. What the camera sees directly is
+/// not merged.
 #[inline]
 pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
     let light = light.earlier(reverse_pdf_w);
@@ -257,8 +265,8 @@ pub fn connect(light: &End<'_>, eye: &End<'_>) -> Ratios {
     }
 }
 
-/// A light vertex merged into an eye vertex \[(38), (39)\]: densities there of scattering towards the photon's past and towards the eye, and the
-/// vertex's [`one_merge`]. For [`Ratios::merge_weight`].
+/// A light vertex merged into an eye vertex \[(38), (39)\]: densities there of scattering towards the photon's past and
+/// towards the eye, and the vertex's [`one_merge`]. For [`Ratios::merge_weight`].
 #[inline]
 pub fn merge(light: &MisState, eye: &MisState, pdf_w: f32, reverse_pdf_w: f32, own: Merges) -> Ratios {
     let (l, e) = (light.earlier(pdf_w), eye.earlier(reverse_pdf_w));

@@ -1,7 +1,7 @@
 //! Unidirectional path tracing with next-event estimation: the independent oracle.
 //!
-//! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of a vertex at once
-//! (`direct_light` splits them), so that the two check each other.
+//! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of
+//! a vertex at once (`direct_light` splits them), so that the two check each other.
 
 use super::bidirectional::{Record, Technique};
 use super::bidirectional_eye::{look, look_in_medium};
@@ -95,8 +95,9 @@ impl<R: Record> PathTracer<'_, R> {
 }
 
 impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
-    /// What ends early has to be made up for by what goes on with a larger weight. Roulette from the first bounce on saves
-    /// nearly half of the time, but doubles squared errors and more; a quarter is about where paths are worth their time.
+    /// What ends early has to be made up for by what goes on with a larger weight. Roulette from the first bounce on
+    /// saves nearly half of the time, but doubles squared errors and more; a quarter is about where paths are worth
+    /// their time.
     const SPARED: f32 = 0.25;
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {

@@ -101,7 +101,8 @@ pub(super) fn merge_photons<R: Record>(
         let meets = vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.meets(photon.band));
         let Some(weight) = meets else { return };
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);
-        // Photons measure irradiance on the geometric surface where they are, see `Shading::gather`: the cosine in f belongs to a direction, not to them.
+        // Photons measure irradiance on the geometric surface where they are, see `Shading::gather`: the cosine in f
+        // belongs to a direction, not to them.
         let cosine = photon.wi.dot(photon.ng).abs();
         let value = vertex.throughput * f * photon.flux * weight / cosine;
         if cosine <= 0.0 || !is_lit(value) {

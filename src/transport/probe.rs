@@ -84,7 +84,8 @@ impl Eye<'_> {
 }
 
 impl Eye<'_> {
-    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind, if there is one.
+    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind,
+    /// if there is one.
     pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindVolumePoint { found: None, length: 0.0 };
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);

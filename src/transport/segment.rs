@@ -1,4 +1,5 @@
-//! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not scatter.
+//! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not
+//! scatter.
 
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
@@ -104,7 +105,8 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// What a vertex in here shows as a first hit: the object that holds the medium, or what lies behind a medium that fills the scene.
+    /// What a vertex in here shows as a first hit: the object that holds the medium, or what lies behind a medium that
+    /// fills the scene.
     pub fn first_hit(&self, scene: &Scene, p: Vec3) -> Option<FirstHit> {
         match self.interior.host(scene) {
             Some(instance) => Some(FirstHit { p, instance }),
@@ -162,7 +164,8 @@ fn pass(through: &mut impl Through, span: &Span) -> Passage {
 enum Boundary {
     /// Nothing: go on behind it with this tint and interior.
     None(Rgb, Interior),
-    /// A scattering surface: index of refraction behind it over before it, and what is on its sides if it bounds a solid.
+    /// A scattering surface: index of refraction behind it over before it, and what is on its sides if it bounds a
+    /// solid.
     Scattering(f32, Option<Crossing>),
 }
 
@@ -327,7 +330,8 @@ pub struct Between {
     pub in_medium: [bool; 2],
 }
 
-/// What is left of light between two points (zero if anything scatters there, else absorption and tints), and the densities of flight.
+/// What is left of light between two points (zero if anything scatters there, else absorption and tints), and the
+/// densities of flight.
 #[inline]
 pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;

@@ -1,10 +1,12 @@
 //! Light that techniques find for all lobes of a vertex at once, told apart by class.
 //!
-//! A vertex that has both broad and sharp lobes makes different things of the same light. What each makes of it is known, so their shares are exact. Where both
-//! are in one part of the picture and no class is switched off, nobody asks, and it costs nothing.
+//! A vertex that has both broad and sharp lobes makes different things of the same light. What each makes of it is
+//! known, so their shares are exact. Where both are in one part of the picture and no class is switched off, nobody
+//! asks, and it costs nothing.
 //!
-//! A path drawn from all lobes of a vertex at once goes on as if by the lobe that drew it. That shares out light that it runs into in proportion to
-//! densities, not to the lobes' own values, which nearly agree: the sum of the classes is exact.
+//! A path drawn from all lobes of a vertex at once goes on as if by the lobe that drew it. That shares out light that
+//! it runs into in proportion to densities, not to the lobes' own values, which nearly agree: the sum of the classes is
+//! exact.
 
 use super::light_vertex::LightVertex;
 use super::site::ScatterPoint;
@@ -54,7 +56,8 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
     }
 }
 
-/// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones first.
+/// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones
+/// first.
 #[inline]
 fn classes<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
@@ -139,7 +142,8 @@ impl<'v, S: ScatterPoint> Merged<'v, S> {
     }
 }
 
-/// The same for light that a light path's vertex sends along `-d`, of which its lobes scatter `f_light`, to one from where it is along `d`.
+/// The same for light that a light path's vertex sends along `-d`, of which its lobes scatter `f_light`, to one from
+/// where it is along `d`.
 #[inline]
 pub(super) fn connected<S: ScatterPoint>(
     vertex: &S,

@@ -13,7 +13,8 @@ use crate::scene::Scene;
 use crate::scene::contact::Place;
 use crate::spectrum::Wavelength;
 
-/// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is broad.
+/// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is
+/// broad.
 pub trait ScatterPoint {
     /// Whether it is in a medium.
     const IN_MEDIUM: bool;
@@ -92,8 +93,8 @@ pub trait ScatterPoint {
     }
 }
 
-/// The normal on the side that a surface seen from `wo` is lit from; zero if it is from both, or if the surface may send most of what it gets along itself
-/// to the eye.
+/// The normal on the side that a surface seen from `wo` is lit from; zero if it is from both, or if the surface may
+/// send most of what it gets along itself to the eye.
 #[inline]
 pub fn lit_side(shading: &Shading<'_>, ng: Vec3, wo: Vec3) -> Vec3 {
     if shading.bsdf.transmits() || shading.bsdf.lobes().has(LobeSet::SHARP) {

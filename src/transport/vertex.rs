@@ -63,7 +63,8 @@ pub struct MediumVertex {
     pub met: MediumArrival,
     /// Unit direction back along the path.
     pub wo: Vec3,
-    /// Weight of the path up to here, the scattering coefficient included: what is left is to multiply by the phase function.
+    /// Weight of the path up to here, the scattering coefficient included: what is left is to multiply by the phase
+    /// function.
     pub throughput: Rgb,
     /// The same without the scattering coefficient: radiance that arrives, or flux times length for light paths.
     pub arriving: Rgb,
@@ -109,8 +110,8 @@ impl MediumVertex {
 pub struct Scattered {
     /// Class of the lobe.
     pub lobe: LobeSet,
-    /// Density per solid angle of the direction, times the probability that the path went on and was not scattered by a medium on its way; for a
-    /// delta lobe meaningless.
+    /// Density per solid angle of the direction, times the probability that the path went on and was not scattered by a
+    /// medium on its way; for a delta lobe meaningless.
     pub pdf_w: f32,
 }
 
@@ -144,7 +145,8 @@ pub trait Visitor<'a> {
         let _ = (vertex, scattered);
         Next::Stop
     }
-    /// A second vertex in the same medium, of a walk that splits, at which nothing but its share of next-event estimation is to be measured.
+    /// A second vertex in the same medium, of a walk that splits, at which nothing but its share of next-event
+    /// estimation is to be measured.
     #[inline]
     fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
         let _ = (vertex, scattered);
@@ -159,7 +161,8 @@ pub trait Visitor<'a> {
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
         let _ = (vertex, sample);
     }
-    /// The path leaves the scene along `direction` with weight `throughput`; `flight`: densities of its way to infinity.
+    /// The path leaves the scene along `direction` with weight `throughput`; `flight`: densities of its way to
+    /// infinity.
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {
         let _ = (direction, throughput, scattered, flight);
     }

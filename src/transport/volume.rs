@@ -1,8 +1,9 @@
 //! Photons gathered in media.
 //!
-//! A photon carries flux times length, so the photons of a ball over its volume are the fluence there; what the medium makes of it, its scattering
-//! coefficient and phase function, the eye path's vertex knows \[Jensen and Christensen 1998, "Efficient simulation of light transport in scenes with
-//! participating media using photon maps", (10), with the coefficient taken out of the photon\].
+//! A photon carries flux times length, so the photons of a ball over its volume are the fluence there; what the medium
+//! makes of it, its scattering coefficient and phase function, the eye path's vertex knows \[Jensen and Christensen
+//! 1998, "Efficient simulation of light transport in scenes with participating media using photon maps", (10), with the
+//! coefficient taken out of the photon\].
 
 use super::bandwidths::MAX_LEVELS;
 use super::vertex::MediumVertex;
@@ -37,8 +38,8 @@ impl<'a> Volume<'a> {
         &self.radius2[..self.count]
     }
 
-    /// Radiance that photons in `medium` of at most `longest` segments scatter at `vertex`, all levels from one query: kernel density estimation over
-    /// balls, the box kernel being `3 / (4 pi r^3)`.
+    /// Radiance that photons in `medium` of at most `longest` segments scatter at `vertex`, all levels from one query:
+    /// kernel density estimation over balls, the box kernel being `3 / (4 pi r^3)`.
     #[inline]
     pub(super) fn gather<K: Kernel>(
         &self,
@@ -134,9 +135,10 @@ mod tests {
         }
     }
 
-    /// Largest deviation over levels and lengths, in standard errors, from what an even field gives: unit flux times length spread evenly over the
-    /// unit cube and over all directions is fluence 1, of which a normalised phase function sends 1 / (4 pi) everywhere, whatever the bandwidth and
-    /// the order of levels. `roughness` is the integral of the squared kernel over that of the box.
+    /// Largest deviation over levels and lengths, in standard errors, from what an even field gives: unit flux times
+    /// length spread evenly over the unit cube and over all directions is fluence 1, of which a normalised phase
+    /// function sends 1 / (4 pi) everywhere, whatever the bandwidth and the order of levels. `roughness` is the
+    /// integral of the squared kernel over that of the box.
     fn deviation<K: Kernel>(map: &PhotonMap<VolumePhoton>, kernel: K, roughness: f32) -> f32 {
         let radii = [0.4f32, 0.1, 0.2, 0.15, 0.3];
         let volume = Volume::new(map, radii.into_iter());
@@ -147,7 +149,8 @@ mod tests {
             let share = 0.5 * (longest - 1) as f32;
             for (found, radius) in found.into_iter().zip(radii) {
                 let ball = 4.0 / 3.0 * std::f32::consts::PI * radius.powi(3);
-                // Weights by the phase function with g = 0.3 vary: their mean square is (1 + g^2) / (1 - g^2)^2 in units of the mean.
+                // Weights by the phase function with g = 0.3 vary: their mean square is (1 + g^2) / (1 - g^2)^2 in
+                // units of the mean.
                 let error = (1.32 * roughness / (PHOTONS as f32 * ball * share)).sqrt();
                 let ratio = found * 4.0 * std::f32::consts::PI / (share * vertex().throughput);
                 worst = worst.max((ratio - Rgb::ONE).abs().max_element() / error);

@@ -1,5 +1,5 @@
-//! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm is a
-//! [`Visitor`].
+//! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm
+//! is a [`Visitor`].
 
 use super::flight::{Fly, Split};
 use super::glow::{Glow, glows};
@@ -40,8 +40,8 @@ pub struct PathStart {
     pub hue: WavelengthSample,
 }
 
-/// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond the scene is
-/// made in `arena`, which may be reset when none of them is left.
+/// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond
+/// the scene is made in `arena`, which may be reset when none of them is left.
 #[inline]
 pub fn walk<'a, V: Visitor<'a>>(
     scene: &'a Scene,
@@ -64,7 +64,8 @@ pub fn walk<'a, V: Visitor<'a>>(
     }
 }
 
-/// What a scene has besides surfaces, each with all before it: nothing, media that absorb, media that scatter, solids that refract colours differently.
+/// What a scene has besides surfaces, each with all before it: nothing, media that absorb, media that scatter, solids
+/// that refract colours differently.
 const NOTHING: u8 = 0;
 const ABSORPTION: u8 = 1;
 const SCATTERING: u8 = 2;
@@ -353,8 +354,8 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Shows a visitor the lamps without a body on a segment that has ended somewhere, which began in a medium or not with some
-/// weight and is the last of so many.
+/// Shows a visitor the lamps without a body on a segment that has ended somewhere, which began in a medium or not with
+/// some weight and is the last of so many.
 #[cold]
 #[inline(never)]
 fn show_glows<'a, V: Visitor<'a>>(

@@ -1,6 +1,8 @@
-//! The chi-squared rule on its own: how often it rejects uniform photons, at how many of them and over how many looks, and what it costs.
+//! The chi-squared rule on its own: how often it rejects uniform photons, at how many of them and over how many looks,
+//! and what it costs.
 //!
-//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`; the last line is JSON for `scripts/figures`. With scenes named, only what the rule costs there.
+//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`; the last line is JSON for `scripts/figures`.
+//! With scenes named, only what the rule costs there.
 
 use caustique::camera::Camera;
 use caustique::estimator::rule::CountingRule;
@@ -192,8 +194,8 @@ impl Steps {
         sorted(self.all[which].iter().copied())[self.all[which].len() / 2]
     }
 
-    /// What the second adds to an iteration of the first, in percent, with its interval of 95 %: the median of paired differences of eye passes, for the
-    /// rest is the same work, and by order statistics where it may be.
+    /// What the second adds to an iteration of the first, in percent, with its interval of 95 %: the median of paired
+    /// differences of eye passes, for the rest is the same work, and by order statistics where it may be.
     fn difference_percent(&self) -> [f64; 3] {
         let differences = sorted(self.eye[0].iter().zip(&self.eye[1]).map(|(first, second)| second - first));
         let middle = differences.len() as f64 / 2.0;

@@ -1,4 +1,5 @@
-//! What an iteration costs, and what levels and the second eye path add: variants interleaved in one run, core-seconds per phase.
+//! What an iteration costs, and what levels and the second eye path add: variants interleaved in one run, core-seconds
+//! per phase.
 //!
 //! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/figures`.
 

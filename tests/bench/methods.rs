@@ -1,5 +1,6 @@
-//! What methods cost: processor seconds of an iteration at 512 x 512 and of a million light and eye paths, in a Cornell box with a mirror
-//! sphere, and of path tracing in one where all is diffuse. The last line is JSON for `scripts/figures`.
+//! What methods cost: processor seconds of an iteration at 512 x 512 and of a million light and eye paths, in a Cornell
+//! box with a mirror sphere, and of path tracing in one where all is diffuse. The last line is JSON for
+//! `scripts/figures`.
 
 #[path = "../support/mod.rs"]
 mod support;
@@ -140,7 +141,8 @@ fn main() {
             _ => {}
         }
     }
-    // What keeping a pass's light vertices until its eye paths merge them would take, beside the photons that wait for the next pass.
+    // What keeping a pass's light vertices until its eye paths merge them would take, beside the photons that wait for
+    // the next pass.
     let mib = |count: u64, size: usize| count as f64 * size as f64 / f64::from(1 << 20);
     let (kept, whole) = (mib(photons[1], size_of::<MergePhoton>()), mib(photons[0], size_of::<LightVertex>()));
     println!("\nmemory of vcm: {} photons of {} bytes, {kept:.0} MiB;", photons[1], size_of::<MergePhoton>());

@@ -1,5 +1,6 @@
-//! Which structure serves range queries best: our implicit tree against a hash grid and a kd-tree, on photons as scenes leave them
-//! (a plane, a caustic in a room, a focus), with bandwidths that spread a hundredfold. All in one run, interleaved; ratios count.
+//! Which structure serves range queries best: our implicit tree against a hash grid and a kd-tree, on photons as scenes
+//! leave them (a plane, a caustic in a room, a focus), with bandwidths that spread a hundredfold. All in one run,
+//! interleaved; ratios count.
 
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
@@ -39,7 +40,8 @@ fn distribution(name: &str, i: u64) -> Vec3 {
     }
 }
 
-/// Counting-sorted hash grid with cells of twice the radius it is made for; coordinates are checked, so nothing counts twice.
+/// Counting-sorted hash grid with cells of twice the radius it is made for; coordinates are checked, so nothing counts
+/// twice.
 struct Grid {
     cell: f32,
     mask: u32,

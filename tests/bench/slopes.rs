@@ -1,9 +1,11 @@
-//! Bias and variance against iterations on fields of photons in closed form: the memoryless rule beside its exact finite sums, by SPPM and where merging alone finds light by VCM,
-//! and CPPM whose test always rejects.
+//! Bias and variance against iterations on fields of photons in closed form: the memoryless rule beside its exact
+//! finite sums, by SPPM and where merging alone finds light by VCM, and CPPM whose test always rejects.
 //!
-//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`, or `-- MEASURED.json PLOT.svg`, which draws what has been measured; every line of stdout is a JSON object: a rule, and per number of iterations the share of the first bandwidth's bias,
-//! the variance and the mean squared error (mean over pixels, over the squared truth), each with its standard error, and what is expected. Given the bandwidths, which
-//! earlier photons decide, an iteration's expectation is known: `bias_given` is the mean of these, the bias without the photons' noise.
+//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`, or `-- MEASURED.json PLOT.svg`, which draws what
+//! has been measured; every line of stdout is a JSON object: a rule, and per number of iterations the share of the
+//! first bandwidth's bias, the variance and the mean squared error (mean over pixels, over the squared truth), each
+//! with its standard error, and what is expected. Given the bandwidths, which earlier photons decide, an iteration's
+//! expectation is known: `bias_given` is the mean of these, the bias without the photons' noise.
 
 #[path = "../support/field.rs"]
 mod field;
@@ -74,7 +76,8 @@ struct Moment {
     estimates: Vec<f64>,
     /// Their expectations, given the bandwidths.
     given: Vec<f64>,
-    /// Mean over pixels of the sum over iterations of squared deviations from their expectation, over the squared number of iterations and the squared truth.
+    /// Mean over pixels of the sum over iterations of squared deviations from their expectation, over the squared
+    /// number of iterations and the squared truth.
     sum: f64,
 }
 
@@ -154,7 +157,8 @@ fn main() {
     }
 }
 
-/// What is measured with its standard errors, the finite sums (lines) and the asymptotes (dashed): Knaus and Zwicker's figure.
+/// What is measured with its standard errors, the finite sums (lines) and the asymptotes (dashed): Knaus and Zwicker's
+/// figure.
 fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
     let root = SVGBackend::new(file, (1000, 460)).into_drawing_area();
     root.fill(&WHITE)?;

@@ -124,8 +124,8 @@ fn the_report_of_a_small_comparison() {
     assert!(csv.starts_with(header) && !csv.contains("NaN") && !page.contains("NaN") && !page.contains("inf "));
 }
 
-/// Turns change nothing: after as many iterations the picture is the one that `render` makes, finished or not; and a reference that was made tells its
-/// error when it is read again.
+/// Turns change nothing: after as many iterations the picture is the one that `render` makes, finished or not; and a
+/// reference that was made tells its error when it is read again.
 #[test]
 fn pictures_are_those_of_render_and_references_know_their_error() {
     let folder = Folder::new();

@@ -120,8 +120,8 @@ fn the_header_has_the_plan_and_the_phases() {
     assert!((sum - total).abs() < 0.1, "{sum} of {total}");
 }
 
-/// Every method writes its own layers: levels and bandwidths where it has them, parts that sum to its image, and a plan that says what it
-/// cannot find.
+/// Every method writes its own layers: levels and bandwidths where it has them, parts that sum to its image, and a plan
+/// that says what it cannot find.
 #[test]
 fn every_method_leaves_what_it_has() {
     let folder = Folder::new();
@@ -175,8 +175,8 @@ fn every_method_leaves_what_it_has() {
     );
 }
 
-/// The pictures per technique are where and what they should be: weighted ones sum to the method's own image, and each is at most what is
-/// found without weights.
+/// The pictures per technique are where and what they should be: weighted ones sum to the method's own image, and each
+/// is at most what is found without weights.
 #[test]
 fn a_picture_per_technique() {
     let folder = Folder::new();
@@ -350,7 +350,8 @@ fn levels_layers_names_and_bandwidths_as_asked() {
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
 }
 
-/// Photons in media have bandwidths of their own, whose balls double from level to level; methods that gather none there have none.
+/// Photons in media have bandwidths of their own, whose balls double from level to level; methods that gather none
+/// there have none.
 #[test]
 fn media_add_layers_of_their_own() {
     let folder = Folder::new();

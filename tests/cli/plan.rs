@@ -62,7 +62,8 @@ fn the_plan_as_json() {
     assert_eq!(plan["warnings"], json!(["--effects -environment: left out, though called for by the environment"]));
 }
 
-/// A render without an effect is the render of a scene that never had it, to the last bit; its header tells what was left out.
+/// A render without an effect is the render of a scene that never had it, to the last bit; its header tells what was
+/// left out.
 #[test]
 fn an_effect_switched_off_is_as_if_it_were_not_there() {
     let folder = Folder::new();
@@ -81,7 +82,8 @@ fn an_effect_switched_off_is_as_if_it_were_not_there() {
     );
 }
 
-/// Classes of light paths that are switched off are named, and their layers are not there; the others are what they were.
+/// Classes of light paths that are switched off are named, and their layers are not there; the others are what they
+/// were.
 #[test]
 fn classes_of_light_paths_are_left_out() {
     let folder = Folder::new();
@@ -117,7 +119,8 @@ fn classes_of_light_paths_are_left_out() {
     assert_eq!(asked.code, Some(2), "{}", asked.stderr);
 }
 
-/// The header of a render holds the plan that `plan` prints for the same options, with what a pilot has measured and all warnings; shards have the same.
+/// The header of a render holds the plan that `plan` prints for the same options, with what a pilot has measured and
+/// all warnings; shards have the same.
 #[test]
 fn the_header_has_the_same_plan() {
     let folder = Folder::new();

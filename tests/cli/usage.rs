@@ -472,7 +472,8 @@ fn missing_libraries() {
     assert!(unwell.stdout.ends_with(&text), "{}", unwell.stdout);
 }
 
-/// Methods that gather photons on surfaces alone, or those of caustics alone, would show no light that media scatter, or some of it: they refuse, before any work is done.
+/// Methods that gather photons on surfaces alone, or those of caustics alone, would show no light that media scatter,
+/// or some of it: they refuse, before any work is done.
 #[test]
 fn scattering_media_and_the_methods_that_refuse_them() {
     let folder = Folder::new();

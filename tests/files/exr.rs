@@ -346,7 +346,8 @@ fn malformed_files_are_errors() {
     assert!(failed > 300 && read > 100, "{failed} failed, {read} read: the mutants test nothing");
 }
 
-/// The decoder allocates what a DWA chunk says of its sections: a number among them that is too large must stop the reader before.
+/// The decoder allocates what a DWA chunk says of its sections: a number among them that is too large must stop the
+/// reader before.
 #[test]
 fn dwa_sections_larger_than_their_block_are_an_error() {
     use ::exr::prelude::*;

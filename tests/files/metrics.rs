@@ -1,4 +1,5 @@
-//! Error metrics against closed forms and against the reference implementation of FLIP; tone curves against published values.
+//! Error metrics against closed forms and against the reference implementation of FLIP; tone curves against published
+//! values.
 
 use caustique::film::{Layer, LayerSet};
 use caustique::image::tonemap::{ToneMap, srgb_decode};
@@ -11,7 +12,8 @@ const HEIGHT: usize = 64;
 /// Edges in every direction and a bright square, then noise on each channel; `scale` is 1 for HDR and 1/2 for LDR.
 ///
 /// The expected FLIP values come from the authors' implementation, PyPI flip-evaluator 1.7, on the same pixels:
-/// `flip_evaluator.evaluate(reference, test, "HDR", inputsRGB=False, applyMagma=False)`, and `"LDR"` on halved and clipped ones.
+/// `flip_evaluator.evaluate(reference, test, "HDR", inputsRGB=False, applyMagma=False)`, and `"LDR"` on halved and
+/// clipped ones.
 fn fixture(scale: f32) -> (Vec<Rgb>, Vec<Rgb>) {
     let (mut reference, mut test) = (Vec::new(), Vec::new());
     for y in 0..HEIGHT {
@@ -105,7 +107,8 @@ fn trimming_leaves_out_the_worst_thousandth() {
     assert!(result.relmse > 1e4);
 }
 
-/// White noise of variance 1 with mean 0: the sum of four uniform numbers of SplitMix64, less its mean, times the root of three.
+/// White noise of variance 1 with mean 0: the sum of four uniform numbers of SplitMix64, less its mean, times the root
+/// of three.
 fn white(i: usize, channel: usize) -> f32 {
     let uniform = |k: usize| {
         let mut z = (((i * 3 + channel) * 4 + k) as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -125,7 +128,8 @@ fn grain_in_closed_form() {
     // An offset is no grain, up to the rounding of its blur; a ramp is none but at the rim.
     assert!(grain(&|_| [1.5, 2.25, 2.0]) < 1e-25);
     assert!(grain(&|i| [1.0 + (i % width) as f32 * 0.25, 2.0, 3.0]) < 0.25 / 4.01 / 3.0 * 2.0 / width as f64);
-    // White noise: a share 1 - 1/n of its variance is left where n pixels are averaged. 90,000 numbers: five standard errors are 2.4 %.
+    // White noise: a share 1 - 1/n of its variance is left where n pixels are averaged. 90,000 numbers: five standard
+    // errors are 2.4 %.
     let noisy = |i: usize| [0, 1, 2].map(|c| 1.0 + c as f32 + 0.1 * white(i, c));
     let (rim, corners) = ((2 * (width + height) - 8) as f64, 4.0);
     let inside = (width * height) as f64 - rim - corners;

@@ -1,7 +1,8 @@
-//! Two methods that share little must agree: photons against path tracing, tile by tile, on scenes that path tracing can do.
+//! Two methods that share little must agree: photons against path tracing, tile by tile, on scenes that path tracing
+//! can do.
 //!
-//! Standard errors come from independent passes (photons correlate pixels); the family-wise error rate is 0.1 % a scene (Sidak over tiles). A planted bug,
-//! one tile brighter by a stated share, must be rejected.
+//! Standard errors come from independent passes (photons correlate pixels); the family-wise error rate is 0.1 % a scene
+//! (Sidak over tiles). A planted bug, one tile brighter by a stated share, must be rejected.
 
 use crate::support;
 
@@ -93,7 +94,8 @@ fn glossy_room() {
     }
 }
 
-/// A lamp behind glass, seen in varnished walls and sharp metal: found by eye paths that go on, which here are enough, and by photons.
+/// A lamp behind glass, seen in varnished walls and sharp metal: found by eye paths that go on, which here are enough,
+/// and by photons.
 #[test]
 fn lamp_behind_glass_in_a_varnished_room() {
     let varnish = Material { base_color: [0.5, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.35, ..Material::default() };

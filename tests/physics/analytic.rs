@@ -1,9 +1,10 @@
 //! Closed forms: what the estimators must give, known without rendering.
 //!
-//! Every check is a t test over independent seeds at a family-wise error rate of 0.1 % for the file (Sidak over [`TESTS`] checks), plus the
-//! stated bias of the closed form itself. Each check is also shown to have power: it rejects the same expectation shifted by
-//! [`Check::detects`], which is smaller than what the bugs it guards against would do (a Fresnel factor forgotten, an eta squared
-//! in the wrong direction, direct light counted twice, a photon left out).
+//! Every check is a t test over independent seeds at a family-wise error rate of 0.1 % for the file (Sidak over
+//! [`TESTS`] checks), plus the stated bias of the closed form itself. Each check is also shown to have power: it
+//! rejects the same expectation shifted by [`Check::detects`], which is smaller than what the bugs it guards against
+//! would do (a Fresnel factor forgotten, an eta squared in the wrong direction, direct light counted twice, a photon
+//! left out).
 
 use crate::support;
 
@@ -126,7 +127,8 @@ fn point_light_over_a_plane() {
     check.run(TESTS, "point light, paths", &by_paths(&scene, 4, 4, 4));
 }
 
-/// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2, for every strategy of direct light.
+/// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2, for every strategy of direct
+/// light.
 #[test]
 fn sphere_light_over_a_plane() {
     let (rho, radiance, radius, height) = (0.5, 4.0, 0.5, 1.0);
@@ -161,7 +163,8 @@ fn point_light_beside_a_mirror() {
     check.run(TESTS, "mirror", &by_photons(&scene, &settings(4, 100_000, 0.1), 4, 24)[4]);
 }
 
-/// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab (specular-diffuse-specular).
+/// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab
+/// (specular-diffuse-specular).
 #[test]
 fn sun_through_a_slab_seen_directly_and_through_a_slab() {
     let (rho, e, n) = (0.5, 3.0, 1.5);
@@ -178,7 +181,8 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         description.cameras.push(look_at(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, 0.5));
         let scene = build(description);
         let (slabs, transmitted) = (if through { 3 } else { 1 }, slab(f64::from(n)));
-        // Slab and pane reflect into each other what the other sends back, on the sun's way and on the eye's, whose camera is between them.
+        // Slab and pane reflect into each other what the other sends back, on the sun's way and on the eye's, whose
+        // camera is between them.
         let between = if through { 1.0 - (1.0 - transmitted).powi(2) } else { 1.0 };
         let expected = f64::from(rho * e) / std::f64::consts::PI * transmitted.powi(slabs) / between.powi(2);
         // A slab forgotten would be 8 %.
@@ -227,8 +231,8 @@ fn white_sphere_in_glass_under_a_uniform_sky() {
     check.run(TESTS, "sphere in glass, paths", &by_paths(&scene, 8, 64, 24));
 }
 
-/// A black sheet of alpha 0.5 halves direct light; an index-matched clear box does nothing to it. Neither is a bounce: all of it
-/// stays direct light, counted once.
+/// A black sheet of alpha 0.5 halves direct light; an index-matched clear box does nothing to it. Neither is a bounce:
+/// all of it stays direct light, counted once.
 #[test]
 fn cut_outs_and_matched_boundaries_are_no_bounces() {
     let (rho, intensity) = (0.5, 2.0);
@@ -267,8 +271,8 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
     }
 }
 
-/// The two eye paths of a pixel share nothing but photons: without any, the errors of level 1 and level 2 under a soft shadow
-/// are uncorrelated over 64 seeds, and those of levels 2 and 3, which share a path, are not.
+/// The two eye paths of a pixel share nothing but photons: without any, the errors of level 1 and level 2 under a soft
+/// shadow are uncorrelated over 64 seeds, and those of levels 2 and 3, which share a path, are not.
 #[test]
 fn the_two_eye_paths_are_independent() {
     let mut description = Description::default();

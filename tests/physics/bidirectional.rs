@@ -1,8 +1,9 @@
 //! Methods made of whole paths: against closed forms where they can, and against each other tile by tile.
 //!
-//! Closed forms are t tests over independent seeds, and tiles are compared by Welch's t statistic over seeds; the family-wise error rate is 0.1 %
-//! for a scene (Sidak over methods and tiles), plus the stated bias of the kernel for methods that merge. Every comparison is shown to have power: a
-//! tile brighter by a stated share is rejected, and so are the bugs planted in the arithmetic of weights (`tests/physics/mis.rs`).
+//! Closed forms are t tests over independent seeds, and tiles are compared by Welch's t statistic over seeds; the
+//! family-wise error rate is 0.1 % for a scene (Sidak over methods and tiles), plus the stated bias of the kernel for
+//! methods that merge. Every comparison is shown to have power: a tile brighter by a stated share is rejected, and so
+//! are the bugs planted in the arithmetic of weights (`tests/physics/mis.rs`).
 
 use crate::support;
 
@@ -180,8 +181,8 @@ fn lamp_seen_through_absorbing_glass() {
 
 // ---------------------------------------------------------------- agreement
 
-/// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. With either side's factor of eta^2 wrong, light inside
-/// is off by 2.25.
+/// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. With either side's
+/// factor of eta^2 wrong, light inside is off by 2.25.
 #[test]
 fn white_sphere_in_glass_under_a_uniform_sky() {
     let mut description = Description::default();
@@ -256,7 +257,8 @@ fn glossy_room() {
     agree("glossy room", &scene, &methods, 0.04, 0.02, 0.15);
 }
 
-/// Smooth and rough glass, with a lens in front of the camera. Light tracing sees nothing behind smooth glass, so it stays out.
+/// Smooth and rough glass, with a lens in front of the camera. Light tracing sees nothing behind smooth glass, so it
+/// stays out.
 #[test]
 fn glass_room() {
     let mut description = lit_room(matte(0.5, 0.0));
@@ -318,8 +320,8 @@ fn short_paths_seen_in_parallel() {
     agree_with("parallel", &scene, &reference, &methods, (0.04, 4), 0.02, 0.15);
 }
 
-/// Caustics of a point light seen in a mirror and through glass, which only photons find: against progressive photon mapping. Counting photons
-/// twice would double most tiles.
+/// Caustics of a point light seen in a mirror and through glass, which only photons find: against progressive photon
+/// mapping. Counting photons twice would double most tiles.
 #[test]
 fn caustics_behind_glass() {
     let mut description = Description::default();
@@ -344,8 +346,8 @@ fn caustics_behind_glass() {
     agree_with("behind glass", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.3);
 }
 
-/// All of the floor lies under water, so that nothing is lit but through it and seen but through it; the lamp is so large that a path tracer, which
-/// must run into it, is the judge.
+/// All of the floor lies under water, so that nothing is lit but through it and seen but through it; the lamp is so
+/// large that a path tracer, which must run into it, is the judge.
 #[test]
 fn under_water() {
     let mut description = Description::default();

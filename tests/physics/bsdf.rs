@@ -1,7 +1,7 @@
 //! The scattering model: sample, density and value agree; energy is kept; directions can be exchanged.
 //!
-//! Statistical checks run at a family-wise error rate of 0.1 % (Sidak over the checks of a test) with fixed seeds. Planted bugs are
-//! rejected by the same checks.
+//! Statistical checks run at a family-wise error rate of 0.1 % (Sidak over the checks of a test) with fixed seeds.
+//! Planted bugs are rejected by the same checks.
 
 use crate::support;
 
@@ -143,7 +143,8 @@ fn furnace_error(p: &Parameters) -> f32 {
     COSINES.into_iter().fold(0.0, worst)
 }
 
-/// A surface that loses nothing, under a white sky, is white: within 0.5 %, whatever its roughness and what lies on top, from both sides.
+/// A surface that loses nothing, under a white sky, is white: within 0.5 %, whatever its roughness and what lies on
+/// top, from both sides.
 #[test]
 fn white_furnace() {
     let failures: Vec<String> = white()
@@ -209,7 +210,8 @@ fn integrate(f: &dyn Fn(Vec3) -> f64, z: (f64, f64), phi: (f64, f64), depth: u32
 }
 
 /// P-value of "directions drawn follow the density", and the largest relative difference between a weight and
-/// `f |cos| / pdf`. Directions not drawn, and those of delta lobes, are a cell of their own, so that the density's integral is tested too.
+/// `f |cos| / pdf`. Directions not drawn, and those of delta lobes, are a cell of their own, so that the density's
+/// integral is tested too.
 fn triad(bsdf: &dyn Scatter, wo: Vec3, set: LobeSet, draws: usize, seed: u64) -> (f64, f32) {
     let (rows, columns) = CELLS;
     let mut counts = vec![0.0; rows * columns + 1];
@@ -367,8 +369,8 @@ fn index(p: &Parameters, w: Vec3) -> f32 {
     if w.z > 0.0 || p.thin { 1.0 } else { p.eta }
 }
 
-/// Largest relative violation of `f_radiance(o, i) / n_o^2 = f_radiance(i, o) / n_i^2`, which for reflection is reciprocity, and of
-/// `f_radiance(o, i) = f_importance(i, o)`.
+/// Largest relative violation of `f_radiance(o, i) / n_o^2 = f_radiance(i, o) / n_i^2`, which for reflection is
+/// reciprocity, and of `f_radiance(o, i) = f_importance(i, o)`.
 fn asymmetry(bsdf: &dyn Scatter, p: &Parameters) -> f32 {
     let mut worst = 0.0f32;
     for (o, i) in pairs(2000, 3) {
@@ -399,7 +401,8 @@ impl Scatter for WithoutEta<'_> {
 #[test]
 fn directions_can_be_exchanged() {
     for (name, p) in all() {
-        // The half vector of refraction by an index near 1 is a small difference: its rounding shows where the lobe is narrow.
+        // The half vector of refraction by an index near 1 is a small difference: its rounding shows where the lobe is
+        // narrow.
         let allowed = if p.alpha_x < 0.05 { 0.2 } else { 1e-2 };
         let worst = asymmetry(&bsdf(&p, &TABLES), &p);
         assert!(worst < allowed, "{name}: off by {worst}");

@@ -1,8 +1,9 @@
-//! Surfaces that lie exactly on each other: glass on a floor, a liquid in a glass, boxes in a stack; and panes that rounding can
-//! hardly tell from their backs.
+//! Surfaces that lie exactly on each other: glass on a floor, a liquid in a glass, boxes in a stack; and panes that
+//! rounding can hardly tell from their backs.
 //!
-//! Furnaces are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks), and every check
-//! has to reject a furnace that is off by 5 % (photons: 12 %). What is black is black in every pixel, without any error rate.
+//! Furnaces are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its
+//! checks), and every check has to reject a furnace that is off by 5 % (photons: 12 %). What is black is black in every
+//! pixel, without any error rate.
 
 use crate::support;
 
@@ -35,7 +36,8 @@ fn picture(scene: &Scene, camera: &Camera, method: Method, iterations: u64, seed
     rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.element_sum() / 3.0).collect()
 }
 
-/// The mean of a picture is 1; photons are found at fewer places than paths, so that they take more of them and tell 12 % instead of 5 %.
+/// The mean of a picture is 1; photons are found at fewer places than paths, so that they take more of them and tell 12
+/// % instead of 5 %.
 fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
     let camera = scene.camera(&square(16)).expect("a camera");
     let critical = t_critical(sidak(ERROR_RATE, methods.len()), 1, SEEDS as f64 - 1.0);
@@ -76,8 +78,8 @@ fn placed() -> DAffine3 {
     )
 }
 
-/// A block of glass on a black floor with a strong lamp below: nothing of it is seen. Rays that start a little past a plane skipped the
-/// floor in 31 to 45 % of the pixels.
+/// A block of glass on a black floor with a strong lamp below: nothing of it is seen. Rays that start a little past a
+/// plane skipped the floor in 31 to 45 % of the pixels.
 #[test]
 fn nothing_below_a_floor_is_seen_through_glass_that_stands_on_it() {
     for (name, on) in [("as modelled", DAffine3::IDENTITY), ("placed", placed())] {
@@ -115,7 +117,8 @@ fn what_is_below_a_hole_is_seen() {
     assert!(picture(&scene, &camera, Method::Path, 4, 1).into_iter().any(|light| light > 0.0));
 }
 
-/// Glass filled with a liquid up to faces that both share, on a white floor: 2.16 where the second of two faces was skipped.
+/// Glass filled with a liquid up to faces that both share, on a white floor: 2.16 where the second of two faces was
+/// skipped.
 #[test]
 fn a_liquid_in_a_glass_on_a_floor_is_no_lamp() {
     let mut description = white_sky();
@@ -163,7 +166,8 @@ fn stacks_of_blocks_are_no_lamps() {
     is_white("three rough glasses", &rough, &METHODS);
 }
 
-/// Thin panes far from the origin: 16 and 41 roundings thick. A start that is 32 roundings past a plane is behind both faces, and gave 0.46.
+/// Thin panes far from the origin: 16 and 41 roundings thick. A start that is 32 roundings past a plane is behind both
+/// faces, and gave 0.46.
 #[test]
 fn panes_far_away_are_panes() {
     for (away, thickness) in [(900.0, 1e-3), (3000.0, 1e-2)] {
@@ -177,8 +181,8 @@ fn panes_far_away_are_panes() {
     }
 }
 
-/// A pane that single precision has no room for where it is (its sides are 3 roundings of 0.24 mm apart in a scene of kilometres) is named, one
-/// with room is not.
+/// A pane that single precision has no room for where it is (its sides are 3 roundings of 0.24 mm apart in a scene of
+/// kilometres) is named, one with room is not.
 #[test]
 fn panes_too_thin_to_tell_are_named() {
     for (thickness, named) in [(7e-4, true), (0.02, false)] {

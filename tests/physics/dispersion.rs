@@ -1,7 +1,8 @@
 //! Dispersion: against Snell's law wavelength by wavelength, and methods against each other.
 //!
-//! Statistical tests have a family-wise error rate of 0.1 % each (Sidak over their checks), plus the stated bias of kernels. Every check has to reject a
-//! planted error: glass that does not disperse, colours put together as if they were independent, a picture brighter by a stated share.
+//! Statistical tests have a family-wise error rate of 0.1 % each (Sidak over their checks), plus the stated bias of
+//! kernels. Every check has to reject a planted error: glass that does not disperse, colours put together as if they
+//! were independent, a picture brighter by a stated share.
 
 use crate::support;
 
@@ -142,8 +143,8 @@ fn paths_of_one_channel_carry_the_same() {
     assert!(mean.iter().all(|m| (m - 1.0).abs() < 1e-4), "{mean:?}");
 }
 
-/// Mean of what two paths bring together whose wavelengths are drawn independently. What either carries besides depends on its wavelength, as behind a prism:
-/// here it is there or not.
+/// Mean of what two paths bring together whose wavelengths are drawn independently. What either carries besides depends
+/// on its wavelength, as behind a prism: here it is there or not.
 fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wavelength) -> Rgb) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let passes = 512;
@@ -173,7 +174,8 @@ fn two_paths_put_together_have_one_wavelength() {
     let meeting = |eye: &Wavelength, light: &Wavelength| eye.meets(light.band).unwrap_or(Rgb::ZERO);
     let found = put_together(carried, meeting);
     assert!(off(found) < 0.02, "{found:?} {expected:?}");
-    // The bugs: colours multiplied as if wavelengths were independent; bands that meet, but with a colour that counts twice.
+    // The bugs: colours multiplied as if wavelengths were independent; bands that meet, but with a colour that counts
+    // twice.
     assert!(off(put_together(carried, |_, _| Rgb::ONE)) > 0.2, "a product of colours goes unnoticed");
     let twice = |eye: &Wavelength, light: &Wavelength| {
         if eye.band == light.band { Rgb::splat(f32::from(BANDS)) } else { Rgb::ZERO }
@@ -199,7 +201,8 @@ fn prism_mesh(half: f32) -> Mesh {
     Mesh { positions: positions.collect(), triangles, closed: true, ..Mesh::default() }
 }
 
-/// Angle above the x axis of light that arrives at the left face at an angle `arriving` above it and leaves by the right face; `None` if it does not.
+/// Angle above the x axis of light that arrives at the left face at an angle `arriving` above it and leaves by the
+/// right face; `None` if it does not.
 fn through_prism(index: f64, arriving: f64) -> Option<f64> {
     let half = 30f64.to_radians();
     // From the left face's inward normal, which points down.
@@ -276,8 +279,8 @@ fn deviated(scene: &Scene, hue: WavelengthSample, arriving: f64) -> f64 {
     panic!("no path gets through the prism");
 }
 
-/// Every wavelength has its angle of minimum deviation, D with n = sin((A + D) / 2) / sin(A / 2), and leaves where Snell says at the angle
-/// of another.
+/// Every wavelength has its angle of minimum deviation, D with n = sin((A + D) / 2) / sin(A / 2), and leaves where
+/// Snell says at the angle of another.
 #[test]
 fn a_prism_bends_each_wavelength_by_its_index() {
     let scene = prism_scene(dispersive(IOR, ABBE));
@@ -301,7 +304,8 @@ fn a_prism_bends_each_wavelength_by_its_index() {
     assert!(wrong > 0.02, "glass that does not disperse goes unnoticed: {wrong}");
 }
 
-/// A sun through the prism on to a screen: photons land in the direction of their wavelength, of its colour, and each channel's mean direction is the integral's.
+/// A sun through the prism on to a screen: photons land in the direction of their wavelength, of its colour, and each
+/// channel's mean direction is the integral's.
 #[test]
 fn photons_behind_a_prism_land_where_their_colour_belongs() {
     let arriving = 24f64.to_radians();
@@ -450,8 +454,8 @@ fn wedge(low: Vec3, high: Vec3, slope: f32) -> Mesh {
     mesh
 }
 
-/// The sun shines through a hole in a roof, which a wedge of glass covers, and leaves a rainbow on the floor; it is seen
-/// from below the roof, maybe through a second wedge.
+/// The sun shines through a hole in a roof, which a wedge of glass covers, and leaves a rainbow on the floor; it is
+/// seen from below the roof, maybe through a second wedge.
 fn rainbow(material: impl Fn(f32) -> Material, behind_glass: bool) -> Scene {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0);
@@ -487,7 +491,8 @@ fn plus(settings: Settings) -> Settings {
     settings
 }
 
-/// The rainbow on the floor, where all methods find it; light tracing, which shares no wavelengths with anyone, with least noise.
+/// The rainbow on the floor, where all methods find it; light tracing, which shares no wavelengths with anyone, with
+/// least noise.
 #[test]
 fn a_rainbow_agrees() {
     let scene = rainbow(strong, false);
@@ -617,7 +622,8 @@ fn bytes(rendered: &Rendered) -> Vec<[u64; 3]> {
     rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.to_array().map(f64::to_bits)).collect()
 }
 
-/// Dispersion of nothing, of what does not refract, and of what nobody wears changes no bit; the same bits come from any number of threads.
+/// Dispersion of nothing, of what does not refract, and of what nobody wears changes no bit; the same bits come from
+/// any number of threads.
 #[test]
 fn without_dispersion_no_bit_changes() {
     let scene = |first: Material, unused: bool| {

@@ -1,10 +1,10 @@
-//! White furnaces: under a sky of radiance 1 what reflects and transmits all light cannot be seen, whatever its lobes and
-//! whatever the method. Steep normal maps, which no closed form covers, look the same by all methods.
+//! White furnaces: under a sky of radiance 1 what reflects and transmits all light cannot be seen, whatever its lobes
+//! and whatever the method. Steep normal maps, which no closed form covers, look the same by all methods.
 //!
-//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks).
-//! Besides noise they allow for what energy tables are off by (0.5 %, and 2 % where facets are wider one way) and, where photons are
-//! gathered, for kernels on a curved surface (3 %); every check has to reject a furnace that is off by 5 % (photons: 20 %, as few as `bpm` has
-//! 40 %, those that frosted glass has focused on itself 90 %).
+//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its
+//! checks). Besides noise they allow for what energy tables are off by (0.5 %, and 2 % where facets are wider one way)
+//! and, where photons are gathered, for kernels on a curved surface (3 %); every check has to reject a furnace that is
+//! off by 5 % (photons: 20 %, as few as `bpm` has 40 %, those that frosted glass has focused on itself 90 %).
 
 use crate::support;
 
@@ -124,8 +124,8 @@ fn nothing_white_is_seen_under_a_white_sky() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// A floor of steep bumps seen at a slant, so that many of their normals face away from the eye. The methods, which scatter at it from
-/// either side, find the same light: a mean of 0.71, where it was 0.61 with those normals black.
+/// A floor of steep bumps seen at a slant, so that many of their normals face away from the eye. The methods, which
+/// scatter at it from either side, find the same light: a mean of 0.71, where it was 0.61 with those normals black.
 #[test]
 fn steep_normal_maps_look_the_same_by_all_methods() {
     let mut description = white_sky();

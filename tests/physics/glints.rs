@@ -20,9 +20,9 @@ const BIAS: f64 = 0.01;
 /// What is told: a tenth of the light.
 const DETECTS: f64 = 0.1;
 
-/// A closed room whose walls give 1/2 and reflect 1/2, so that there is 1 everywhere and in every direction, also below a pane of glass that keeps the floor from the ceiling;
-/// the floor is of white metal, sharp enough that eye paths go on from it, and seen from the side: a cosine that is
-/// forgotten in the weights shows.
+/// A closed room whose walls give 1/2 and reflect 1/2, so that there is 1 everywhere and in every direction, also below
+/// a pane of glass that keeps the floor from the ceiling; the floor is of white metal, sharp enough that eye paths go
+/// on from it, and seen from the side: a cosine that is forgotten in the weights shows.
 fn furnace(roughness: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
@@ -45,7 +45,8 @@ fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
     (all / pixels, shared / pixels)
 }
 
-/// All of the light is there, whatever photons bring of it: with small bandwidths hardly any, with large ones nearly all.
+/// All of the light is there, whatever photons bring of it: with small bandwidths hardly any, with large ones nearly
+/// all.
 #[test]
 fn all_light_is_there_once() {
     for (roughness, radius) in [(0.3, 0.02), (0.3, 0.2), (0.15, 0.3)] {
@@ -80,7 +81,8 @@ fn all_light_is_there_once() {
     }
 }
 
-/// A ball of metal in that room, smaller than the first bandwidth: most photons within it are of other sides of the ball, or beyond it.
+/// A ball of metal in that room, smaller than the first bandwidth: most photons within it are of other sides of the
+/// ball, or beyond it.
 fn ball() -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
@@ -93,8 +95,8 @@ fn ball() -> Scene {
 
 const BALL: f32 = 0.09;
 
-/// Metal has no broad lobes, and yet bandwidths there follow the photons that it shows: rules that count photons find out what is missing around a ball, and from iteration to
-/// iteration less is.
+/// Metal has no broad lobes, and yet bandwidths there follow the photons that it shows: rules that count photons find
+/// out what is missing around a ball, and from iteration to iteration less is.
 #[test]
 fn bandwidths_shrink_on_metal() {
     let scene = ball();
@@ -129,7 +131,8 @@ fn bandwidths_shrink_on_metal() {
     }
 }
 
-/// A small lamp over metal and a small pane between them, which most light paths miss: of most iterations the map is empty.
+/// A small lamp over metal and a small pane between them, which most light paths miss: of most iterations the map is
+/// empty.
 fn pane() -> Scene {
     let mut description = Description::default();
     let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.35, ..Material::default() };
@@ -141,7 +144,8 @@ fn pane() -> Scene {
     build(description)
 }
 
-/// Eye paths leave photons their share whether any have come this time or not: few light paths bring as much as many, and as paths alone.
+/// Eye paths leave photons their share whether any have come this time or not: few light paths bring as much as many,
+/// and as paths alone.
 #[test]
 fn empty_maps_bring_nothing_and_take_nothing() {
     let scene = pane();

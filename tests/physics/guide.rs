@@ -1,6 +1,8 @@
-//! Guided emission keeps the light, whatever it has learnt, and finds what unguided emission does not; and the choice among ways to render.
+//! Guided emission keeps the light, whatever it has learnt, and finds what unguided emission does not; and the choice
+//! among ways to render.
 //!
-//! The light is compared by t tests over independent passes at a family-wise error rate of 0.1 %; each rejects paths whose flux forgets the guide.
+//! The light is compared by t tests over independent passes at a family-wise error rate of 0.1 %; each rejects paths
+//! whose flux forgets the guide.
 
 use crate::support;
 
@@ -138,7 +140,8 @@ fn guided_light_is_the_same_light() {
     }
 }
 
-/// Of cells whose photons leave errors, those of nine times the error get three times the paths, those of nine times the cost a third; a fifth stays unguided.
+/// Of cells whose photons leave errors, those of nine times the error get three times the paths, those of nine times
+/// the cost a third; a fifth stays unguided.
 #[test]
 fn cells_follow_the_error_they_leave() {
     let scene = &lit()[2].1;
@@ -174,7 +177,8 @@ fn cells_follow_the_error_they_leave() {
     assert!((first - 0.2 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.2 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
 }
 
-/// Light of a part of the picture and the variance of all of it, summed over pixels, after twelve iterations of one level.
+/// Light of a part of the picture and the variance of all of it, summed over pixels, after twelve iterations of one
+/// level.
 fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&Pixel) -> DVec3) -> (f64, f64) {
     let camera = scene.camera(&square(16)).expect("a camera");
     let settings = Settings { levels: Levels::new(1), iterations: Some(12), ..settings };
@@ -186,7 +190,8 @@ fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&Pixel) -
     (light, variance)
 }
 
-/// Two lamps in rooms of their own, the camera in one: light paths are the more those of the lamp that is seen, and the picture is less noisy after as many.
+/// Two lamps in rooms of their own, the camera in one: light paths are the more those of the lamp that is seen, and the
+/// picture is less noisy after as many.
 #[test]
 fn lamps_have_budgets_of_their_own() {
     let scene = {
@@ -214,7 +219,8 @@ fn lamps_have_budgets_of_their_own() {
     assert!(unguided > 4.0 * guided, "{unguided} and {guided}");
 }
 
-/// Rules that count photons find the light of unguided paths by guided ones: means of 16 seeds, Welch's test, one false alarm in a thousand runs.
+/// Rules that count photons find the light of unguided paths by guided ones: means of 16 seeds, Welch's test, one false
+/// alarm in a thousand runs.
 #[test]
 fn rules_that_count_photons_can_be_guided() {
     let scene = room_with(0.15);
@@ -330,8 +336,8 @@ fn the_choice_does_not_depend_on_threads() {
     assert_eq!(bits(&one), bits(&three));
 }
 
-/// The shares of effects make up the picture, and are those of a longer render, within a quarter: six iterations find no more. Caustics in the glass are
-/// no share of those beside it.
+/// The shares of effects make up the picture, and are those of a longer render, within a quarter: six iterations find
+/// no more. Caustics in the glass are no share of those beside it.
 #[test]
 fn effects_are_weighed() {
     let scene = glass_room();
@@ -356,8 +362,8 @@ fn effects_are_weighed() {
     }
 }
 
-/// What is switched off is weighed as if it were not: that is what the picture lacks. Media have a part of the light where they scatter; those that only absorb
-/// take of all others, and are not weighed.
+/// What is switched off is weighed as if it were not: that is what the picture lacks. Media have a part of the light
+/// where they scatter; those that only absorb take of all others, and are not weighed.
 #[test]
 fn what_is_left_out_is_weighed_too() {
     let weights = |scene: &Scene, off: ClassSet| {
@@ -387,8 +393,9 @@ fn what_is_left_out_is_weighed_too() {
     }
 }
 
-/// What is a property of the scene is weighed by the scene without it: as much as two long renders tell, or not at all where noise hides it. A wall of
-/// two greys, the sky through an open roof, and a lens so small that nobody sees its blur.
+/// What is a property of the scene is weighed by the scene without it: as much as two long renders tell, or not at all
+/// where noise hides it. A wall of two greys, the sky through an open roof, and a lens so small that nobody sees its
+/// blur.
 #[test]
 fn properties_of_the_scene_are_weighed() {
     let mut description = Description::default();
@@ -458,8 +465,8 @@ fn a_pilot_can_be_stopped() {
     assert!(stopped <= 6 && whole > 24, "{stopped}, {whole}");
 }
 
-/// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor the light: guided ones have, and the
-/// picture as a whole has the more of it.
+/// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor
+/// the light: guided ones have, and the picture as a whole has the more of it.
 #[test]
 fn caustics_are_left_to_guided_light_paths() {
     let mut description = Description::default();

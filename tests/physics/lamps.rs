@@ -1,7 +1,7 @@
 //! Lamps as Blender has them: without a body, hidden from cameras, shining into a cone. Closed forms, by all methods.
 //!
-//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its checks),
-//! and each has to reject a picture that is off by the share it declares.
+//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its
+//! checks), and each has to reject a picture that is off by the share it declares.
 
 use crate::support;
 

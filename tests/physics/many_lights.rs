@@ -40,7 +40,8 @@ fn hall() -> (Description, Vec<[DVec3; 4]>, Vec<(DVec3, f64)>) {
     (description, panels, points)
 }
 
-/// Irradiance at `p`, facing up, from a polygon of radiance 1 whose corners go round as seen from there \[Lambert 1760\].
+/// Irradiance at `p`, facing up, from a polygon of radiance 1 whose corners go round as seen from there \[Lambert
+/// 1760\].
 fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
     let n = corners.len();
     let edge = |k: usize| {
@@ -50,7 +51,8 @@ fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
     0.5 * (0..n).map(edge).sum::<f64>().abs()
 }
 
-/// Irradiance at `p` on the floor, estimated `n` times; `share` says by which probability each is divided, over the true one.
+/// Irradiance at `p` on the floor, estimated `n` times; `share` says by which probability each is divided, over the
+/// true one.
 fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectSample) -> f64) -> Vec<f64> {
     let one = |i: u64| {
         let draws = Stream::new(11, 0, Domain::Test, i).vertex(1);

@@ -166,9 +166,10 @@ fn direction(k: u64) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), z)
 }
 
-/// Seen from the side, a steep normal map is as bright as from the front where it is matte: where its normal faces away from the viewer it is not black. Light that
-/// comes from behind the normal stays out, and all light that comes is scattered, whichever way it goes: white stays white, to what 400,000 draws of
-/// bounded weights say (five standard errors).
+/// Seen from the side, a steep normal map is as bright as from the front where it is matte: where its normal faces away
+/// from the viewer it is not black. Light that comes from behind the normal stays out, and all light that comes is
+/// scattered, whichever way it goes: white stays white, to what 400,000 draws of bounded weights say (five standard
+/// errors).
 #[test]
 fn steep_normals_are_not_black_from_the_side() {
     let tables = EnergyTables::new([1.5], Coverings::default());
@@ -198,8 +199,9 @@ fn steep_normals_are_not_black_from_the_side() {
     });
 }
 
-/// With shading normals, light and eye still see one function: exchanging directions exchanges what each way of transport carries, per
-/// geometric cosine \[Veach 1997, 5.3\]; nothing leaks through an opaque surface; photons are weighed to match.
+/// With shading normals, light and eye still see one function: exchanging directions exchanges what each way of
+/// transport carries, per geometric cosine \[Veach 1997, 5.3\]; nothing leaks through an opaque surface; photons are
+/// weighed to match.
 #[test]
 fn shading_normals_keep_light_and_eye_agreed() {
     let tables = EnergyTables::new([1.5], Coverings::default());

@@ -1,7 +1,8 @@
 //! Participating media: against closed forms, and methods against each other.
 //!
-//! Closed forms are t tests over independent seeds and tiles Welch's t tests, at a family-wise error rate of 0.1 % for each test (Sidak over its
-//! checks), plus the stated bias of closed form or kernel. Every check has to reject a planted error of a stated size.
+//! Closed forms are t tests over independent seeds and tiles Welch's t tests, at a family-wise error rate of 0.1 % for
+//! each test (Sidak over its checks), plus the stated bias of closed form or kernel. Every check has to reject a
+//! planted error of a stated size.
 
 use crate::support;
 
@@ -19,8 +20,8 @@ use support::stats::{Check, ERROR_RATE, chi_squared_p, sidak};
 
 // ---------------------------------------------------------------- phase function
 
-/// P-values of chi-squared tests of drawn cosines against the density's integrals, for several asymmetries; and the largest deviation of the mean
-/// cosine from g. `bent` plants a bug: cosines drawn for another asymmetry.
+/// P-values of chi-squared tests of drawn cosines against the density's integrals, for several asymmetries; and the
+/// largest deviation of the mean cosine from g. `bent` plants a bug: cosines drawn for another asymmetry.
 fn phase_tests(bent: f32) -> (f64, f64) {
     const CELLS: usize = 64;
     const DRAWS: u64 = 200_000;
@@ -226,7 +227,8 @@ fn beer_lambert() {
     }
 }
 
-/// A medium that absorbs nothing under a uniform sky cannot be seen, whatever its phase function and however its channels differ.
+/// A medium that absorbs nothing under a uniform sky cannot be seen, whatever its phase function and however its
+/// channels differ.
 #[test]
 fn furnace() {
     for (sigma_s, g) in [([1.5; 3], 0.0), ([2.5, 1.0, 0.4], 0.7)] {
@@ -244,7 +246,8 @@ fn furnace() {
     }
 }
 
-/// A closed box whose walls give radiance e and reflect rho, full of fog that absorbs nothing: e / (1 - rho) everywhere.
+/// A closed box whose walls give radiance e and reflect rho, full of fog that absorbs nothing: e / (1 - rho)
+/// everywhere.
 #[test]
 fn furnace_box_full_of_fog() {
     let mut description = Description::default();
@@ -316,7 +319,8 @@ fn kernels_that_reach_behind_borders_lose_nothing() {
 }
 
 /// Light of a point scattered once on its way through a medium without end, by Simpson's rule on the airlight integral
-/// `sigma_s int p(cos) I exp(-sigma_t (t + d(t))) / d(t)^2 dt`, the mean over a square picture of half width `slope` at distance 1.
+/// `sigma_s int p(cos) I exp(-sigma_t (t + d(t))) / d(t)^2 dt`, the mean over a square picture of half width `slope` at
+/// distance 1.
 fn airlight(medium: &MediumParameters, light: DVec3, intensity: f64, slope: f64) -> [f64; 3] {
     let n = 24;
     let g = f64::from(medium.g);
@@ -366,8 +370,8 @@ fn single_scattering_of_a_point_light() {
     check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
 }
 
-/// Air close to a lamp, where the inverse square would rule the noise of points drawn by transmittance: near enough on one side of the picture for
-/// points drawn by the angle, too far on the other.
+/// Air close to a lamp, where the inverse square would rule the noise of points drawn by transmittance: near enough on
+/// one side of the picture for points drawn by the angle, too far on the other.
 #[test]
 fn air_close_to_a_point_light() {
     let medium = fog([0.05, 0.1, 0.15], [0.1, 0.1, 0.05], 0.3);

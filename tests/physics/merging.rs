@@ -1,8 +1,9 @@
-//! What merging is and is not, as the third talk of the 2013 course has it: one more way to sample a path, as noisy as the plain one until its
-//! photons are used again; and no help where the surface that gathers is glossy.
+//! What merging is and is not, as the third talk of the 2013 course has it: one more way to sample a path, as noisy as
+//! the plain one until its photons are used again; and no help where the surface that gathers is glossy.
 //!
-//! Variances are compared by their ratio. With hits as rare as here the relative error of a variance is 1 / sqrt(hits), stated with each test; limits are five
-//! of those away, so that a test fails by chance less than once in a million runs.
+//! Variances are compared by their ratio. With hits as rare as here the relative error of a variance is 1 / sqrt(hits),
+//! stated with each test; limits are five of those away, so that a test fails by chance less than once in a million
+//! runs.
 
 use crate::support;
 
@@ -34,8 +35,9 @@ fn moments(scene: &Scene, settings: &Settings) -> (f64, f64) {
 const LAMP: f32 = 0.2;
 const ITERATIONS: u64 = 120_000;
 
-/// A lamp that shines up into a mirror, and below them a matte floor on which the mirror throws its light: next-event estimation sees the lamp's black
-/// back. A path finds the light by scattering into it, a photon by landing near the point seen.
+/// A lamp that shines up into a mirror, and below them a matte floor on which the mirror throws its light: next-event
+/// estimation sees the lamp's black back. A path finds the light by scattering into it, a photon by landing near the
+/// point seen.
 fn lamp_in_a_mirror() -> Scene {
     let mut description = Description::default();
     let (x, z) = (Vec3::X, Vec3::Z);
@@ -47,10 +49,10 @@ fn lamp_in_a_mirror() -> Scene {
     build(description)
 }
 
-/// With the kernel's disc as large as the lamp, a photon of one light path for one eye path lands in the disc as often as the eye path runs into the
-/// lamp, and brings as much (the floor is white, so that no roulette interferes): the same mean, the same variance. A hundred light paths cut the variance to a hundredth (a little more: they
-/// are stratified) and cost less than a hundred
-/// eye paths.
+/// With the kernel's disc as large as the lamp, a photon of one light path for one eye path lands in the disc as often
+/// as the eye path runs into the lamp, and brings as much (the floor is white, so that no roulette interferes): the
+/// same mean, the same variance. A hundred light paths cut the variance to a hundredth (a little more: they are
+/// stratified) and cost less than a hundred eye paths.
 #[test]
 fn merging_without_reuse_is_as_noisy_as_path_tracing() {
     let scene = lamp_in_a_mirror();
@@ -97,7 +99,8 @@ fn caustic_on(floor: Material) -> Scene {
     build(description)
 }
 
-/// The stated limit of vertex connection and merging: at a glossy surface few photons come from where the lobe looks, and no other technique has them.
+/// The stated limit of vertex connection and merging: at a glossy surface few photons come from where the lobe looks,
+/// and no other technique has them.
 #[test]
 fn caustics_on_glossy_surfaces_stay_noisy() {
     let relative_variance = |roughness: f32| {
@@ -125,9 +128,11 @@ fn caustics_on_glossy_surfaces_stay_noisy() {
     assert!(glossy > 4.0 * rough, "rough {rough}, glossy {glossy}");
 }
 
-/// What merging is taken to cost follows from how many vertices it finds. In a closed box whose walls shine and reflect alike those of light paths are
-/// equally dense on all of its 24 square metres, so that an eye path finds `eye light pixels pi r^2 / 24`, whatever the picture's size if the kernel shrinks with
-/// its pixels. Sixteen seeds tell the mean to half a percent (some 1,400 vertices are in view). Discs at the edges lose `8 r / (3 pi s)` of those of a wall of side s.
+/// What merging is taken to cost follows from how many vertices it finds. In a closed box whose walls shine and reflect
+/// alike those of light paths are equally dense on all of its 24 square metres, so that an eye path finds
+/// `eye light pixels pi r^2 / 24`, whatever the picture's size if the kernel shrinks with its pixels. Sixteen seeds
+/// tell the mean to half a percent (some 1,400 vertices are in view). Discs at the edges lose `8 r / (3 pi s)` of those
+/// of a wall of side s.
 #[test]
 fn as_many_are_merged_as_are_there() {
     const SEEDS: u64 = 16;

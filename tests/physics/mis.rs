@@ -1,9 +1,10 @@
 //! The oracle of multiple importance sampling: every weight again, from explicit densities of whole paths.
 //!
-//! A recorder sees each contribution that the walks make on random paths in a few scenes, one of them foggy. The oracle walks the same paths by the same draws, writes down
-//! every vertex, multiplies densities per area for every strategy that could have made the path, and must find the weight that the
-//! recursion gave. Then the recursion is run by hand over the same vertices for all strategies of a path: the weights must sum to one, and no longer do
-//! when a bug is planted in it.
+//! A recorder sees each contribution that the walks make on random paths in a few scenes, one of them foggy. The oracle
+//! walks the same paths by the same draws, writes down every vertex, multiplies densities per area for every strategy
+//! that could have made the path, and must find the weight that the recursion gave. Then the recursion is run by hand
+//! over the same vertices for all strategies of a path: the weights must sum to one, and no longer do when a bug is
+//! planted in it.
 
 use crate::support;
 
@@ -142,8 +143,8 @@ struct Node<'s> {
     /// Cosines for arrivals from the light's and from the eye's side (two surfaces where a photon is merged).
     cos: [f64; 2],
     delta: bool,
-    /// Density of the direction that a walk has drawn here, towards the light or away. In single precision a grazing direction has too few digits to
-    /// evaluate it again.
+    /// Density of the direction that a walk has drawn here, towards the light or away. In single precision a grazing
+    /// direction has too few digits to evaluate it again.
     drawn: Option<(bool, f32)>,
 }
 
@@ -187,7 +188,8 @@ impl<'s> Whole<'s> {
         self.media.push(medium);
     }
 
-    /// Mean over channels of the density of flying segment `j` and stopping at a vertex of its medium, or of getting through.
+    /// Mean over channels of the density of flying segment `j` and stopping at a vertex of its medium, or of getting
+    /// through.
     fn flies(&self, j: usize, stops: bool) -> f64 {
         let Some(medium) = self.media[j].filter(|m| m.sigma_s != Rgb::ZERO) else { return 1.0 };
         let distance = self.distance2[j].sqrt();
@@ -552,7 +554,8 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                             EmissionDensity { direct: 1.0, start: 1.0, onward, cos: 1.0, infinite: false, delta: true }
                         }
                         Some(target) => {
-                            // The lamp is flat and of one brightness, but each of its triangles has a probability of its own.
+                            // The lamp is flat and of one brightness, but each of its triangles has a probability of
+                            // its own.
                             let lamp = emitters.iter().find_map(|emitter| match emitter {
                                 Emitter::Triangle { instance, primitive, corners: [a, b, c], .. } => {
                                     let (n, to) = (b.cross(*c), target - *a);
@@ -722,7 +725,8 @@ fn outdoors() -> Description {
     description
 }
 
-/// Coloured fog in a room with a mirror and a ball of clear glass: vertices in the medium, segments through it, and nothing in the ball.
+/// Coloured fog in a room with a mirror and a ball of clear glass: vertices in the medium, segments through it, and
+/// nothing in the ball.
 #[test]
 fn lamp_in_fog() {
     let mut description = room();

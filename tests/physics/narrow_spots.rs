@@ -81,8 +81,8 @@ fn narrow_spots_send_what_they_should() {
     }
 }
 
-/// Directions of light paths in the edge lie as densely as the intensity there says: a tenth of the ramp at a time, by a
-/// chi-squared test at an error rate of 0.1 %.
+/// Directions of light paths in the edge lie as densely as the intensity there says: a tenth of the ramp at a time, by
+/// a chi-squared test at an error rate of 0.1 %.
 #[test]
 fn edges_are_sampled_as_they_shine() {
     for (edge, integral) in [

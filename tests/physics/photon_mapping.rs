@@ -1,8 +1,9 @@
 //! Classical photon mapping against closed forms.
 //!
-//! Every check is a t test over independent seeds (each with a map of its own) at a family-wise error rate of 0.1 % for the file, plus a stated
-//! bias: nearest neighbours of points as regular as emission draws them give up to 1 / 2k too little. Each also rejects an expectation shifted by
-//! a little more, which is less than what a wrong number of light paths or direct light counted twice would do.
+//! Every check is a t test over independent seeds (each with a map of its own) at a family-wise error rate of 0.1 % for
+//! the file, plus a stated bias: nearest neighbours of points as regular as emission draws them give up to 1 / 2k too
+//! little. Each also rejects an expectation shifted by a little more, which is less than what a wrong number of light
+//! paths or direct light counted twice would do.
 
 use crate::support;
 
@@ -54,8 +55,8 @@ fn check(what: &str, values: &[f64], expected: f64, bias: f64, detects: f64) {
     }
 }
 
-/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho). The picture stays clear of
-/// the edges.
+/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho).
+/// The picture stays clear of the edges.
 fn furnace() -> Scene {
     let mut description = Description::default();
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));

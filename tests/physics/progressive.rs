@@ -1,6 +1,7 @@
 //! Progressive photon mapping of every rule and kernel: against closed forms and against path tracing.
 //!
-//! t tests over independent seeds at a family-wise error rate of 0.1 % a test function (Sidak), plus stated biases of kernels; each rejects a planted bug.
+//! t tests over independent seeds at a family-wise error rate of 0.1 % a test function (Sidak), plus stated biases of
+//! kernels; each rejects a planted bug.
 
 use crate::support;
 
@@ -73,8 +74,8 @@ fn lights_too_rare_for_the_sample_keep_their_channel() {
     assert!(photons.surface.iter().flatten().all(|photon| photon.flux.x == 0.0));
 }
 
-/// In a closed box whose walls give radiance e and reflect rho there is e / (1 - rho) everywhere: a uniform field of photons, whatever the bandwidth.
-/// The picture stays clear of the edges.
+/// In a closed box whose walls give radiance e and reflect rho there is e / (1 - rho) everywhere: a uniform field of
+/// photons, whatever the bandwidth. The picture stays clear of the edges.
 #[test]
 fn a_uniform_field_has_no_bias_at_any_bandwidth() {
     let (rho, e) = (0.5, 0.5);
@@ -144,9 +145,9 @@ fn all_agree_with_path_tracing() {
 }
 
 /// The bias of the memoryless rule after 128 iterations is the mean over its bandwidths of the closed form's, and its
-/// variance the sum over iterations of theirs over the squared number of iterations \[Knaus and Zwicker 2011, 3\], if they
-/// are independent: it is told by the quarters of iterations, which are, though eye paths draw from sequences. The averaged
-/// maps of a bandwidth that never shrinks keep its bias.
+/// variance the sum over iterations of theirs over the squared number of iterations \[Knaus and Zwicker 2011, 3\], if
+/// they are independent: it is told by the quarters of iterations, which are, though eye paths draw from sequences. The
+/// averaged maps of a bandwidth that never shrinks keep its bias.
 #[test]
 fn errors_are_the_sums_over_bandwidths() {
     let scene = Field::Square.scene();
@@ -167,7 +168,8 @@ fn errors_are_the_sums_over_bandwidths() {
         let (mut shares, mut ratios, mut poisson) = (Vec::new(), Vec::new(), Vec::new());
         for seed in 0..seeds {
             let settings = Settings { alpha, iterations: Some(n), ..Field::Square.settings(radius, photons, seed) };
-            // Squared deviations of single iterations from their expectation, in all and as a Poisson process would have them.
+            // Squared deviations of single iterations from their expectation, in all and as a Poisson process would
+            // have them.
             let (mut sums, mut squares, mut expected) = ([0.0; 128], [0.0; 128], 0.0);
             // Deviations of the sums over quarters.
             let mut quarters = [[0.0; QUARTERS as usize]; 128];
@@ -206,8 +208,8 @@ fn errors_are_the_sums_over_bandwidths() {
     }
 }
 
-/// Where merging alone finds light, VCM's bias after eight iterations is the mean over its bandwidths of the closed form's. A first iteration without photons, an
-/// eighth of the light, is found.
+/// Where merging alone finds light, VCM's bias after eight iterations is the mean over its bandwidths of the closed
+/// form's. A first iteration without photons, an eighth of the light, is found.
 #[test]
 fn merging_alone_has_the_bias_of_its_bandwidths() {
     let scene = Field::Point.scene();
@@ -243,8 +245,9 @@ fn merging_alone_has_the_bias_of_its_bandwidths() {
     assert!((ratio * (1.0 - 1.0 / n as f64) - 1.0).abs() > critical * error, "an empty iteration goes unnoticed");
 }
 
-/// The curves of the first talk: in a uniform field the squared radius at fixed points falls as the product of `(N + alpha M) / (N + M)`, the count grows as
-/// what falls into it, and the error falls. 5 % covers the spread of counts about their means over 64 points.
+/// The curves of the first talk: in a uniform field the squared radius at fixed points falls as the product of
+/// `(N + alpha M) / (N + M)`, the count grows as what falls into it, and the error falls. 5 % covers the spread of
+/// counts about their means over 64 points.
 #[test]
 fn measurement_points_follow_the_talks_curves() {
     let mut description = Description::default();
@@ -269,7 +272,8 @@ fn measurement_points_follow_the_talks_curves() {
     let (mut last_radius2, mut last_error) = (1.0, f64::INFINITY);
     for n in [1, 8, 64, 512] {
         let (radius2, error) = at(n);
-        // The first iteration keeps a share alpha of its photons, and its area; from then on it is the memoryless product.
+        // The first iteration keeps a share alpha of its photons, and its area; from then on it is the memoryless
+        // product.
         let expected = alpha * radius2_factor(n, alpha);
         println!("{n} iterations: squared radius {radius2:.4}, expected {expected:.4}, error {error:.4}");
         assert!((radius2 / expected - 1.0).abs() < 0.05, "{n} iterations: {radius2}, {expected}");

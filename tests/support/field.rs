@@ -1,8 +1,8 @@
 //! Fields of photons in closed form: a floor lit by the mirror images of a lamp.
 //!
-//! What comes straight from the lamp is no photon's; with paths as short as [`Field::max_depth`] every photon on the floor has come by one mirror.
-//! The floor's irradiance is that of the lamp's images; a kernel's expectation is its mean over discs. Photons of equal flux that fall independently
-//! have the variance of a Poisson process.
+//! What comes straight from the lamp is no photon's; with paths as short as [`Field::max_depth`] every photon on the
+//! floor has come by one mirror. The floor's irradiance is that of the lamp's images; a kernel's expectation is its
+//! mean over discs. Photons of equal flux that fall independently have the variance of a Poisson process.
 
 use super::scenes::{add, build, look_at, matte, mirror, point_light, quad};
 use caustique::estimator::{InitialBandwidth, Pixel};
@@ -123,8 +123,8 @@ impl Field {
         power / f64::from(photons)
     }
 
-    /// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles whose radii
-    /// halve equal areas, exact to the sixth order in the radius.
+    /// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles
+    /// whose radii halve equal areas, exact to the sixth order in the radius.
     fn disc(self, x: f64, z: f64, radius2: f64) -> f64 {
         // Gauss-Legendre in the squared radius.
         const NODES: [(f64, f64); 3] =

@@ -14,8 +14,8 @@ pub fn t_statistic(values: &[f64], expected: f64) -> f64 {
     (mean - expected) / error.max(1e-12 * expected.abs().max(1e-300))
 }
 
-/// Two-sided critical value of Student's t for `tests` simultaneous tests at a family-wise error rate of `alpha` (Sidak), with
-/// `freedom` degrees of freedom.
+/// Two-sided critical value of Student's t for `tests` simultaneous tests at a family-wise error rate of `alpha`
+/// (Sidak), with `freedom` degrees of freedom.
 pub fn t_critical(alpha: f64, tests: usize, freedom: f64) -> f64 {
     use statrs::distribution::{ContinuousCDF, StudentsT};
     let single = 1.0 - (1.0 - alpha).powf(1.0 / tests as f64);
@@ -53,8 +53,8 @@ impl Check {
     }
 }
 
-/// P-value of Pearson's chi-squared test of counts against expectations. Cells are pooled, in order of expectation, until
-/// each pool expects at least [`LEAST_EXPECTED`]; counts where next to nothing is expected make the value zero.
+/// P-value of Pearson's chi-squared test of counts against expectations. Cells are pooled, in order of expectation,
+/// until each pool expects at least [`LEAST_EXPECTED`]; counts where next to nothing is expected make the value zero.
 pub fn chi_squared_p(counts: &[f64], expected: &[f64]) -> f64 {
     use statrs::distribution::{ChiSquared, ContinuousCDF};
     let mut cells: Vec<(f64, f64)> = expected.iter().copied().zip(counts.iter().copied()).collect();

@@ -148,8 +148,8 @@ struct Context3 {
     beside: *mut c_void,
 }
 
-/// `RTCRayQueryContext` of Embree 4 (the second number is there only where instances come in arrays, and padding otherwise) and
-/// what our filter finds behind it.
+/// `RTCRayQueryContext` of Embree 4 (the second number is there only where instances come in arrays, and padding
+/// otherwise) and what our filter finds behind it.
 #[repr(C)]
 struct Context4 {
     instance: [u32; 2],
@@ -174,7 +174,8 @@ pub unsafe fn beside<const MAJOR: u32, T>(arguments: &FilterArguments) -> *mut T
     beside.cast()
 }
 
-/// `RTCIntersectArguments` of Embree 4. The last field is there only in builds with `RTC_MIN_WIDTH`, and padding otherwise.
+/// `RTCIntersectArguments` of Embree 4. The last field is there only in builds with `RTC_MIN_WIDTH`, and padding
+/// otherwise.
 #[repr(C)]
 struct IntersectArguments4 {
     flags: u32,
@@ -321,8 +322,8 @@ impl Trace {
         }
     }
 
-    /// Like [`Trace::intersect`], with a filter that is asked about every hit which the geometry's own has let pass: of `filters` the
-    /// one for this version, which finds `with` by [`beside`].
+    /// Like [`Trace::intersect`], with a filter that is asked about every hit which the geometry's own has let pass: of
+    /// `filters` the one for this version, which finds `with` by [`beside`].
     ///
     /// # Safety
     /// As for [`Trace::intersect`]; the filters must be sound with a pointer to `T` that is `with`.

@@ -74,7 +74,8 @@ pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
     }
 }
 
-/// Filters of a ray, for Embree 3 and 4, that hand every hit to the closure `&mut dyn FnMut(Hit)` beside them, and let none stop the ray.
+/// Filters of a ray, for Embree 3 and 4, that hand every hit to the closure `&mut dyn FnMut(Hit)` beside them, and let
+/// none stop the ray.
 pub const REPORT: [FilterFunction; 2] = [report::<3>, report::<4>];
 
 /// # Safety

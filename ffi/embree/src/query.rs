@@ -115,7 +115,8 @@ impl Scene {
         (raw.hit.geometry != INVALID_GEOMETRY_ID).then(|| Hit::new(raw.ray.tfar, &raw.hit))
     }
 
-    /// Calls `each` with every hit on the segment, in no order. For few and short rays: each hit is a call back from Embree.
+    /// Calls `each` with every hit on the segment, in no order. For few and short rays: each hit is a call back from
+    /// Embree.
     pub fn each_hit(&self, ray: &Ray, each: &mut dyn FnMut(Hit)) {
         let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
         if !raw.ray.is_valid(self.reach) {
@@ -127,11 +128,11 @@ impl Scene {
         filter::resume_panic();
     }
 
-    /// Calls `each` with the nearest hits of up to eight rays that go much the same way, as those of neighbouring pixels do: faster than
-    /// one by one. `ray(k)` is ray k of 8, if there is one.
+    /// Calls `each` with the nearest hits of up to eight rays that go much the same way, as those of neighbouring
+    /// pixels do: faster than one by one. `ray(k)` is ray k of 8, if there is one.
     ///
-    /// Ties and rays through edges may be decided otherwise than by [`Scene::intersect`]; which rays are traced together decides,
-    /// nothing else.
+    /// Ties and rays through edges may be decided otherwise than by [`Scene::intersect`]; which rays are traced
+    /// together decides, nothing else.
     #[inline]
     pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
         if !self.packets {
@@ -173,8 +174,8 @@ impl Scene {
             }
             (all.tnear[k], all.tfar[k], all.id[k]) = (raw.tnear, raw.tfar, raw.id);
         }
-        // SAFETY: the scene is committed and alive; the structure is initialised and as large as any version's; `packets` says
-        // that the device supports them.
+        // SAFETY: the scene is committed and alive; the structure is initialised and as large as any version's;
+        // `packets` says that the device supports them.
         unsafe { self.trace.intersect8(&valid, self.raw, &mut all) };
         for k in 0..8 {
             if all.geometry[k] == INVALID_GEOMETRY_ID {

@@ -577,8 +577,9 @@ fn threads_may_build_at_once() {
 /// must not depend on the number of threads that built the scene, nor change from build to build.
 #[test]
 fn ties_do_not_depend_on_threads() {
-    // Flat, of a power of two and hit aslant, so that the six triangles around a corner are at the same distance to
-    // the last bit and in the ray's way all; and now and then a pile of triangles that are one and the same, higher than a leaf of Embree's tree.
+    // Flat, of a power of two and hit aslant, so that the six triangles around a corner are at the same distance to the
+    // last bit and in the ray's way all; and now and then a pile of triangles that are one and the same, higher than a
+    // leaf of Embree's tree.
     let (mut positions, mut indices) = grid(512);
     positions.iter_mut().for_each(|position| position[2] = 0.0);
     let targets = positions.clone();

@@ -131,7 +131,8 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     Ok(windows)
 }
 
-/// Settles what follows from the picture's size, and chooses for the runs that leave it to auto, for the time and iterations of a run; says what.
+/// Settles what follows from the picture's size, and chooses for the runs that leave it to auto, for the time and
+/// iterations of a run; says what.
 fn choose_all(
     args: &ConvergeArgs,
     mut runs: Vec<Run>,

@@ -15,12 +15,13 @@ use std::str::FromStr;
 
 /// Compare methods and settings: accuracy against time.
 ///
-/// Renders all runs in turns, one iteration of each, measures them at a geometric series of moments against a reference, and writes plots, tables,
-/// fitted exponents and crops as one page, DIR/index.html, beside points.csv, points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the
-/// running iteration and writes what there is.
+/// Renders all runs in turns, one iteration of each, measures them at a geometric series of moments against a
+/// reference, and writes plots, tables, fitted exponents and crops as one page, DIR/index.html, beside points.csv,
+/// points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the running iteration and writes what
+/// there is.
 ///
-/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. Where levels are combined, the combiner's time is
-/// added once, as if the run stopped at that moment.
+/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. Where levels are combined, the
+/// combiner's time is added once, as if the run stopped at that moment.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
 pub struct ConvergeArgs {
@@ -28,12 +29,12 @@ pub struct ConvergeArgs {
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
 
-    /// Methods, each with its defaults and a single image: one bandwidth level, no combiner [default: path,sppm,cppm,vcm, unless
-    /// there is a --run]
+    /// Methods, each with its defaults and a single image: one bandwidth level, no combiner [default:
+    /// path,sppm,cppm,vcm, unless there is a --run]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
     pub methods: Vec<Method>,
-    /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5'; may be
-    /// repeated. As there, levels are combined unless --no-combine is given
+    /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5';
+    /// may be repeated. As there, levels are combined unless --no-combine is given
     #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
     pub runs: Vec<String>,
     /// Stop each run after so many seconds of its own [default: 60, without --iterations]
@@ -67,7 +68,8 @@ pub struct ConvergeArgs {
     /// The reference's own error in the figure chosen, where its header does not tell: smaller figures are not reported
     #[arg(long, value_name = "E", value_parser = positive, requires = "reference", help_heading = "Error")]
     pub reference_error: Option<f64>,
-    /// Method of a reference made here [default: bdpt; vcm where the scene has caustics seen through glass or in mirrors]
+    /// Method of a reference made here [default: bdpt; vcm where the scene has caustics seen through glass or in
+    /// mirrors]
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with = "reference", help_heading = "Error")]
     pub reference_method: Option<Method>,
     /// Seconds for a reference made here, both halves together [default: 8 times --time]

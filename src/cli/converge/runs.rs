@@ -10,7 +10,8 @@ use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 
-/// Options beside a render's method that are not a run's: those of the picture itself, which all runs have in common, and files of its own.
+/// Options beside a render's method that are not a run's: those of the picture itself, which all runs have in common,
+/// and files of its own.
 const COMMON: [&str; 3] = ["seed", "max_depth", "debug_techniques"];
 /// Headings of options that may differ from run to run.
 const OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];

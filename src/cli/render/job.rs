@@ -28,29 +28,33 @@ pub struct Job {
     /// How light is found
     #[arg(long, value_enum, default_value_t = Method::Auto, help_heading = "Method")]
     pub method: Method,
-    /// Light paths sent from the lights in an iteration: more give a smoother start, fewer faster iterations [default: 100000]
+    /// Light paths sent from the lights in an iteration: more give a smoother start, fewer faster iterations [default:
+    /// 100000]
     ///
-    /// By ppm, sppm, appm and cppm in each iteration, by pm once, for its one map, 2000000 unless told otherwise; guided ones with --indirect paths send one
-    /// a pixel, at most 100000. The other methods send one for every eye path, or none
+    /// By ppm, sppm, appm and cppm in each iteration, by pm once, for its one map, 2000000 unless told otherwise;
+    /// guided ones with --indirect paths send one a pixel, at most 100000. The other methods send one for every eye
+    /// path, or none
     #[arg(long, value_name = "N", value_parser = whole(1_u32..=50_000_000), help_heading = "Method")]
     pub photons: Option<u32>,
-    /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a warning says
-    /// so [default: 1024]
+    /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a
+    /// warning says so [default: 1024]
     #[arg(long, value_name = "MIB", value_parser = whole(1..=u32::MAX), help_heading = "Expert")]
     pub photon_memory: Option<u32>,
-    /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp and noisy to smooth and blurred,
-    /// from which the combiner makes one. The combiner that comes with the program takes 5 [default: 5]
+    /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp
+    /// and noisy to smooth and blurred, from which the combiner makes one. The combiner that comes with the program
+    /// takes 5 [default: 5]
     #[arg(long, value_name = "M", value_parser = level_count, help_heading = "Expert")]
     pub levels: Option<usize>,
-    /// Eye paths of a pixel in an iteration with several levels: one for all levels, or two, of which one is level 1's own, as the network of
-    /// --model was trained with; they take about 1.7 times as long [default: 1, with --model 2]
+    /// Eye paths of a pixel in an iteration with several levels: one for all levels, or two, of which one is level 1's
+    /// own, as the network of --model was trained with; they take about 1.7 times as long [default: 1, with --model 2]
     #[arg(long, value_name = "1|2", value_parser = whole(1_u32..=2), help_heading = "Expert")]
     pub eye_paths: Option<u32>,
     /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
     /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
     #[arg(long, value_name = "knn|footprint|R", help_heading = "Expert")]
     pub initial_bandwidth: Option<BandwidthChoice>,
-    /// Photons within the largest bandwidth to begin with, 1 to 1024; with pm within every bandwidth [default: 20, with one level 10; pm: 100]
+    /// Photons within the largest bandwidth to begin with, 1 to 1024; with pm within every bandwidth [default: 20, with
+    /// one level 10; pm: 100]
     #[arg(long, value_name = "K", value_parser = whole(1_u32..=1024), help_heading = "Expert")]
     pub knn: Option<u32>,
     /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
@@ -63,32 +67,37 @@ pub struct Job {
     /// With cppm the factor of the squared bandwidth where nothing within it looks uniform, in (0, 1) [default: 0.8]
     #[arg(long, value_name = "K", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Expert")]
     pub cppm_k: Option<f64>,
-    /// With cppm the growth, with every reduction, of the number of photons it takes for a test: 1 to 1000 [default: 1.2]
+    /// With cppm the growth, with every reduction, of the number of photons it takes for a test: 1 to 1000 [default:
+    /// 1.2]
     #[arg(long, value_name = "BETA", value_parser = between(Included(1.0), Included(1000.0)), help_heading = "Expert")]
     pub cppm_beta: Option<f64>,
     /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
     #[arg(long, value_name = "P", value_parser = between(Excluded(0.0), Excluded(1.0)), help_heading = "Expert")]
     pub cppm_significance: Option<f64>,
-    /// With cppm red, green and blue apart, with photons of equal flux: finds what differs in colour or brightness but not in the number of photons, such as
-    /// the picture of a projector; takes about three times as long
+    /// With cppm red, green and blue apart, with photons of equal flux: finds what differs in colour or brightness but
+    /// not in the number of photons, such as the picture of a projector; takes about three times as long
     #[arg(long, help_heading = "Expert")]
     pub cppm_plus: bool,
-    /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found [default: memoryless; ppm: local]
+    /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found
+    /// [default: memoryless; ppm: local]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub radius_rule: Option<RadiusRule>,
-    /// How sppm and appm weigh photons by their distance: 'box' alike within the bandwidth, 'epanechnikov' and 'gaussian' (cut off at three
-    /// standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and the local rule count photons and need box [default: box]
+    /// How sppm and appm weigh photons by their distance: 'box' alike within the bandwidth, 'epanechnikov' and
+    /// 'gaussian' (cut off at three standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and
+    /// the local rule count photons and need box [default: box]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub kernel: Option<Kernel>,
-    /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short pilot finds them to matter; the light is
-    /// the same, its noise another. Not for path, pm and --cppm-plus [default: off; auto: on where light is focused]
+    /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short
+    /// pilot finds them to matter; the light is the same, its noise another. Not for path, pm and --cppm-plus [default:
+    /// off; auto: on where light is focused]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub guide: Option<Switch>,
-    /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves caustics to the photons
-    /// [default: photons]
+    /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves
+    /// caustics to the photons [default: photons]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub indirect: Option<Indirect>,
-    /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no limit]
+    /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no
+    /// limit]
     #[arg(long, value_name = "N", value_parser = whole(1_u32..=1_000_000), help_heading = "Method")]
     pub max_depth: Option<u32>,
     /// Seed: another number, other noise; the same number and options, the same picture to the last bit
@@ -379,7 +388,8 @@ impl Job {
         Strategy { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 
-    /// What auto's pilots are finished with: as the render, but for a network, and on one of several machines by our own denoiser, whose pictures are the same on all.
+    /// What auto's pilots are finished with: as the render, but for a network, and on one of several machines by our
+    /// own denoiser, whose pictures are the same on all.
     ///
     /// # Errors
     /// A library that was asked for by name is missing.

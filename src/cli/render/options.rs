@@ -1,4 +1,5 @@
-//! Every option of `caustique render`: default, unit, range and help in one place. Those about what is rendered and how are in [`super::job`].
+//! Every option of `caustique render`: default, unit, range and help in one place. Those about what is rendered and how
+//! are in [`super::job`].
 
 use super::job::{Job, idle};
 use super::preview::Target;
@@ -12,8 +13,9 @@ use std::path::PathBuf;
 
 /// Render a scene to a multichannel EXR, and to a PNG to look at.
 ///
-/// Without options: 64 iterations at 1280 pixels across, seen through the scene's first camera, by the method that suits the scene, denoised
-/// as far as its own errors allow. Ctrl-C finishes the running iteration and writes what there is; a second one ends at once.
+/// Without options: 64 iterations at 1280 pixels across, seen through the scene's first camera, by the method that
+/// suits the scene, denoised as far as its own errors allow. Ctrl-C finishes the running iteration and writes what
+/// there is; a second one ends at once.
 ///
 /// An option given twice: the last one holds. -h shows what a person needs first, --help everything.
 #[derive(clap::Args, Serialize)]
@@ -39,8 +41,8 @@ pub struct RenderArgs {
     #[serde(flatten)]
     pub picture: PictureArgs,
 
-    /// Show the picture while it renders, denoised: a file that is rewritten every few seconds (.png: under --exposure and --tonemap; .exr:
-    /// linear light and alpha), or 'tev', that viewer on this machine
+    /// Show the picture while it renders, denoised: a file that is rewritten every few seconds (.png: under --exposure
+    /// and --tonemap; .exr: linear light and alpha), or 'tev', that viewer on this machine
     #[arg(long, value_name = "FILE.png|FILE.exr|tev", help_heading = "Running")]
     #[serde(skip)]
     pub preview: Option<Target>,
@@ -48,8 +50,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     #[serde(skip)]
     pub threads: usize,
-    /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG: how path, light, bdpt, bpm or vcm share the light
-    /// among their strategies. Weighted pictures sum to the layer Noisy
+    /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG: how path, light, bdpt, bpm
+    /// or vcm share the light among their strategies. Weighted pictures sum to the layer Noisy
     #[arg(long, value_name = "DIR", help_heading = "Expert")]
     #[serde(skip)]
     pub debug_techniques: Option<PathBuf>,

@@ -1,17 +1,20 @@
-//! The adaptive rule \[Kaplanyan and Dachsbacher 2013\]: the bandwidth of least asymptotic error, from estimates of variance and bias.
+//! The adaptive rule \[Kaplanyan and Dachsbacher 2013\]: the bandwidth of least asymptotic error, from estimates of
+//! variance and bias.
 //!
-//! Photons of density q of squared contributions give one iteration the variance `q R / (pi r^2)`, and a field of Laplacian D biases its estimate by
-//! `r^2 k D / 2`, where R and k are the kernel's roughness and second moment. Over N iterations whose squared radii fall as `i^(-1/3)`, the
-//! variance is 3/4 of that at the last radius over N, and the bias 3/2 of that at the last radius. The sum of variance and squared bias is least at
+//! Photons of density q of squared contributions give one iteration the variance `q R / (pi r^2)`, and a field of
+//! Laplacian D biases its estimate by `r^2 k D / 2`, where R and k are the kernel's roughness and second moment. Over N
+//! iterations whose squared radii fall as `i^(-1/3)`, the variance is 3/4 of that at the last radius over N, and the
+//! bias 3/2 of that at the last radius. The sum of variance and squared bias is least at
 //!
 //! `r^6 = 2 q R / (3 pi N k^2 D^2)`.
 //!
 //! q is estimated within the bandwidth. D is estimated with a smooth kernel of a bandwidth of its own, which shrinks as
-//! `i^(-1/10)`, the rate of least error for second derivatives in the plane. Both are means over all iterations.
-//! A square of an estimate is too large by its variance, which is taken off D^2; else noise would be taken for curvature, and bandwidths in dim light
-//! shrink to nothing.
+//! `i^(-1/10)`, the rate of least error for second derivatives in the plane. Both are means over all iterations. A
+//! square of an estimate is too large by its variance, which is taken off D^2; else noise would be taken for curvature,
+//! and bandwidths in dim light shrink to nothing.
 //!
-//! Bandwidths may grow, but stay within constant factors of the memoryless rule's, so that the estimate is consistent whatever is found.
+//! Bandwidths may grow, but stay within constant factors of the memoryless rule's, so that the estimate is consistent
+//! whatever is found.
 
 use super::CountingRule;
 use super::memoryless::radius2_factor;
@@ -34,7 +37,8 @@ const LEAST_PHOTONS: u32 = 10;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adaptive<K>(PhantomData<K>);
 
-/// The bandwidth of one level of one pixel. The sums of the largest level of an eye path stand for all of them, and the levels keep their ratio.
+/// The bandwidth of one level of one pixel. The sums of the largest level of an eye path stand for all of them, and the
+/// levels keep their ratio.
 #[derive(Clone, Copy, Debug)]
 pub struct Bandwidth {
     /// Radius squared (m2).
@@ -163,8 +167,9 @@ mod tests {
         check::<Epanechnikov>();
     }
 
-    /// Photons of density 30,000 (1 + d / 4 (x^2 + y^2)), whose Laplacian is 30,000 d: the estimates are unbiased within five standard errors (3 % for
-    /// that of d = 80), and the bandwidth is positive, grows where there is no curvature and shrinks where there is.
+    /// Photons of density 30,000 (1 + d / 4 (x^2 + y^2)), whose Laplacian is 30,000 d: the estimates are unbiased
+    /// within five standard errors (3 % for that of d = 80), and the bandwidth is positive, grows where there is no
+    /// curvature and shrinks where there is.
     #[test]
     fn curvature_is_found_and_shrinks_bandwidths() {
         let run = |d: f64| {

@@ -1,7 +1,9 @@
-//! The chi-squared rule \[CPPM 2020\]: a bandwidth is kept as long as the photons within it look uniform, and shrinks only when a test says they do not.
+//! The chi-squared rule \[CPPM 2020\]: a bandwidth is kept as long as the photons within it look uniform, and shrinks
+//! only when a test says they do not.
 //!
-//! The disc of the bandwidth is cut into annuli of equal area and these into equal sectors (section 5.3). Photons of all iterations since the
-//! last reduction are counted where they fall, turned into the frame of their gathering point and laid flat \[(27)\].
+//! The disc of the bandwidth is cut into annuli of equal area and these into equal sectors (section 5.3). Photons of
+//! all iterations since the last reduction are counted where they fall, turned into the frame of their gathering point
+//! and laid flat \[(27)\].
 
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
@@ -32,7 +34,8 @@ impl Default for ChiSquaredSettings {
     }
 }
 
-/// Least count for the first test, B_1, however few neighbours set the bandwidth: below it the statistic does not follow its distribution.
+/// Least count for the first test, B_1, however few neighbours set the bandwidth: below it the statistic does not
+/// follow its distribution.
 pub const LEAST_BOUND: f32 = 10.0;
 
 /// Photons of a level that are counted at most: see [`ChiSquared::sums`].
@@ -57,7 +60,8 @@ pub struct ChiSquared {
 
 /// Cells of two annuli of six sectors.
 const USUAL: usize = 12;
-/// Bits of a cell in [`Tally::packed`], and how many times eight photons they count at most, of which a quarter are in each number.
+/// Bits of a cell in [`Tally::packed`], and how many times eight photons they count at most, of which a quarter are in
+/// each number.
 const BITS: u32 = 5;
 const MOST_EIGHTS: u32 = 15;
 const _: () = assert!(2 * MOST_EIGHTS < 1 << BITS && USUAL as u32 * BITS < u64::BITS);
@@ -75,7 +79,8 @@ const EVEN: u64 = {
 /// What the photons of one eye path add to counts.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within; the sum of four numbers.
+    /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within; the
+    /// sum of four numbers.
     packed: [u64x4; MAX_LEVELS],
     /// How many times eight photons these may be.
     eights: u32,
@@ -149,9 +154,10 @@ impl ChiSquared {
         }
     }
 
-    /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides \[(27)\]; a photon on
-    /// the normal through the point has none and counts in the first sector. The borders are lines through the centre, if their number is even, so that
-    /// a sector is the half it is in and the lines that it is beyond: the lower half is numbered backwards.
+    /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides
+    /// \[(27)\]; a photon on the normal through the point has none and counts in the first sector. The borders are
+    /// lines through the centre, if their number is even, so that a sector is the half it is in and the lines that it
+    /// is beyond: the lower half is numbered backwards.
     fn sectors(&self, frame: &Frame, offset: &[f32x8; 3]) -> f32x8 {
         let (u, v) = (along(frame.t, offset), along(frame.b, offset));
         if !self.sectors.is_multiple_of(2) {
@@ -196,7 +202,8 @@ impl ChiSquared {
         }
     }
 
-    /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: those of a path are first counted by five bits a cell.
+    /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: those of a path are
+    /// first counted by five bits a cell.
     #[inline(always)]
     fn count_usual(bandwidths: &[Bandwidth], counts: &mut [u32], tally: &mut Tally, frame: &Frame, photons: &Found) {
         let by = f32x8::splat;
@@ -248,7 +255,8 @@ impl ChiSquared {
         squares * counts.len() as f64 / total - total
     }
 
-    /// Whether counts in the innermost annuli pass the test, by [`ChiSquared::sums`]: the statistic, times the total, against the quantile, without a division.
+    /// Whether counts in the innermost annuli pass the test, by [`ChiSquared::sums`]: the statistic, times the total,
+    /// against the quantile, without a division.
     #[inline]
     fn looks_uniform(&self, annuli: usize, (total, squares): (f64, f64)) -> bool {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
@@ -262,7 +270,8 @@ impl ChiSquared {
         counts.iter_mut().for_each(|count| *count /= 2);
     }
 
-    /// After an iteration: tests if there are photons enough, and shrinks the bandwidth where they do not look uniform. Returns whether it shrank.
+    /// After an iteration: tests if there are photons enough, and shrinks the bandwidth where they do not look uniform.
+    /// Returns whether it shrank.
     #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
         let all = Self::sums(counts);
@@ -275,7 +284,8 @@ impl ChiSquared {
         rejected
     }
 
-    /// Shrinks the bandwidth to the largest inner disc that looks uniform, or by k where none does \[6.1, (13), (14)\]; then all counts are dropped.
+    /// Shrinks the bandwidth to the largest inner disc that looks uniform, or by k where none does \[6.1, (13), (14)\];
+    /// then all counts are dropped.
     #[cold]
     #[inline(never)]
     fn shrink(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) {
@@ -474,8 +484,9 @@ mod tests {
         }
     }
 
-    /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials and the error of the chi-squared
-    /// approximation, which 120 photons in 12 cells keep below half a percent. Photons of a slope are told.
+    /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials and the error
+    /// of the chi-squared approximation, which 120 photons in 12 cells keep below half a percent. Photons of a slope
+    /// are told.
     #[test]
     fn the_size_of_the_test_is_its_significance() {
         let rule = rule();

@@ -1,10 +1,11 @@
-//! The rule of local statistics \[Hachisuka, Ogaki, Jensen 2008; for shared statistics Hachisuka and Jensen 2009\]: of the photons that an iteration
-//! adds a share alpha is kept, and the disc shrinks as if the others had not been there.
+//! The rule of local statistics \[Hachisuka, Ogaki, Jensen 2008; for shared statistics Hachisuka and Jensen 2009\]: of
+//! the photons that an iteration adds a share alpha is kept, and the disc shrinks as if the others had not been there.
 //!
-//! With N photons so far, M new ones and flux tau, all three are scaled with the area:
-//! `N' = N + alpha M`, `R'^2 / R^2 = N' / (N + M)`, `tau' = (tau + tau_M) R'^2 / R^2` (the course's first talk; its slide leaves `tau_M` out).
-//! The estimate `tau / (pi R^2)` over the number of iterations is therefore the mean over iterations of `tau_M / (pi R^2)` with the radius each
-//! was gathered with: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no state of its own, and its variance is known.
+//! With N photons so far, M new ones and flux tau, all three are scaled with the area: `N' = N + alpha M`,
+//! `R'^2 / R^2 = N' / (N + M)`, `tau' = (tau + tau_M) R'^2 / R^2` (the course's first talk; its slide leaves `tau_M`
+//! out). The estimate `tau / (pi R^2)` over the number of iterations is therefore the mean over iterations of
+//! `tau_M / (pi R^2)` with the radius each was gathered with: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no
+//! state of its own, and its variance is known.
 
 use super::CountingRule;
 use crate::math::Frame;
@@ -65,8 +66,8 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The state of the papers, step by step, against the mean of what each iteration estimates; counts never fall, radii never grow and stay positive, and
-    /// the flux is scaled with the area.
+    /// The state of the papers, step by step, against the mean of what each iteration estimates; counts never fall,
+    /// radii never grow and stay positive, and the flux is scaled with the area.
     #[test]
     fn the_papers_recursion_is_a_mean_over_iterations() {
         let rule = LocalStatistics { alpha: 2.0 / 3.0 };
@@ -92,8 +93,9 @@ mod tests {
         assert!(radius2 < 0.1);
     }
 
-    /// Under uniform light an iteration finds photons in proportion to the area, and the product of the factors is that of the memoryless rule
-    /// \[Knaus and Zwicker 2011, 4.2\], begun one step earlier: `prod_{k=0}^{i-1} (k + alpha) / (k + 1)`.
+    /// Under uniform light an iteration finds photons in proportion to the area, and the product of the factors is that
+    /// of the memoryless rule \[Knaus and Zwicker 2011, 4.2\], begun one step earlier:
+    /// `prod_{k=0}^{i-1} (k + alpha) / (k + 1)`.
     #[test]
     fn under_uniform_light_it_shrinks_as_the_memoryless_rule() {
         let rule = LocalStatistics { alpha: 0.7 };

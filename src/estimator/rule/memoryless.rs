@@ -1,4 +1,5 @@
-//! The memoryless rule \[Knaus and Zwicker 2011\]: radii depend on the iteration alone, so iterations may run in any order.
+//! The memoryless rule \[Knaus and Zwicker 2011\]: radii depend on the iteration alone, so iterations may run in any
+//! order.
 //!
 //! `r_{i+1}^2 / r_i^2 = (i + alpha) / (i + 1)` \[post-reconstruction 2021, (4)\].
 
@@ -14,8 +15,8 @@ pub fn radius2_factor(i: u64, alpha: f64) -> f64 {
     if i <= EXACT {
         return product(i);
     }
-    // Gamma(x + alpha) / Gamma(x + 1) by Stirling's series of both; the difference of the large terms is taken in closed
-    // form, which a difference of two log-gammas would lose.
+    // Gamma(x + alpha) / Gamma(x + 1) by Stirling's series of both; the difference of the large terms is taken in
+    // closed form, which a difference of two log-gammas would lose.
     let ratio = |x: f64| {
         let (a, b) = (x + alpha, x + 1.0);
         let series = |z: f64| {

@@ -10,8 +10,8 @@ pub mod volume;
 use crate::math::Frame;
 use crate::transport::Found;
 
-/// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one eye path are counted and updated
-/// together.
+/// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one
+/// eye path are counted and updated together.
 pub trait CountingRule: Sync {
     /// State of a level of a pixel, kept between iterations.
     type Bandwidth: Copy + Send + Sync;
@@ -30,8 +30,8 @@ pub trait CountingRule: Sync {
     fn counts(&self) -> usize {
         1
     }
-    /// The bandwidth before the first iteration: its radius squared, the photons that the pilot found within it (0: not known), and by how
-    /// many levels it is larger than the method's own image's.
+    /// The bandwidth before the first iteration: its radius squared, the photons that the pilot found within it (0: not
+    /// known), and by how many levels it is larger than the method's own image's.
     fn begin(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
     /// Its radius squared.
     fn radius2(bandwidth: &Self::Bandwidth) -> f32;
@@ -41,7 +41,8 @@ pub trait CountingRule: Sync {
         let _ = bandwidths;
         largest2
     }
-    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all iterations.
+    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all
+    /// iterations.
     fn count(
         &self,
         bandwidths: &[Self::Bandwidth],

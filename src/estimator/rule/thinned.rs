@@ -1,10 +1,12 @@
 //! The chi-squared rule where photons differ in weight.
 //!
-//! Guided light paths are dense where the guide sends them, and carry little there. The test counts photons, so it would take the border between what is
-//! guided more and what is guided less for an edge in the light. Within a disc each photon therefore counts with a probability in proportion to its weight
-//! ([`Mark`](crate::photon::Mark)): what is counted is as dense as the light, whatever the guide does, and is still a Poisson process, so that the
-//! test means what it says. Where all weigh the same, one in 250 is lost (weights are told by their leading bits). Where they do not, the heaviest photon that a disc has seen decides how many of
-//! the others count, and the test takes longer; when a heavier one comes, those counted before are thinned as if it had been known.
+//! Guided light paths are dense where the guide sends them, and carry little there. The test counts photons, so it
+//! would take the border between what is guided more and what is guided less for an edge in the light. Within a disc
+//! each photon therefore counts with a probability in proportion to its weight ([`Mark`](crate::photon::Mark)): what is
+//! counted is as dense as the light, whatever the guide does, and is still a Poisson process, so that the test means
+//! what it says. Where all weigh the same, one in 250 is lost (weights are told by their leading bits). Where they do
+//! not, the heaviest photon that a disc has seen decides how many of the others count, and the test takes longer; when
+//! a heavier one comes, those counted before are thinned as if it had been known.
 
 use super::CountingRule;
 use super::chi_squared::{self, Bandwidth, ChiSquared, ChiSquaredSettings};
@@ -111,8 +113,9 @@ mod tests {
     use crate::photon::Mark;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Share of a thousand discs that are rejected after so many iterations, by the rule and by the one that takes all photons for alike. On one side of a line
-    /// through the disc photons are `denser` times as many as on the other and weigh as much less; beyond that the light is `brighter` on that side.
+    /// Share of a thousand discs that are rejected after so many iterations, by the rule and by the one that takes all
+    /// photons for alike. On one side of a line through the disc photons are `denser` times as many as on the other and
+    /// weigh as much less; beyond that the light is `brighter` on that side.
     fn rejected(denser: f32, brighter: f32) -> [f64; 2] {
         let settings = ChiSquaredSettings::default();
         let (thinned, plain) = (Thinned::new(&settings), ChiSquared::new(&settings));
@@ -151,8 +154,9 @@ mod tests {
         shrunk
     }
 
-    /// The gradient of a guide is not light, to this rule; it is to the one that counts all photons (the planted bug). An edge in the light is seen.
-    /// The share of 1000 discs that are rejected is 5 % within four standard errors and the chi-squared approximation's own error (below 1 % with these counts).
+    /// The gradient of a guide is not light, to this rule; it is to the one that counts all photons (the planted bug).
+    /// An edge in the light is seen. The share of 1000 discs that are rejected is 5 % within four standard errors and
+    /// the chi-squared approximation's own error (below 1 % with these counts).
     #[test]
     fn a_guides_gradient_is_not_light() {
         let allowed = 4.0 * (0.05f64 * 0.95 / 1000.0).sqrt() + 0.01;
@@ -166,7 +170,8 @@ mod tests {
         assert!(edge > 0.9, "{edge}");
     }
 
-    /// Photons that were counted before a heavier one came are as many as if it had come first, within four standard errors.
+    /// Photons that were counted before a heavier one came are as many as if it had come first, within four standard
+    /// errors.
     #[test]
     fn what_was_counted_before_is_thinned() {
         let rule = Thinned::new(&ChiSquaredSettings { significance: 1e-300, ..ChiSquaredSettings::default() });

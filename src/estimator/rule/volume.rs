@@ -1,16 +1,18 @@
-//! The memoryless rule in volumes \[Knaus and Zwicker 2011; Knaus in Hachisuka et al. 2013, "State of the art in photon density estimation", participating media\]:
-//! the kernel is a ball, so it is the radius cubed that shrinks.
+//! The memoryless rule in volumes \[Knaus and Zwicker 2011; Knaus in Hachisuka et al. 2013, "State of the art in photon
+//! density estimation", participating media\]: the kernel is a ball, so it is the radius cubed that shrinks.
 //!
-//! `r_{i+1}^3 / r_i^3 = (i + alpha) / (i + 1)`. Bandwidth levels halve the kernel's measure from one to the next as on surfaces, here the volume:
-//! radii are a factor 2^(-1/3) apart.
+//! `r_{i+1}^3 / r_i^3 = (i + alpha) / (i + 1)`. Bandwidth levels halve the kernel's measure from one to the next as on
+//! surfaces, here the volume: radii are a factor 2^(-1/3) apart.
 
 use super::memoryless::radius2_factor;
 
-/// Default of alpha. Variance falls as `N^-alpha` and squared bias, of order r^4, as `N^(-4 (1 - alpha) / 3)`: both as fast for 4/7, where the mean squared
-/// error falls as `N^(-4/7)` \[Kaplanyan and Dachsbacher 2013, for kernels of three dimensions\].
+/// Default of alpha. Variance falls as `N^-alpha` and squared bias, of order r^4, as `N^(-4 (1 - alpha) / 3)`: both as
+/// fast for 4/7, where the mean squared error falls as `N^(-4/7)` \[Kaplanyan and Dachsbacher 2013, for kernels of
+/// three dimensions\].
 pub const ALPHA: f64 = 4.0 / 7.0;
 
-/// Radius of iteration `i` (the first is 1) over that of the first: the product is the one of [`radius2_factor`], of the radius cubed.
+/// Radius of iteration `i` (the first is 1) over that of the first: the product is the one of [`radius2_factor`], of
+/// the radius cubed.
 pub fn radius_factor(i: u64, alpha: f64) -> f64 {
     radius2_factor(i, alpha).cbrt()
 }

@@ -1,7 +1,7 @@
 //! Headers with their attributes in order.
 //!
-//! The `exr` crate keeps custom attributes in a `HashMap` and writes them in its order, which changes from run to run. The size of
-//! a header does not depend on the order, so it is put right afterwards, in place.
+//! The `exr` crate keeps custom attributes in a `HashMap` and writes them in its order, which changes from run to run.
+//! The size of a header does not depend on the order, so it is put right afterwards, in place.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
@@ -26,7 +26,8 @@ pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F) -> io::Resul
     file.write_all(&attributes.concat())
 }
 
-/// One attribute as it stands in the file: name, zero, type, zero, size of the value (four bytes, little endian), value. `None` at the end.
+/// One attribute as it stands in the file: name, zero, type, zero, size of the value (four bytes, little endian),
+/// value. `None` at the end.
 fn read_attribute(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     if read_text(reader, &mut bytes)? == 0 {

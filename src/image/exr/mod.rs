@@ -1,7 +1,8 @@
 //! OpenEXR, in and out.
 //!
-//! Written: one part of scan lines, channels sorted by name, attributes sorted by name, chunks in order of lines; the same layers and
-//! attributes give the same bytes whatever the number of threads. Read: any flat EXR that the `exr` crate decodes.
+//! Written: one part of scan lines, channels sorted by name, attributes sorted by name, chunks in order of lines; the
+//! same layers and attributes give the same bytes whatever the number of threads. Read: any flat EXR that the `exr`
+//! crate decodes.
 
 mod header;
 mod read;

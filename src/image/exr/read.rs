@@ -19,11 +19,11 @@ use crate::film::{Layer, LayerSet, Plane, Sample};
 
 /// Reads every channel of every part, and the string attributes of all parts.
 ///
-/// The picture is the display window: what a part's data window leaves out is zero, what it has beyond is left out. Samples of
-/// type half and uint become `f32` (uint above 2^24 is rounded). Of tiled files with mip maps the full resolution is read. A channel
-/// `a.b.C` is the component `C` of the layer `a.b`; root channels `R G B A` (or `Y`) are the layer with the empty name, any
-/// other root channel `Q` is the layer `Q` with the one component `Q`. In a file of several parts the part's name precedes channels
-/// that do not hold it yet; only the first part's may stay at the root.
+/// The picture is the display window: what a part's data window leaves out is zero, what it has beyond is left out.
+/// Samples of type half and uint become `f32` (uint above 2^24 is rounded). Of tiled files with mip maps the full
+/// resolution is read. A channel `a.b.C` is the component `C` of the layer `a.b`; root channels `R G B A` (or `Y`) are
+/// the layer with the empty name, any other root channel `Q` is the layer `Q` with the one component `Q`. In a file of
+/// several parts the part's name precedes channels that do not hold it yet; only the first part's may stay at the root.
 ///
 /// Errors: a file that cannot be opened, is malformed, deep, subsampled or too large for its length. Never panics.
 pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
@@ -100,7 +100,8 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
     if promised > u128::from(length) * RATIO { Err(invalid("more pixels than the file can hold")) } else { Ok(()) }
 }
 
-/// A chunk of DWA begins with the sizes of its sections, eleven 64-bit numbers, and the decoder allocates what they say.
+/// A chunk of DWA begins with the sizes of its sections, eleven 64-bit numbers, and the decoder allocates what they
+/// say.
 fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
     let Some(header) = headers.get(chunk.layer_index) else { return Err(invalid("part index")) };
     let bytes = match &chunk.compressed_block {

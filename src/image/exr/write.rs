@@ -40,11 +40,11 @@ pub struct Options {
     pub naming: Naming,
 }
 
-/// Writes all layers and attributes to `path`, atomically (see [`atomic::write`]). Compresses on the current rayon pool; the bytes do not depend on
-/// its size.
+/// Writes all layers and attributes to `path`, atomically (see [`atomic::write`]). Compresses on the current rayon
+/// pool; the bytes do not depend on its size.
 ///
-/// Errors: a picture without pixels or channels, a channel name that other programs cannot read, an attribute that is not ASCII, the
-/// file system.
+/// Errors: a picture without pixels or channels, a channel name that other programs cannot read, an attribute that is
+/// not ASCII, the file system.
 pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Options) -> Result<()> {
     check(set, options.naming).map_err(|error| error.within(path.display()))?;
     let mut planes: Vec<(String, &Plane)> = Vec::new();

@@ -152,8 +152,8 @@ enum Tail {
     Glint,
 }
 
-/// A path so far, from a light. A byte, for photons: two bits of what is next to the light (`Tail`), two that count broad lobes and media up to two,
-/// one set where there is one and it is a medium, one of the light without size.
+/// A path so far, from a light. A byte, for photons: two bits of what is next to the light (`Tail`), two that count
+/// broad lobes and media up to two, one set where there is one and it is a medium, one of the light without size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightPrefix(u8);
 

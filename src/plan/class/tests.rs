@@ -104,7 +104,8 @@ fn nothing_is_ahead_that_was_not_told() {
     assert!(!caustic.ahead().has(PathClass::Sds) && !caustic.ahead().has(PathClass::Reflection));
 }
 
-/// Parts and effects cut the same classes: no part but that of light which surfaces have scattered before holds more than one effect, glossy and sds apart.
+/// Parts and effects cut the same classes: no part but that of light which surfaces have scattered before holds more
+/// than one effect, glossy and sds apart.
 #[test]
 fn sets_of_classes() {
     let off: EffectSet = [Effect::Caustic, Effect::Sds].into_iter().collect();

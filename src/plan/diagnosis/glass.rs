@@ -24,8 +24,8 @@ fn is_glass(material: &Material) -> bool {
     material.transmission >= 0.5 && material.ior != 1.0
 }
 
-/// Curved thin walls: most were meant to be solid, and thin only because the exporter wrote no thickness and the mesh is open. Flat ones are
-/// panes, which a thickness would change little.
+/// Curved thin walls: most were meant to be solid, and thin only because the exporter wrote no thickness and the mesh
+/// is open. Flat ones are panes, which a thickness would change little.
 pub(super) fn thin(scene: &Scene) -> Vec<String> {
     let (meshes, materials) = (&scene.shapes.meshes, &scene.materials.list);
     let mut flat: BTreeMap<u32, bool> = BTreeMap::new();

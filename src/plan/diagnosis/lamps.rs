@@ -22,8 +22,8 @@ const BOUNCES: usize = 4;
 /// Places on a surface that glows, and directions from each.
 const PLACES: (usize, u32) = (8, 64);
 
-/// Lamps in lumens beside surfaces and environments in watts, or the other way round: the units are a guess, and by the other guess the lights
-/// were in proportion. Lamps are compared with surfaces, suns with the environment.
+/// Lamps in lumens beside surfaces and environments in watts, or the other way round: the units are a guess, and by the
+/// other guess the lights were in proportion. Lamps are compared with surfaces, suns with the environment.
 pub(super) fn units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
@@ -56,7 +56,8 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
     ))
 }
 
-/// Lamps alone, where the file's writer never says what shines from all around. A scene without any light is told when it is built.
+/// Lamps alone, where the file's writer never says what shines from all around. A scene without any light is told when
+/// it is built.
 pub(super) fn no_environment(scene: &Scene, asked: &Asked) -> Option<String> {
     let dark = scene.world_unsaid && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
     (dark && !asked.switches.off.has(Effect::Environment)).then(|| {
@@ -111,7 +112,8 @@ fn sources(scene: &Scene) -> Vec<Source> {
     sources
 }
 
-/// Lamps in a casing that lets no light out. In a room without windows no light gets out, either: but there the camera is among what it lights.
+/// Lamps in a casing that lets no light out. In a room without windows no light gets out, either: but there the camera
+/// is among what it lights.
 pub(super) fn encased(scene: &Scene, camera: Vec3) -> Vec<String> {
     let mut warnings = Vec::new();
     for Source { name, object, rays } in sources(scene) {

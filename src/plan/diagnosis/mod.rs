@@ -1,7 +1,8 @@
 //! Why is there no caustic? What looks like a mistake in the scene, told from the scene alone, each with a remedy.
 //!
-//! What the file itself shows (open and inverted meshes, a scene without light) is told when it is read and built. Where rays are asked here, they go in
-//! fixed directions and their number is fixed: the same scene gets the same answer everywhere.
+//! What the file itself shows (open and inverted meshes, a scene without light) is told when it is read and built.
+//! Where rays are asked here, they go in fixed directions and their number is fixed: the same scene gets the same
+//! answer everywhere.
 
 mod glass;
 mod lamps;

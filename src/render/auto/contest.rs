@@ -1,8 +1,9 @@
 //! Candidates against each other, each by the finished picture that it makes of the same counted work.
 //!
-//! The first half of a candidate's iterations is finished as the render will be, and so is each quarter of them: what more iterations bring is told by both, and
-//! carried on to the end of the render as the power of their number that they show. All pictures are judged alike, by the second halves of all
-//! candidates, whose noise no picture shares: the mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
+//! The first half of a candidate's iterations is finished as the render will be, and so is each quarter of them: what
+//! more iterations bring is told by both, and carried on to the end of the render as the power of their number that
+//! they show. All pictures are judged alike, by the second halves of all candidates, whose noise no picture shares: the
+//! mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
 use super::trial::WORST;
@@ -19,7 +20,8 @@ pub(super) const ITERATIONS: (u64, u64) = (4, 256);
 const FIRST: f64 = 0.4;
 /// Those whose picture has so many times the squared error of the best after that are out.
 const UNCLEAR: f64 = 2.0;
-/// Standard errors that a difference has to stand out by: before a candidate is out, and before the usual way is left for a better one.
+/// Standard errors that a difference has to stand out by: before a candidate is out, and before the usual way is left
+/// for a better one.
 const TOLD: f64 = 2.0;
 
 /// A candidate and how it did.
@@ -39,7 +41,8 @@ pub struct Trial {
 pub(super) struct Candidate<'a> {
     way: Strategy,
     session: Session<'a>,
-    /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what comes before iterations.
+    /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what
+    /// comes before iterations.
     once: f64,
     whole: f64,
     spent: f64,
@@ -64,7 +67,8 @@ impl Trial {
 }
 
 impl<'a> Candidate<'a> {
-    /// Nothing done yet but what comes before iterations, of which one costs so much in the small picture and the whole one.
+    /// Nothing done yet but what comes before iterations, of which one costs so much in the small picture and the whole
+    /// one.
     pub fn new(stage: &'a Stage<'a>, way: Strategy, [once, whole]: [f64; 2]) -> Candidate<'a> {
         Candidate { way, session: Session::new(stage), once, whole, spent: 0.0 }
     }
@@ -110,7 +114,8 @@ fn without_worst(mut values: Vec<f64>) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// The judges, means of all candidates' by what their noise is, and the candidate whose finished picture says what pixels are worth.
+/// The judges, means of all candidates' by what their noise is, and the candidate whose finished picture says what
+/// pixels are worth.
 fn judges(shown: &[Option<Shown>]) -> Option<([Vec<[f32; 3]>; 2], &Shown)> {
     let all: Vec<&Shown> = shown.iter().flatten().collect();
     let least = *all.iter().min_by(|a, b| a.noise.total_cmp(&b.noise))?;
@@ -137,14 +142,15 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 impl Expected {
-    /// Carries what was told of a candidate's half, and of either quarter of it, on to `more` times the half's iterations, as the power of
-    /// their number that the mean errors show. It is linear in both, so that the power's own noise, which grows with the logarithm of
-    /// `more`, is in what it is told to be worth.
+    /// Carries what was told of a candidate's half, and of either quarter of it, on to `more` times the half's
+    /// iterations, as the power of their number that the mean errors show. It is linear in both, so that the power's
+    /// own noise, which grows with the logarithm of `more`, is in what it is told to be worth.
     fn carried(half: &[Judged], quarters: [&[Judged]; 2], more: f64) -> Expected {
         let of = |pixels: &[Judged]| mean(pixels.iter().map(|pixel| pixel.error));
         let (h, q) = (of(half), 0.5 * (of(quarters[0]) + of(quarters[1])));
         let more = more.max(1.0);
-        // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is missing.
+        // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is
+        // missing.
         let (of_half, of_quarter) = match h {
             _ if h <= 0.5 * q => (0.0, 0.5 / more),
             _ if h >= q => (1.0, 0.0),
@@ -168,7 +174,8 @@ impl Expected {
         self.0.as_ref().map_or(f64::INFINITY, error)
     }
 
-    /// How much more it leaves than another, and the standard error that the judges' noise gives that: both were judged by the same.
+    /// How much more it leaves than another, and the standard error that the judges' noise gives that: both were judged
+    /// by the same.
     fn more_than(&self, other: &Expected) -> (f64, f64) {
         let (Some(pixels), Some(others)) = (&self.0, &other.0) else {
             return (if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY }, 0.0);
@@ -195,8 +202,8 @@ impl Expected {
     }
 }
 
-/// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's `budget`. What
-/// is clear after the first share costs no more. Those are all there are once `stop` holds.
+/// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's
+/// `budget`. What is clear after the first share costs no more. Those are all there are once `stop` holds.
 pub(super) fn hold(
     candidates: &mut [Candidate<'_>],
     finish: &mut Finish,
@@ -245,7 +252,8 @@ fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, budget: f64) -
         let (shown, ([a, b], worth)) = (shown.as_ref()?, judged.as_ref()?);
         let of = |picture: &[[f32; 3]]| told::judge(picture, [a, b], &worth.finished);
         let earlier = shown.earlier.each_ref().map(|picture| of(picture));
-        // In the render's iterations over those of the half; the least number of iterations may have cost more than the share.
+        // In the render's iterations over those of the half; the least number of iterations may have cost more than the
+        // share.
         let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);
         Some(Expected::carried(&of(&shown.finished), [&earlier[0], &earlier[1]], more))
     };

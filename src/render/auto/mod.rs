@@ -1,10 +1,12 @@
-//! Choosing how to render. Vertex connection and merging, which weighs all techniques against each other for every path, is taken where glass or mirrors
-//! focus light. Elsewhere a short pilot renders it and paths without photons on a small picture of the same view, finished as
-//! the render will be, and another is taken where its picture is clearly closer to the truth: further than the pilot's own noise can say.
+//! Choosing how to render. Vertex connection and merging, which weighs all techniques against each other for every
+//! path, is taken where glass or mirrors focus light. Elsewhere a short pilot renders it and paths without photons on a
+//! small picture of the same view, finished as the render will be, and another is taken where its picture is clearly
+//! closer to the truth: further than the pilot's own noise can say.
 //!
-//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times constants (`super::cost`). So the
-//! same arguments give the same choice on any machine and any number of threads. Candidates get the same work, near to the render's own work
-//! per pixel, and their pictures are judged without a reference by iterations that they do not hold (`contest`).
+//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times
+//! constants (`super::cost`). So the same arguments give the same choice on any machine and any number of threads.
+//! Candidates get the same work, near to the render's own work per pixel, and their pictures are judged without a
+//! reference by iterations that they do not hold (`contest`).
 
 mod contest;
 mod pilot;
@@ -50,8 +52,8 @@ impl Choice {
     }
 }
 
-/// Tries the candidates and takes one by what `finish` makes of them. `make` gives the settings of a way, `None` where other wishes rule it out. Once `stop`
-/// holds, what is tried ends as soon as it can, and the choice is worth nothing.
+/// Tries the candidates and takes one by what `finish` makes of them. `make` gives the settings of a way, `None` where
+/// other wishes rule it out. Once `stop` holds, what is tried ends as soon as it can, and the choice is worth nothing.
 pub fn choose(
     (scene, camera): (&Scene, &Camera),
     finish: &mut Finish,

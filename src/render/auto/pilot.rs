@@ -23,11 +23,11 @@ const LEAST_SHARE: f64 = 0.1;
 const PIXELS: (f64, f64) = (1024.0, 16384.0);
 /// Pixels of the picture by which effects are weighed.
 const WEIGHED: f64 = 768.0;
-/// Iterations of a candidate over those of the render: near to the render's own, so that what they leave is what the render will, and few enough that the picture
-/// is not much smaller.
+/// Iterations of a candidate over those of the render: near to the render's own, so that what they leave is what the
+/// render will, and few enough that the picture is not much smaller.
 const ITERATIONS: f64 = 0.25;
-/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no more than its share of it. One core takes twice
-/// that share.
+/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no
+/// more than its share of it. One core takes twice that share.
 const CORES: f64 = 2.0;
 /// What a render until an error is reached is taken for (core-seconds).
 const UNLIMITED: f64 = 1000.0;
@@ -36,8 +36,9 @@ pub(super) fn focuses(scene: &Scene) -> bool {
     !scene.lights.targets().spheres().is_empty()
 }
 
-/// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors focus light it is one: what connections and
-/// photons leave out there a pilot is too short to miss, and would praise them for it.
+/// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors
+/// focus light it is one: what connections and photons leave out there a pilot is too short to miss, and would praise
+/// them for it.
 fn ways(scene: &Scene, make: &impl Fn(Strategy) -> Option<Settings>) -> Vec<(Strategy, Settings)> {
     let with_settings = |way: &Strategy| make(*way).map(|settings| (*way, settings));
     if focuses(scene) {
@@ -83,7 +84,8 @@ impl<'a> Pilot<'a> {
         WEIGHED.min(self.pixels)
     }
 
-    /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is too short, only those of light are weighed, or none.
+    /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is
+    /// too short, only those of light are weighed, or none.
     pub fn weigh(&self) -> (Vec<Weighed>, f64) {
         let settings = weights::settings(self.gathering, trial::PHOTONS);
         let once = self.cost.of(Strategy::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
@@ -105,7 +107,8 @@ impl<'a> Pilot<'a> {
         (weights::weigh(self.scene, &small, &settings, &presence, &properties, count), taken)
     }
 
-    /// Tries what there is, with what weighing the effects has left of the pilot; returns the trials, or why there are none.
+    /// Tries what there is, with what weighing the effects has left of the pilot; returns the trials, or why there are
+    /// none.
     pub fn try_all(
         &self,
         weighing: f64,
@@ -145,8 +148,8 @@ impl<'a> Pilot<'a> {
         (contest::hold(&mut candidates, finish, (allowed, budget), stop), None)
     }
 
-    /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too little for the smallest picture; `None` where even that takes
-    /// more than `most`.
+    /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too
+    /// little for the smallest picture; `None` where even that takes more than `most`.
     fn size(&self, ways: &[(Strategy, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
         let once = |way: &Strategy, settings: &Settings, pixels: f64| {
             self.cost.of(*way, &trial::settings(settings, pixels / self.pixels), pixels)

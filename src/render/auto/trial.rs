@@ -10,11 +10,12 @@ use crate::transport::MAX_LEVELS;
 
 /// Share of the light paths that are sent to weigh effects.
 pub(super) const PHOTONS: f64 = 0.125;
-/// Share of the pixels that are left out of means, those of the largest noise: a bright sample in a hundred or so of pixels says next to nothing about how
-/// often there is one.
+/// Share of the pixels that are left out of means, those of the largest noise: a bright sample in a hundred or so of
+/// pixels says next to nothing about how often there is one.
 pub(super) const WORST: f64 = 0.01;
 
-/// Settings of a small render: those of the large one with a share of its light paths, in bandwidths as much wider as the same number of neighbours asks for.
+/// Settings of a small render: those of the large one with a share of its light paths, in bandwidths as much wider as
+/// the same number of neighbours asks for.
 pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
     widened(of, photons, 1.0 / photons as f32)
 }
@@ -56,8 +57,9 @@ pub(super) fn scale(value: f64, floor: f64) -> f64 {
     1.0 / (value * value + floor)
 }
 
-/// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of `levels`. A pixel's own mean would not
-/// do: where one bright sample is all that it has, it is as large as its error. It counts where two eye paths agree on it, for lamps stand out.
+/// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of
+/// `levels`. A pixel's own mean would not do: where one bright sample is all that it has, it is as large as its error.
+/// It counts where two eye paths agree on it, for lamps stand out.
 pub(super) fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
     let smoothest = levels.count - 1;
     const REACH: usize = 2;

@@ -1,8 +1,10 @@
-//! What effects mean to the picture: how much of its light they are, how wrong it would be without them, and what leaving them out would save.
+//! What effects mean to the picture: how much of its light they are, how wrong it would be without them, and what
+//! leaving them out would save.
 //!
-//! The additive parts of the picture are told apart by any render. Two effects of light share a part with others, and pictures of their classes alone tell them: what
-//! narrow lobes show, and caustics seen in mirrors and glass. What is a property of the scene is told by a picture of the scene without it. Squares are products of two
-//! halves of the iterations, whose noise is not the same: what they have in common is the light.
+//! The additive parts of the picture are told apart by any render. Two effects of light share a part with others, and
+//! pictures of their classes alone tell them: what narrow lobes show, and caustics seen in mirrors and glass. What is a
+//! property of the scene is told by a picture of the scene without it. Squares are products of two halves of the
+//! iterations, whose noise is not the same: what they have in common is the light.
 
 use super::trial::{self, WORST, mean, scale, values};
 use crate::camera::Camera;
@@ -140,8 +142,8 @@ impl Scale<'_> {
     }
 }
 
-/// Weighs effects on a small picture by [`settings`] of a way that finds all of them: those of light that the scene calls for, and those of its `properties`. `count` counts what
-/// the scene costs without one.
+/// Weighs effects on a small picture by [`settings`] of a way that finds all of them: those of light that the scene
+/// calls for, and those of its `properties`. `count` counts what the scene costs without one.
 pub(super) fn weigh(
     scene: &Scene,
     camera: &Camera,
@@ -204,8 +206,8 @@ pub(super) fn weigh(
 }
 
 impl Weighed {
-    /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is counted
-    /// without a guide.
+    /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is
+    /// counted without a guide.
     pub fn saving(self, cost: &Cost, way: Strategy, settings: &Settings, pixels: f64) -> Weight {
         let saved = match self.without {
             // Of unguided paths it tells the share.

@@ -1,4 +1,5 @@
-//! Numbers of accessors (specification, sections 3.6.2 and 2.8 of KHR_mesh_quantization): every range is checked before memory is taken.
+//! Numbers of accessors (specification, sections 3.6.2 and 2.8 of KHR_mesh_quantization): every range is checked before
+//! memory is taken.
 
 use super::document::{Document, at, get};
 use super::fault;

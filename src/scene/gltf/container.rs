@@ -80,7 +80,8 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8])> {
     }
 }
 
-/// Checks the version and the extensions that the document names. Unknown required ones are an error, optional ones warnings.
+/// Checks the version and the extensions that the document names. Unknown required ones are an error, optional ones
+/// warnings.
 pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> {
     let asset = &document["asset"];
     for key in ["version", "minVersion"] {

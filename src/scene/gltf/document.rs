@@ -138,8 +138,8 @@ fn parts<T: DeserializeOwned>(raw: &Value, list: &str) -> Result<Vec<T>> {
     items.iter().enumerate().map(part).collect()
 }
 
-/// A part without its extensions and extras, which the crate cannot parse in every place where they may stand; and without
-/// numbers that the crate would cut down to 32 bits.
+/// A part without its extensions and extras, which the crate cannot parse in every place where they may stand; and
+/// without numbers that the crate would cut down to 32 bits.
 fn core(value: &Value, place: &str) -> Result<Value> {
     let wide = |key: &str| matches!(key, "count" | "byteLength" | "byteOffset" | "min" | "max");
     Ok(match value {

@@ -1,4 +1,5 @@
-//! `extras.caustique`: what glTF cannot say. Each kind of part has its keys; an unknown one is a warning with a suggestion.
+//! `extras.caustique`: what glTF cannot say. Each kind of part has its keys; an unknown one is a warning with a
+//! suggestion.
 
 use super::container::malformed;
 use super::fault;

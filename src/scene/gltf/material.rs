@@ -91,7 +91,8 @@ record! { Dispersion { dispersion: f32 = 0.0, }}
 /// A material, and whether the file itself says that its meshes are solid or thin.
 pub(super) struct Loaded {
     pub(super) material: Material,
-    /// `Some(true)`: a volume extension with a thickness, or a medium inside. `Some(false)`: a volume extension without thickness.
+    /// `Some(true)`: a volume extension with a thickness, or a medium inside. `Some(false)`: a volume extension without
+    /// thickness.
     pub(super) solid: Option<bool>,
     /// It has an occlusion texture, which is not read: occlusion is simulated.
     pub(super) occlusion: bool,
@@ -196,8 +197,8 @@ impl Reader<'_> {
         self.textures.reference(self.document, &info, usage, &place, self.warnings).map(Some)
     }
 
-    /// KHR_materials_pbrSpecularGlossiness: a dielectric whose reflectance at normal incidence is the specular colour, which
-    /// KHR_materials_ior's legacy index 0 (Fresnel's factor is 1 before the specular colour) expresses.
+    /// KHR_materials_pbrSpecularGlossiness: a dielectric whose reflectance at normal incidence is the specular colour,
+    /// which KHR_materials_ior's legacy index 0 (Fresnel's factor is 1 before the specular colour) expresses.
     fn specular_glossiness(&mut self, material: &mut Material) -> Result<()> {
         const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
         let Some(old) = self.extension::<SpecularGlossiness>(NAME)? else { return Ok(()) };

@@ -1,11 +1,11 @@
 //! Reads glTF 2.0 (`.glb`, `.gltf`) as Blender exports it, and as others do, into a [`Description`].
 //!
-//! The specification: <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate names the parts of a
-//! document; what they say about indices, ranges and bytes is checked here, because files come from anywhere: a fault is an
-//! error that names its place, and whatever is ignored or approximated is a warning.
+//! The specification: <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate names the parts of
+//! a document; what they say about indices, ranges and bytes is checked here, because files come from anywhere: a fault
+//! is an error that names its place, and whatever is ignored or approximated is a warning.
 //!
-//! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `nodes` (the hierarchy), which
-//! calls for meshes, materials and textures as it meets them, so that what no node uses is not even decoded.
+//! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `nodes` (the hierarchy),
+//! which calls for meshes, materials and textures as it meets them, so that what no node uses is not even decoded.
 
 mod accessor;
 mod container;
@@ -29,9 +29,9 @@ use std::path::Path;
 /// What the numbers of punctual lights mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LightUnits {
-    /// `extras.caustique.light_units` of the scene, or else the generator: Blender's exporter multiplies watts by 683 lm/W (and
-    /// leaves emissive surfaces alone), so its files are photometric. Other files state lamps and emissive surfaces in one
-    /// system, so their ratio holds when lamps are taken as they are.
+    /// `extras.caustique.light_units` of the scene, or else the generator: Blender's exporter multiplies watts by 683
+    /// lm/W (and leaves emissive surfaces alone), so its files are photometric. Other files state lamps and emissive
+    /// surfaces in one system, so their ratio holds when lamps are taken as they are.
     #[default]
     Auto,
     /// W/sr and W/m2: taken as they are.
@@ -67,8 +67,8 @@ pub struct ReadOptions {
 /// nowhere outside its folder unless `options` allow it.
 ///
 /// # Errors
-/// The file or one that it names cannot be read, is damaged, or requires an extension that is not supported. The place in
-/// the error names the file and the part of it.
+/// The file or one that it names cannot be read, is damaged, or requires an extension that is not supported. The place
+/// in the error names the file and the part of it.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
     let bytes = std::fs::read(path)
         .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;

@@ -412,8 +412,8 @@ impl Reader<'_> {
     }
 }
 
-/// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3), with
-/// all the digits of the file.
+/// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3),
+/// with all the digits of the file.
 fn local(raw: &Value, place: &str) -> Result<DAffine3> {
     fn numbers<const N: usize>(raw: &Value, key: &str, place: &str) -> Result<Option<[f64; N]>> {
         let Some(value) = raw.get(key) else { return Ok(None) };

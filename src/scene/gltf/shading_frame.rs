@@ -21,9 +21,9 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     repaired
 }
 
-/// Makes tangents along growing u of texture coordinates `set`: the mean over the faces around a vertex, weighted by the
-/// corners' angles, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF names, faces
-/// that are mirrored in the texture do not mix with others: a vertex between both kinds becomes two.
+/// Makes tangents along growing u of texture coordinates `set`: the mean over the faces around a vertex, weighted by
+/// the corners' angles, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF
+/// names, faces that are mirrored in the texture do not mix with others: a vertex between both kinds becomes two.
 pub(super) fn make_tangents(mesh: &mut Mesh, set: usize) {
     if mesh.uvs[set].is_empty() {
         return;

@@ -64,8 +64,8 @@ impl Default for Transform {
 }
 
 impl Transform {
-    /// Translation, rotation and scale as one matrix. Counter-clockwise with v running down, as the extension's text and its
-    /// example of the lower left quadrant have it (its GLSL, read by columns, turns the other way).
+    /// Translation, rotation and scale as one matrix. Counter-clockwise with v running down, as the extension's text
+    /// and its example of the lower left quadrant have it (its GLSL, read by columns, turns the other way).
     fn matrix(&self) -> [[f32; 3]; 2] {
         let (s, c) = self.rotation.sin_cos();
         let [x, y] = self.scale;

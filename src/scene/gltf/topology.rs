@@ -7,9 +7,11 @@ use std::collections::HashMap;
 /// What a set of triangles bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Solid {
-    /// Every edge, vertices welded by position, is shared by exactly two triangles that run along it in opposite directions.
+    /// Every edge, vertices welded by position, is shared by exactly two triangles that run along it in opposite
+    /// directions.
     pub(super) closed: bool,
-    /// Every edge is shared by two triangles, but some run along it in the same direction: part of the faces is turned over.
+    /// Every edge is shared by two triangles, but some run along it in the same direction: part of the faces is turned
+    /// over.
     pub(super) flipped: bool,
     /// Edges of one triangle alone: the rims of holes.
     pub(super) rim: usize,
@@ -17,7 +19,8 @@ pub(super) struct Solid {
     pub(super) volume: f64,
 }
 
-/// Looks at all triangles of `meshes` together. Triangles whose corners fall together bound nothing and are passed over.
+/// Looks at all triangles of `meshes` together. Triangles whose corners fall together bound nothing and are passed
+/// over.
 pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
     let mut welded: HashMap<[u32; 3], u32> = HashMap::new();
     // Negative zero is zero.

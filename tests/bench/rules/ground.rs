@@ -12,12 +12,13 @@ use caustique::scene::{Scene, View};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Light paths of an iteration of a reference by photons, and its neighbours: where photons alone find light, a third of the bias that the paper's setting has after
-/// 1,000 iterations.
+/// Light paths of an iteration of a reference by photons, and its neighbours: where photons alone find light, a third
+/// of the bias that the paper's setting has after 1,000 iterations.
 const REFERENCE: (u32, usize) = (1 << 18, 8);
 /// Scenes that bidirectional path tracing, which has no bias, is done with soon.
 const CONNECTED: [&str; 2] = ["blocks", "interior"];
-/// Scenes where single bright samples of it take too long to average out, and vertex connection and merging, whose bias is far below that of any rule, does.
+/// Scenes where single bright samples of it take too long to average out, and vertex connection and merging, whose bias
+/// is far below that of any rule, does.
 const MERGED: [&str; 1] = ["cornell"];
 
 /// The methods of the paper's comparison.
@@ -59,7 +60,8 @@ impl Ground {
         Shot::of(&session)
     }
 
-    /// Two independent halves that take so many core-seconds together: by bidirectional path tracing or VCM, if they converge here, else by SPPM with more light paths and narrower bandwidths. Kept in out/rules.
+    /// Two independent halves that take so many core-seconds together: by bidirectional path tracing or VCM, if they
+    /// converge here, else by SPPM with more light paths and narrower bandwidths. Kept in out/rules.
     pub fn reference(&self, seconds: f64) -> Reference {
         let method = match self.name.as_str() {
             name if CONNECTED.contains(&name) => Method::Bdpt,
@@ -141,7 +143,8 @@ impl Shot {
     }
 }
 
-/// Two independent pictures of little bias. What a picture differs from one, times what it differs from the other, expects its own squared error alone.
+/// Two independent pictures of little bias. What a picture differs from one, times what it differs from the other,
+/// expects its own squared error alone.
 pub struct Reference {
     pub halves: [Shot; 2],
     /// Of each half.

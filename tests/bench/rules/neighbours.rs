@@ -9,7 +9,8 @@ use std::path::Path;
 
 const NEIGHBOURS: [usize; 6] = [5, 10, 20, 40, 80, 160];
 
-/// Errors by method and number, and of APPM whose first bandwidth is the same everywhere: a tenth of the scene's radius.
+/// Errors by method and number, and of APPM whose first bandwidth is the same everywhere: a tenth of the scene's
+/// radius.
 pub fn neighbours(
     grounds: &[Ground],
     (photons, iterations, seeds): (u32, u64, u64),

@@ -6,7 +6,8 @@ use caustique::render::{Session, Stage};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Bandwidths (first seed) and errors of photons' light (root mean square over seeds, of the truth) at a smooth place and at an edge.
+/// Bandwidths (first seed) and errors of photons' light (root mean square over seeds, of the truth) at a smooth place
+/// and at an edge.
 pub fn points(
     ground: &Ground,
     (photons, iterations, seeds): (u32, u64, u64),

@@ -1,4 +1,5 @@
-//! Mutants of good files: every one is read or refused with a message, none panics, hangs or takes the machine's memory.
+//! Mutants of good files: every one is read or refused with a message, none panics, hangs or takes the machine's
+//! memory.
 
 use super::glb::{Glb, pack};
 use caustique::scene::description::EnvironmentSource;

@@ -221,7 +221,8 @@ fn solids_of_several_primitives() {
     assert_eq!((scene.instances[0].object, scene.instances[1].object), (0, 0));
 }
 
-/// Tangents along growing u; w as glTF has it, so that the bitangent looks to where v falls. A mirrored half gets its own vertices.
+/// Tangents along growing u; w as glTF has it, so that the bitangent looks to where v falls. A mirrored half gets its
+/// own vertices.
 #[test]
 fn tangents_for_normal_maps() {
     let mut file = Glb::new();

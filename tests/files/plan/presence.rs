@@ -52,7 +52,8 @@ fn effects_are_there_for_reasons() {
         (Some("photons"), Some("photons"))
     );
     assert!(everything.effect(Effect::Dispersion).simulated);
-    // Photons find it all; connections do not find what a lamp without size throws through glass, and nothing bounds that.
+    // Photons find it all; connections do not find what a lamp without size throws through glass, and nothing bounds
+    // that.
     assert_eq!(everything.left_out_at_most, Some(0.0));
     assert_eq!(plan_by(scene.clone(), Search::Connections).left_out_at_most, None);
     // Without light nothing is lit.
@@ -61,7 +62,8 @@ fn effects_are_there_for_reasons() {
     assert_eq!(present(&plan(scene)), "dispersion");
 }
 
-/// Photons take part in gloss only where they may be of lamps that sharp lobes show by way of clear glass or perfect mirrors.
+/// Photons take part in gloss only where they may be of lamps that sharp lobes show by way of clear glass or perfect
+/// mirrors.
 #[test]
 fn who_brings_gloss() {
     let by = |lamp: bool, ball: Material, shining: Material| {

@@ -1,4 +1,5 @@
-//! A scene without an effect is rendered as the scene that never had it, to the last bit: whether it is left out of the description or of the scene.
+//! A scene without an effect is rendered as the scene that never had it, to the last bit: whether it is left out of the
+//! description or of the scene.
 
 use super::floor;
 use crate::support::scenes::{add, build, glass, matte, point_light, quad, square};

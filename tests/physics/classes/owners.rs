@@ -45,7 +45,8 @@ impl Scribe<'_> {
         }
     }
 
-    /// Paths whose last vertex of this walk is one with some events: lit straight from a light of either kind, or connected to the camera.
+    /// Paths whose last vertex of this walk is one with some events: lit straight from a light of either kind, or
+    /// connected to the camera.
     fn ends(&mut self, events: &[Event]) {
         for event in events {
             let path = format!("{}{}", self.sofar, letter(*event));
@@ -110,8 +111,8 @@ fn delta(path: &str) -> bool {
     path.chars().all(|c| "CM".contains(c))
 }
 
-/// Who would count a path, once for each time, as the estimators go about it: which lobes eye paths go on with, where they are lit, where they gather, which
-/// photons are left there. Nothing here knows of classes.
+/// Who would count a path, once for each time, as the estimators go about it: which lobes eye paths go on with, where
+/// they are lit, where they gather, which photons are left there. Nothing here knows of classes.
 fn counted(search: Search, (path, sizeless): &Whole) -> Vec<Owner> {
     let sizeless = *sizeless;
     let mut owners = Vec::new();
@@ -154,7 +155,8 @@ fn counted(search: Search, (path, sizeless): &Whole) -> Vec<Owner> {
 /// Paths that are not counted exactly once, by the owner of their class.
 fn faults(paths: &HashSet<Whole>, search: Search, counted: impl Fn(&Whole) -> Vec<Owner>) -> Vec<String> {
     let class = |whole: &Whole| PathClass::of(whole.0.chars().map(event), whole.1);
-    // Without photons nobody finds a light without size by a mirror; eye paths that go on are not for media that scatter; a map holds none of them.
+    // Without photons nobody finds a light without size by a mirror; eye paths that go on are not for media that
+    // scatter; a map holds none of them.
     let invisible = |(path, sizeless): &Whole| {
         *sizeless && (delta(path) || (search == Search::EyePaths && path.ends_with(['C', 'M'])))
     };
@@ -240,7 +242,8 @@ fn planted_faults_are_found() {
     }));
 }
 
-/// Every method has at most one owner for every class, and no class that photons or connections could bring is without one.
+/// Every method has at most one owner for every class, and no class that photons or connections could bring is without
+/// one.
 #[test]
 fn every_class_has_an_owner_in_every_plan() {
     let searches = [

@@ -60,8 +60,8 @@ fn apart(a: &Rendered, b: &Rendered, sum: &Rendered) -> f64 {
     worst
 }
 
-/// With the same random numbers a picture is the sum of one class and all others, in every part. A render of photons alone for caustics draws other
-/// numbers where surfaces would also scatter broadly; those are compared below.
+/// With the same random numbers a picture is the sum of one class and all others, in every part. A render of photons
+/// alone for caustics draws other numbers where surfaces would also scatter broadly; those are compared below.
 #[test]
 fn a_class_and_all_others_are_the_whole() {
     let scene = room(true);
@@ -118,8 +118,8 @@ fn every_method_leaves_out_what_is_switched_off() {
     }
 }
 
-/// What is left is the same to the last bit where a bandwidth does not depend on it; without what photons bring none is traced, and without what
-/// only surfaces scatter on light paths end early.
+/// What is left is the same to the last bit where a bandwidth does not depend on it; without what photons bring none is
+/// traced, and without what only surfaces scatter on light paths end early.
 #[test]
 fn photons_that_nobody_wants_are_not_traced() {
     let scene = room(true);
@@ -167,8 +167,8 @@ fn differ(a: &[Vec<f64>], b: &[Vec<f64>]) -> bool {
     (a - b).abs() > t_critical(1e-3, 1, 9.0) * error_a.hypot(error_b) + 0.03 * b
 }
 
-/// Each class alone is the same light whoever brings it: photons, paths, or all weighed against each other. Were one carried twice or by nobody, it would be
-/// twice as bright or dark.
+/// Each class alone is the same light whoever brings it: photons, paths, or all weighed against each other. Were one
+/// carried twice or by nobody, it would be twice as bright or dark.
 #[test]
 fn a_class_is_the_same_light_by_every_method() {
     let scene = room(false);
