@@ -1,5 +1,6 @@
 //! Triangle meshes and where they stand.
 
+use super::surface::error_within;
 use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
 
 /// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has
@@ -73,13 +74,17 @@ pub struct Placement {
     pub points: Affine3A,
     /// Of normals, up to length: the inverse transpose. The front of a mirrored mesh stays its front, as glTF wants.
     pub normals: Mat3A,
+    /// Largest coordinate of a point of the mesh, once turned and scaled, over its largest coordinate before.
+    stretch: f32,
 }
 
 impl Placement {
     /// From an affine transform that can be inverted.
     pub fn new(points: Affine3A) -> Placement {
         let normals = points.matrix3.inverse().transpose();
-        Placement { points, normals }
+        let rows = points.matrix3.transpose();
+        let sums = [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().element_sum());
+        Placement { points, normals, stretch: sums.into_iter().fold(0.0, f32::max) }
     }
 }
 
@@ -91,6 +96,14 @@ impl Instance {
             None => p,
             Some(placement) => placement.points.transform_point3(p),
         }
+    }
+
+    /// How far a point `p` in world space may be off from a triangle of the mesh no coordinate of whose corners is
+    /// larger than `largest` in the mesh's own space.
+    #[inline]
+    pub(super) fn error(&self, largest: f32, p: Vec3) -> f32 {
+        let stretch = self.to_world.as_ref().map_or(1.0, |placement| placement.stretch);
+        error_within((largest * stretch).max(p.abs().max_element()))
     }
 
     /// A normal of the mesh in world space, not normalised.

@@ -26,12 +26,15 @@ pub struct Surface {
     pub primitive: u32,
     /// Index of the material.
     pub material: u32,
+    /// How far from its triangle the position may be, and how far Embree's own arithmetic may see that triangle from
+    /// there (scene units).
+    pub error: f32,
     /// Others lie on it here, and it is known which comes first (`scene/contact.rs`).
     pub touching: bool,
 }
 
 /// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest
-/// coordinate: eight roundings, where the products and sums of a transform (four), of barycentric coordinates (two),
+/// coordinate of the position and of its triangle's corners: eight roundings, where the products and sums of a transform (four), of barycentric coordinates (two),
 /// and those of Embree's own corners (two) are.
 const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 
@@ -84,6 +87,7 @@ impl Surface {
             instance: instance_index,
             primitive,
             material: instance.material,
+            error: instance.error(c0.p.abs().max(c1.p.abs()).max(c2.p.abs()).max_element(), p),
             touching: false,
         })
     }
@@ -92,18 +96,25 @@ impl Surface {
     /// error bound of the position, so that the ray does not hit the surface it leaves.
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Vec3 {
-        spawn(self.p, self.ng, direction)
+        spawn(self.p, self.ng, direction, self.error)
     }
 }
 
-/// How far from its surface a computed position may be (scene units).
+/// How far from its triangle a position may be, where no coordinate of either is larger than `largest` (scene units).
 #[inline]
-pub fn error(p: Vec3) -> f32 {
-    POSITION_ERROR * p.abs().max_element().max(1e-3)
+pub(super) fn error_within(largest: f32) -> f32 {
+    POSITION_ERROR * largest.max(1e-3)
 }
 
-/// [`Surface::spawn`] for a point of a triangle with unit normal `ng`.
+/// The same for the points of a triangle with these corners in world space.
 #[inline]
-pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3) -> Vec3 {
-    p + ng * error(p).copysign(direction.dot(ng))
+pub fn error(corners: [Vec3; 3]) -> f32 {
+    let [a, b, c] = corners.map(Vec3::abs);
+    error_within(a.max(b).max(c).max_element())
+}
+
+/// [`Surface::spawn`] for a point of a triangle with unit normal `ng` that may be off by `error`.
+#[inline]
+pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
+    p + ng * error.copysign(direction.dot(ng))
 }

@@ -1,9 +1,15 @@
 //! One light source and the densities that belong to it.
 
 use super::{Environment, Spread};
-use crate::geometry::Shapes;
+use crate::geometry::{Shapes, error};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
+
+/// How far the points of a triangle, given by a corner and the edges to the others, may be off (scene units).
+#[inline]
+pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
+    error([corner, corner + a, corner + b])
+}
 
 /// A light source. The set is closed: a scene's lights are one flat list.
 #[derive(Clone, Debug)]

@@ -12,6 +12,7 @@
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
 use super::emission::{EmissionSample, Entry};
+use super::emitter::position_error;
 use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, spawn};
@@ -246,7 +247,8 @@ impl Guide {
         let d = Frame::from_normal(axis).to_world(warp::cone_uniform(direction, one_minus_cos));
         if let Emitter::Triangle { plane, corners, .. } = &lights.emitters()[emission.light as usize] {
             let b = warp::triangle_uniform(point);
-            emission.origin = spawn(corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate(), d);
+            let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
+            emission.origin = spawn(at, plane.truncate(), d, position_error(corners));
         }
         emission.direction = d;
         (emission.density.onward, emission.density.cos) = lights.onward(emission.light as usize, d)?;

@@ -5,7 +5,7 @@ use super::aim::Targets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
-use super::emitter::{Emitter, Sky, spot_falloff, spot_point, spot_solid_angle};
+use super::emitter::{Emitter, Sky, position_error, spot_falloff, spot_point, spot_solid_angle};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::spread::Spread;
@@ -241,7 +241,7 @@ impl Lights {
                 let radiance = radiance * toward;
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 let arrival_pdf_a = Self::onto(cos.abs(), *two_sided, spread) / distance2;
-                let target = Some(spawn(at, ng, -wi));
+                let target = Some(spawn(at, ng, -wi, position_error(corners)));
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a })
             }
             Emitter::Point { p: at, intensity } => {
@@ -422,7 +422,12 @@ impl Lights {
                     return None;
                 }
                 let flux = radiance * (PI * area * along * if *two_sided { 2.0 } else { 1.0 });
-                (spawn(at, ng, d), d, flux, [1.0 / area, Self::onto(cos, *two_sided, spread), cos])
+                (
+                    spawn(at, ng, d, position_error(corners)),
+                    d,
+                    flux,
+                    [1.0 / area, Self::onto(cos, *two_sided, spread), cos],
+                )
             }
             Emitter::Point { p, intensity } => {
                 (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])

@@ -56,6 +56,7 @@ fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Inte
         instance: 0,
         primitive: 0,
         material: 0,
+        error: 0.0,
         touching: false,
     };
     Interface::new(&material.parameters(&ANYWHERE, &[], eta), tables)

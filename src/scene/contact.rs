@@ -1,6 +1,6 @@
 //! Surfaces that lie on each other: a glass on a table, a liquid in a glass, sheets in a stack.
 //!
-//! A ray goes on a little past the surface it leaves ([`error`]), for rounding decides about what is nearer; so
+//! A ray goes on a little past the surface it leaves ([`Surface::error`]), for rounding decides about what is nearer; so
 //! whatever lies in that little way has to be met by other means. Where light passes a triangle that others may lie on
 //! ([`Contacts`](super::Contacts)), all others there are looked for, and taken to lie on each other in this order,
 //! whichever Embree finds first:
@@ -15,7 +15,7 @@
 
 use super::Scene;
 use super::contacts::face_each_other;
-use crate::geometry::{Surface, error};
+use crate::geometry::Surface;
 use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
@@ -34,6 +34,7 @@ pub struct Place {
     instance: u32,
     primitive: u32,
     material: u32,
+    error: f32,
 }
 
 impl Place {
@@ -45,8 +46,8 @@ impl Place {
 
     #[inline(always)]
     fn of(surface: &Surface) -> Place {
-        let Surface { p, ng, instance, primitive, material, .. } = *surface;
-        Place { p, ng, instance, primitive, material }
+        let Surface { p, ng, instance, primitive, material, error, .. } = *surface;
+        Place { p, ng, instance, primitive, material, error }
     }
 }
 
@@ -69,7 +70,7 @@ fn order(scene: &Scene, place: &Place, direction: Vec3) -> (u8, i64, i64) {
 type Others = SmallVec<[(Place, Hit); 3]>;
 
 fn others(scene: &Scene, at: &Place, token: u32) -> Others {
-    let reach = error(at.p);
+    let reach = at.error;
     let (origin, direction) = (at.p - at.ng * reach, at.ng);
     let mut others = Others::new();
     let mut add = |hit: Hit| {

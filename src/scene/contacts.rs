@@ -92,8 +92,7 @@ impl Contacts {
             let corners = placed.corners(&shapes.meshes[placed.mesh as usize], primitive);
             let [a, b, c] = corners;
             let normal = (b - a).cross(c - a).try_normalize()?;
-            let error = corners.map(error).into_iter().fold(0.0, f32::max);
-            Some(Triangle { corners, normal, error, instance, primitive })
+            Some(Triangle { corners, normal, error: error(corners), instance, primitive })
         };
         let of = |instance: u32| {
             let mesh = &shapes.meshes[shapes.instances[instance as usize].mesh as usize];

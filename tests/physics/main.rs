@@ -14,6 +14,7 @@ mod furnaces;
 mod glints;
 mod guide;
 mod lamps;
+mod large_triangles;
 mod long_paths;
 mod many_lights;
 mod material;

@@ -24,6 +24,7 @@ fn surface() -> Surface {
         instance: 0,
         primitive: 0,
         material: 0,
+        error: 0.0,
         touching: false,
     }
 }

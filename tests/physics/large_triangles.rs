@@ -1,0 +1,60 @@
+//! Points of large triangles near the origin: positions there look exact, and the triangle that they are on is not.
+//!
+//! A matt plane under parallel light is as bright everywhere, without noise: reflectance / pi times irradiance times the
+//! cosine. What is darker is shaded by itself.
+
+use crate::support;
+
+use caustique::math::{DAffine3, DVec3, Rgb};
+use caustique::render::{Control, Levels, Method, Settings, render};
+use caustique::scene::Description;
+use caustique::scene::description::{PunctualKind, PunctualLight};
+use glam::DQuat;
+use std::f64::consts::PI;
+use support::scenes::{add, build, look_at, matte, quad, square};
+
+/// Least and largest value of the picture of a plane that is turned about x and z, reaches `half` to each side, and is
+/// seen from a little above a point beside the origin; over what it should be.
+fn extremes(half: f32, method: Method, turn: DQuat) -> (f64, f64) {
+    let mut description = Description::default();
+    let along = |v: DVec3| (turn * v).as_vec3() * (2.0 * half);
+    let (a, b) = (along(DVec3::Z), along(DVec3::X));
+    add(&mut description, "plane", quad(-0.5 * (a + b), a, b), matte(0.5, 0.0));
+    let normal = turn * DVec3::Y;
+    // Aslant, so that cosines matter, but well above the horizon.
+    let light = (normal + turn * DVec3::new(0.3, 0.0, 0.2)).normalize();
+    description.lights.push(PunctualLight {
+        name: "sun".into(),
+        to_world: DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::Z, light)),
+        intensity: Rgb::splat(3.0),
+        kind: PunctualKind::Sun { angle: 0.0 },
+        radius: 0.0,
+        hidden_from_camera: false,
+    });
+    let at = turn * DVec3::new(0.013, 0.0, -0.007);
+    description.cameras.push(look_at(at + normal * 0.4 + turn * DVec3::new(0.1, 0.0, 0.05), at, 50.0));
+    let scene = build(description);
+    let camera = scene.camera(&square(16)).expect("a camera");
+    let settings =
+        Settings { method, levels: Levels::new(1), iterations: Some(4), photons: 100, ..Settings::default() };
+    let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+    let expected = 0.5 / PI * 3.0 * normal.dot(light);
+    let values = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.x / expected);
+    values.fold((f64::INFINITY, 0.0), |(least, largest), value| (least.min(value), largest.max(value)))
+}
+
+#[test]
+fn a_large_tilted_plane_does_not_shade_itself() {
+    for half in [1.0, 10.0, 1000.0] {
+        for (i, angle) in [0.0, 0.4, 0.9, 1.3, 2.2].into_iter().enumerate() {
+            let turn = DQuat::from_rotation_x(angle) * DQuat::from_rotation_z(0.7 * angle + 0.1 * i as f64);
+            for method in [Method::Path, Method::Sppm] {
+                let (least, largest) = extremes(half, method, turn);
+                assert!(
+                    least > 0.999 && largest < 1.001,
+                    "{half} m, turned by {angle}, {method:?}: from {least} to {largest} of what it should be"
+                );
+            }
+        }
+    }
+}
