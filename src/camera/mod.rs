@@ -1,10 +1,12 @@
 //! Cameras: perspective and orthographic, with a thin lens; rays from the film and importance towards a point.
 
+mod filter;
 mod tiles;
 
+pub use filter::{Filter, WIDEST};
 pub use tiles::{GROUP, Place, band, par_pixels};
 
-use crate::math::{DVec3, Mat3, Vec2, Vec3, warp};
+use crate::math::{DMat3, DMat4, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
 
 /// How the film maps to directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +32,9 @@ pub struct Camera {
     height: u32,
     /// Share of a pixel's side that its rays cover.
     covered: f32,
+    filter: Filter,
+    /// Width of the whole picture over that of this film, which is a window of it.
+    whole: f32,
 }
 
 /// A ray from the film.
@@ -70,6 +75,8 @@ impl Camera {
             width: size.0,
             height: size.1,
             covered: 1.0,
+            filter: Filter::default(),
+            whole: 1.0,
         }
     }
 
@@ -77,6 +84,26 @@ impl Camera {
     pub fn shifted(&self, shift: Vec2) -> Camera {
         let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
         Camera { offset: 2.0 * shift * half, ..*self }
+    }
+
+    /// The same with another pixel filter.
+    pub fn filtered(&self, filter: Filter) -> Camera {
+        Camera { filter, ..*self }
+    }
+
+    /// A window of the picture: left edge, top edge, width and height in pixels. All but its size is as in the whole
+    /// picture.
+    pub fn window(&self, [x, y, width, height]: [u32; 4]) -> Camera {
+        let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
+        let (corner, size) = (Vec2::new(x as f32, y as f32), Vec2::new(width as f32, height as f32));
+        let offset = self.plane(corner + 0.5 * size, half);
+        let half = half * size / Vec2::new(self.width as f32, self.height as f32);
+        let projection = match self.projection {
+            Projection::Perspective(_) => Projection::Perspective(half),
+            Projection::Orthographic(_) => Projection::Orthographic(half),
+        };
+        let whole = self.whole * self.width as f32 / width as f32;
+        Camera { projection, offset, width, height, whole, ..*self }
     }
 
     /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film:
@@ -98,10 +125,28 @@ impl Camera {
         Camera { lens_radius: 0.0, focus_distance: 1.0, ..*self }
     }
 
-    /// The point of the film, in pixels, for a point of the unit square in pixel `(x, y)`.
+    /// A point of the film, in pixels, that pixel `(x, y)` sees, for a point of the unit square.
     #[inline]
     pub fn film(&self, (x, y): (u32, u32), u: Vec2) -> Vec2 {
-        Vec2::new(x as f32, y as f32) + 0.5 + (u - 0.5) * self.covered
+        let from_middle = match self.filter {
+            Filter::Box(width) => (u - 0.5) * width,
+            filter => Vec2::new(filter.inverse(u.x), filter.inverse(u.y)),
+        };
+        Vec2::new(x as f32, y as f32) + 0.5 + from_middle * self.covered
+    }
+
+    /// One of the pixels that see the point `film`, drawn by `u` in proportion to their filters there, and the sum of
+    /// these; `None` where it lies beyond the picture.
+    #[inline]
+    pub fn pixel(&self, film: Vec2, u: impl FnOnce() -> Vec2) -> Option<((u32, u32), f32)> {
+        if self.filter == Filter::Box(1.0) {
+            return Some((((film.x as u32).min(self.width - 1), (film.y as u32).min(self.height - 1)), 1.0));
+        }
+        let u = u();
+        let [(x, along), (y, across)] =
+            [(film.x, u.x), (film.y, u.y)].map(|(film, u)| filter::choose(self.filter, film, u));
+        let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
+        (x < self.width && y < self.height).then_some(((x, y), along * across))
     }
 
     /// Width and height of the film in pixels.
@@ -168,13 +213,49 @@ impl Camera {
         }
     }
 
-    /// Width that the picture spans per metre of distance (perspective; 0 for an orthographic camera), and at distance
+    /// World to camera (x to the right, y up, z along the view) and world to the picture (x to the right and y down, from
+    /// 0 to 1, after division by w) as OpenEXR has them: row by row, for row vectors on their left. `origin` is the
+    /// world's point that positions here are counted from.
+    pub fn matrices(&self, origin: DVec3) -> [[f32; 16]; 2] {
+        let rotation = self.rotation.as_dmat3();
+        let axes = DMat3::from_cols(rotation.x_axis, rotation.y_axis, -rotation.z_axis).transpose();
+        let position = self.position.as_dvec3() + origin;
+        let to_camera = DMat4::from_mat3(axes) * DMat4::from_translation(-position);
+        let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
+        let (half, offset) = (half.as_dvec2(), self.offset.as_dvec2());
+        // x in the picture is (1 + (x - offset) / half) / 2, of points at distance 1 along the view.
+        let (sx, sy) = (0.5 / half.x, -0.5 / half.y);
+        let (ox, oy) = (0.5 - offset.x * sx, 0.5 - offset.y * sy);
+        let film = match self.projection {
+            Projection::Perspective(_) => DMat4::from_cols(
+                DVec4::new(sx, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, sy, 0.0, 0.0),
+                DVec4::new(ox, oy, 0.0, 1.0),
+                DVec4::new(0.0, 0.0, 1.0, 0.0),
+            ),
+            Projection::Orthographic(_) => DMat4::from_cols(
+                DVec4::new(sx, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, sy, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, 1.0, 0.0),
+                DVec4::new(ox, oy, 0.0, 1.0),
+            ),
+        };
+        // For row vectors the transposed, row by row: the columns, one after the other.
+        [to_camera, film * to_camera].map(|m| m.to_cols_array().map(|x| x as f32))
+    }
+
+    /// Width that the whole picture spans per metre of distance (perspective; 0 for an orthographic camera), and at distance
     /// 0.
     pub fn span(&self) -> (f32, f32) {
         match self.projection {
-            Projection::Perspective(half) => (2.0 * half.x, 0.0),
-            Projection::Orthographic(half) => (0.0, 2.0 * half.x),
+            Projection::Perspective(half) => (2.0 * half.x * self.whole, 0.0),
+            Projection::Orthographic(half) => (0.0, 2.0 * half.x * self.whole),
         }
+    }
+
+    /// Width of the whole picture in pixels.
+    pub fn whole_width(&self) -> f32 {
+        self.width as f32 * self.whole
     }
 
     /// Depth of `p` along the viewing direction.
@@ -204,7 +285,10 @@ impl Camera {
         let focus = lens_local + local * (self.focus_distance / cos);
         let plane = (focus.truncate() / self.focus_distance - self.offset) / half;
         let film = Vec2::new(plane.x + 1.0, 1.0 - plane.y) * 0.5 * Vec2::new(self.width as f32, self.height as f32);
-        if !(film.x >= 0.0 && film.y >= 0.0 && film.x < self.width as f32 && film.y < self.height as f32) {
+        // Pixels at the edge see a little beyond it.
+        let beyond = (self.filter.radius() - 0.5).max(0.0);
+        let seen = |x: f32, side: u32| x >= -beyond && x < side as f32 + beyond;
+        if !(seen(film.x, self.width) && seen(film.y, self.height)) {
             return None;
         }
         // Film points are uniform over the area 4 half.x half.y at distance 1: density per solid angle 1 / (area
@@ -250,6 +334,77 @@ mod tests {
                 assert!((sample.wi + ray.direction).length() < 1e-4);
                 let distance2 = (p - sample.lens).length_squared();
                 assert!((sample.importance * distance2 / camera.pdf_w(ray.direction) - 1.0).abs() < 1e-3);
+            }
+        }
+    }
+
+    fn some(projection: Projection) -> Camera {
+        let rotation = Mat3::from_rotation_y(0.4) * Mat3::from_rotation_x(-0.2);
+        Camera::new(DVec3::new(1.0, 2.0, 3.0), rotation, projection, (0.2, 4.0), (160, 90))
+            .shifted(Vec2::new(0.1, -0.3))
+    }
+
+    /// A window sees what the whole picture sees there, and light paths bring its pixels as much.
+    #[test]
+    fn windows_are_parts_of_the_picture() {
+        for projection in
+            [Projection::Perspective(Vec2::new(0.8, 0.45)), Projection::Orthographic(Vec2::new(0.8, 0.45))]
+        {
+            let whole = some(projection);
+            let corner = Vec2::new(40.0, 30.0);
+            let window = whole.window([40, 30, 60, 20]);
+            let deeper = window.window([10, 5, 20, 10]);
+            assert_eq!((window.size(), deeper.size()), ((60, 20), (20, 10)));
+            for camera in [window, deeper] {
+                let (a, b) = (whole.span(), camera.span());
+                assert!((a.0 - b.0).abs() < 1e-5 && (a.1 - b.1).abs() < 1e-5);
+                assert!((camera.whole_width() - 160.0).abs() < 1e-3);
+            }
+            for i in 0..100 {
+                let draws = Stream::new(0, 0, Domain::Test, i).vertex(0);
+                let (film, lens) = (draws.two(Purpose::Pixel) * Vec2::new(20.0, 10.0), draws.two(Purpose::Lens));
+                let a = whole.ray(corner + Vec2::new(10.0, 5.0) + film, lens);
+                for b in [window.ray(Vec2::new(10.0, 5.0) + film, lens), deeper.ray(film, lens)] {
+                    assert!((a.direction - b.direction).length() < 1e-5 && (a.origin - b.origin).length() < 1e-5);
+                }
+                let p = a.origin + a.direction * 5.0;
+                let Some(of_whole) = whole.sample(p, lens) else { continue };
+                let of_window = window.sample(p, lens).expect("it is in the window");
+                assert!((of_whole.film - corner - of_window.film).length() < 2e-2);
+                let pixels = [160.0 * 90.0, 60.0 * 20.0];
+                let per_pixel = [of_whole.importance * pixels[0], of_window.importance * pixels[1]];
+                // Importance is that of all pixels together: the same for each.
+                assert!(
+                    (of_whole.importance / pixels[1] * pixels[0] / of_window.importance - 1.0).abs() < 1e-3,
+                    "{per_pixel:?}"
+                );
+            }
+        }
+    }
+
+    /// Where a point is in the picture the header's matrices say, too.
+    #[test]
+    fn matrices_lead_to_the_film() {
+        for projection in
+            [Projection::Perspective(Vec2::new(0.8, 0.45)), Projection::Orthographic(Vec2::new(0.8, 0.45))]
+        {
+            let camera = some(projection).pinhole();
+            let origin = DVec3::new(100.0, -20.0, 5.0);
+            let [to_camera, to_ndc] = camera.matrices(origin);
+            let by = |m: &[f32; 16], p: DVec3| {
+                let p = [p.x, p.y, p.z, 1.0];
+                let column = |c: usize| (0..4).map(|row| p[row] * f64::from(m[4 * row + c])).sum::<f64>();
+                let w = column(3);
+                DVec3::new(column(0) / w, column(1) / w, column(2) / w)
+            };
+            for film in [Vec2::new(0.0, 0.0), Vec2::new(160.0, 90.0), Vec2::new(20.0, 70.0)] {
+                let ray = camera.ray(film, Vec2::splat(0.5));
+                let p = ray.origin + ray.direction * 3.0;
+                let world = p.as_dvec3() + origin;
+                let ndc = by(&to_ndc, world);
+                let expected = film / Vec2::new(160.0, 90.0);
+                assert!((ndc.truncate().as_vec2() - expected).length() < 1e-3, "{projection:?}, {film}: {ndc}");
+                assert!((by(&to_camera, world).z - f64::from(camera.depth(p))).abs() < 1e-3);
             }
         }
     }

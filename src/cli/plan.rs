@@ -39,7 +39,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     // Options that contradict each other are errors here, too.
     let settings = job.settings()?;
     let Loaded { scene, removed } = scene::read(&job.scene, Form::beside(args.json), rayon::current_num_threads())?;
-    let camera = scene.camera(&job.view())?;
+    let camera = scene.camera(&job.view()?)?;
     check::media(&job.scene.path, &settings, &scene)?;
     let make = |way| job.allowed(way, camera.size());
     let choice = if job.method == Method::Auto {

@@ -49,7 +49,7 @@ pub fn span(camera: &Camera, length: f32) -> f32 {
 
 /// [`InitialBandwidth::Footprint`] at the end of a path of some length.
 pub fn footprint(camera: &Camera, length: f32) -> f32 {
-    FOOTPRINT_PIXELS * span(camera, length) / camera.size().0 as f32
+    FOOTPRINT_PIXELS * span(camera, length) / camera.whole_width()
 }
 
 /// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the

@@ -5,7 +5,7 @@
 //! names of ours are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the component, and at most 31
 //! characters.
 
-use super::layers::{Layer, LayerSet};
+use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, Kind, Result};
 
 /// How channels are called in an EXR.
@@ -35,6 +35,30 @@ impl Naming {
                 };
                 format!("ViewLayer.{pass}")
             }
+        }
+    }
+
+    /// What stands in a component of a layer in a file: which component of ours, and whether its sign is changed.
+    /// Positions and normals are in the world axes of glTF (y up) here and in plain files, and in Blender's (z up, (x, -z,
+    /// y)) in files with its names.
+    pub fn axis<'c>(self, layer: &str, component: &'c str) -> (&'c str, bool) {
+        match (self, layer, component) {
+            (Naming::Blender, "P" | "normal", "Y") => ("Z", true),
+            (Naming::Blender, "P" | "normal", "Z") => ("Y", false),
+            _ => (component, false),
+        }
+    }
+
+    /// A transform of points of the world, row by row, for points in a file's axes.
+    pub fn from_file_axes(self, m: [f32; 16]) -> [f32; 16] {
+        match self {
+            Naming::Plain => m,
+            // (x, y, z) of Blender is (x, z, -y) of ours: its second row is minus our third, its third our second.
+            Naming::Blender => std::array::from_fn(|i| match i / 4 {
+                1 => -m[8 + i % 4],
+                2 => m[4 + i % 4],
+                _ => m[i],
+            }),
         }
     }
 
@@ -102,23 +126,27 @@ pub enum Selection {
     All,
     /// The picture alone.
     Beauty,
+    /// What compositing takes: the picture, its finished parts, albedo, normal, depth and cryptomattes; half floats
+    /// where they serve.
+    Comp,
     /// Layers by name; `beauty` stands for the picture, and `Level` for `Level1`, `Level2`, ...
     List(Vec<String>),
 }
 
 impl Selection {
-    /// Reads `all`, `beauty` or names with commas between them. Errors: no name, or one that no layer of ours has, with
+    /// Reads `all`, `comp`, `beauty` or names with commas between them. Errors: no name, or one that no layer of ours has, with
     /// the nearest.
     pub fn parse(text: &str) -> Result<Self> {
         match text {
             "all" => return Ok(Selection::All),
             "beauty" => return Ok(Selection::Beauty),
+            "comp" => return Ok(Selection::Comp),
             _ => {}
         }
         let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).filter(|s| !s.is_empty()).collect();
         if names.is_empty() {
             return Err(Error::new(Kind::Usage, "--layers", "no layer is named")
-                .hint("give all, beauty, or names such as beauty,Noisy,albedo"));
+                .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
         }
         match names.iter().find(|name| *name != "beauty" && describe(name).is_none()) {
             Some(unknown) => Err(unknown_layer(unknown, KNOWN.iter().copied())),
@@ -132,6 +160,7 @@ impl Selection {
         match self {
             Selection::All => stem != "Quarter",
             Selection::Beauty => name.is_empty(),
+            Selection::Comp => name.is_empty() || stem.starts_with("Combined") || COMP.contains(&stem),
             Selection::List(names) => {
                 names.iter().any(|n| n == name || (n == "beauty" && name.is_empty()) || (!stem.is_empty() && n == stem))
             }
@@ -152,9 +181,27 @@ impl Selection {
                 return Err(unknown_layer(missing, present.iter().map(String::as_str)));
             }
         }
-        let layers = set.layers.into_iter().filter(|layer| self.wants(&layer.name)).collect();
+        let layers = set.layers.into_iter().filter(|layer| self.wants(&layer.name));
+        let layers = match self {
+            Selection::Comp => {
+                layers.map(|layer| if serves_as_half(&layer) { layer.stored_as(Sample::Half) } else { layer }).collect()
+            }
+            _ => layers.collect(),
+        };
         Ok(LayerSet { layers, ..set })
     }
+}
+
+/// Layers for compositing besides the picture and its parts, by their names without numbers.
+const COMP: [&str; 5] = ["albedo", "normal", "Z", "CryptoObject", "CryptoMaterial"];
+
+/// Whether half floats hold a layer as well as anybody sees: colours and directions, where none is too bright. Depth
+/// wants more digits, and the ids of cryptomattes are no numbers.
+fn serves_as_half(layer: &Layer) -> bool {
+    const LARGEST: f32 = 65_504.0;
+    let colours = layer.name.is_empty() || layer.name.starts_with("Combined");
+    (colours || layer.name == "albedo" || layer.name == "normal")
+        && layer.planes.iter().all(|plane| plane.values.iter().all(|value| value.abs() <= LARGEST))
 }
 
 /// Names to suggest from; [`describe`] knows each.

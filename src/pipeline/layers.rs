@@ -78,7 +78,7 @@ pub(super) fn cryptomattes(
         for layer in mattes.layers(&ranks, 1.0) {
             set.push(layer)?;
         }
-        attributes.0.extend(mattes.attributes(naming));
+        attributes.texts.extend(mattes.attributes(naming));
     }
     Ok(attributes)
 }

@@ -104,9 +104,10 @@ pub trait Watch {
     fn looks(&mut self) -> bool {
         false
     }
-    /// The picture as it is: the beauty alone (radiance), or why there is none. The render goes on either way.
-    fn picture(&mut self, picture: Result<LayerSet>) {
-        let _ = picture;
+    /// The picture as it is: the beauty alone (radiance), or why there is none; and where it is in the whole one. The
+    /// render goes on either way.
+    fn picture(&mut self, picture: Result<LayerSet>, frame: &exr::Frame) {
+        let _ = (picture, frame);
     }
     /// All are; the pixels are still there.
     fn rendered(&mut self, rendered: &Rendered);
@@ -155,23 +156,24 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     watch.begins(&plan, &settings);
     let decided = choice.as_ref().map(|choice| choice.spent).unwrap_or_default();
+    let frame = frame(&scene, &order.view)?;
     let stage = Stage::new(&scene, &camera, &settings);
     let rendered = drive(Session::after(&stage, decided), |progress, session| {
         watch.progress(progress);
-        preview(session, ready.as_mut(), watch);
+        preview(session, ready.as_mut(), &frame, watch);
         if watch.stops() { Control::Stop } else { Control::Continue }
     });
     watch.rendered(&rendered);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
     watch.waits(Some(Wait::Finishing));
-    let delivery = deliver(&order, &scene, &plan, rendered, &selection, ready.as_mut());
+    let delivery = deliver(&order, (&scene, &frame), &plan, rendered, &selection, ready.as_mut());
     watch.waits(None);
     delivery
 }
 
 /// Shows the picture as it is to those who look, finished as the last one will be, if quicker.
-fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, watch: &mut dyn Watch) {
+fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, frame: &exr::Frame, watch: &mut dyn Watch) {
     if !watch.looks() {
         return;
     }
@@ -185,7 +187,7 @@ fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, watch: &mut dyn
             set.layers.retain(|layer| layer.name.is_empty());
             Ok(set)
         });
-        watch.picture(picture);
+        watch.picture(picture, frame);
     });
     session.charge(spent);
 }
@@ -257,7 +259,7 @@ fn readied(
 /// From pixels to the layers that were asked for, finished, and the header that tells of all.
 fn deliver(
     order: &Order<'_>,
-    scene: &Scene,
+    (scene, frame): (&Scene, &exr::Frame),
     plan: &Plan,
     mut rendered: Rendered,
     selection: &Selection,
@@ -269,6 +271,7 @@ fn deliver(
     let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
     let mut set = rendered.layers(&scene.survey, wanted)?;
     let mut attributes = layers::cryptomattes(scene, &rendered, selection, order.naming, &mut set)?;
+    attributes.frame = Some(*frame);
     let techniques = std::mem::take(&mut rendered.techniques);
     // The pixels are most of the memory, and all that is wanted of them is in the layers now.
     drop(rendered);
@@ -291,6 +294,15 @@ fn deliver(
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let finished = finished.map(|(name, _, account)| (name, account));
     Ok(Delivery { set, attributes, techniques, finished, finishing, refusal })
+}
+
+/// Where the picture is in the whole one, and its camera.
+fn frame(scene: &Scene, view: &View) -> Result<exr::Frame> {
+    let whole = scene.whole_camera(view)?;
+    let (width, height) = whole.size();
+    let [x, y, ..] = scene.window(view, (width, height))?.unwrap_or_default();
+    let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
+    Ok(exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc })
 }
 
 /// What the header says besides the render's own account.

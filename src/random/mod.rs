@@ -93,6 +93,8 @@ pub enum Purpose {
     Border = 24,
     /// How they are turned.
     BorderTurn = 25,
+    /// Which of the pixels that see a point of the film a light path goes to (2D).
+    Splat = 26,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

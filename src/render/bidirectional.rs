@@ -283,7 +283,7 @@ impl Iterate for Passes<'_> {
                 let middle = footprints.len() / 2;
                 FOOTPRINT_PIXELS * radius / *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
             }
-            _ => FOOTPRINT_PIXELS.min(widest * width as f32),
+            _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
         };
         self.covered = std::f32::consts::PI * pixels * pixels;
         all.into_iter().map(Pixel::new).collect()

@@ -44,7 +44,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         center: (center - origin).as_vec3(),
         // A little room, so that no light from infinity starts inside the geometry.
         radius: radius as f32 * 1.001,
-        hidden_from_camera: description.environment_hidden_from_camera,
+        hidden_from_camera: description.environment_hidden_from_camera || description.picture.film_transparent,
         environment: environment(description.environment),
     };
     let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);

@@ -86,6 +86,10 @@ pub struct Picture {
     pub exposure: Option<f32>,
     /// From light to a display's colours.
     pub tonemap: Option<ToneCurve>,
+    /// Cameras see nothing where no surface is, and alpha tells how much of a pixel that is.
+    pub film_transparent: bool,
+    /// The window that is rendered: left edge, top edge, width and height, in shares of the whole picture.
+    pub crop: Option<[f64; 4]>,
 }
 
 /// Tone curves by name.

@@ -15,7 +15,7 @@ pub use contacts::Contacts;
 pub use description::Description;
 pub use nesting::{Nestings, OPEN, Stack};
 pub use survey::Survey;
-pub use view::{MAX_SIZE, View};
+pub use view::{Crop, MAX_SIZE, View};
 
 use crate::error::Result;
 use crate::geometry::Shapes;

@@ -29,7 +29,7 @@ pub struct Survey {
     pub delta_lights: bool,
     /// Light comes from infinity.
     pub infinite_lights: bool,
-    /// An environment shines.
+    /// An environment shines that cameras see.
     pub environment: bool,
 }
 
@@ -40,7 +40,7 @@ impl Survey {
         let mut survey = Survey {
             media: medium.is_some(),
             scattering: scatters(&medium),
-            environment: lights.sky().environment.is_some(),
+            environment: lights.sky().environment.is_some() && !lights.sky().hidden_from_camera,
             ..Survey::default()
         };
         let mut worn = vec![0usize; materials.list.len()];

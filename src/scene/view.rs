@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::description::{CameraDescription, Projection};
-use crate::camera::{self, Camera};
+use crate::camera::{self, Camera, Filter};
 use crate::error::{Error, Kind, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2};
 
@@ -22,14 +22,76 @@ pub struct View {
     pub width: Option<u32>,
     /// Height in pixels.
     pub height: Option<u32>,
+    /// The window that is rendered; the scene's own, or all, otherwise.
+    pub crop: Option<Crop>,
+    /// Pixel filter.
+    pub filter: Filter,
+}
+
+/// A window of a picture: left edge, top edge, width and height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Crop {
+    /// In pixels.
+    Pixels([u32; 4]),
+    /// In shares of the picture's width and height.
+    Shares([f64; 4]),
+}
+
+impl Crop {
+    /// The window in a picture of that size, in pixels: at least one, where shares are small. `None` where it is not
+    /// within the picture or empty.
+    pub fn window(self, (width, height): (u32, u32)) -> Option<[u32; 4]> {
+        let [x, y, w, h] = match self {
+            Crop::Pixels(window) => window,
+            Crop::Shares([x, y, w, h]) => {
+                let along = |start: f64, length: f64, side: u32| {
+                    let side_f = f64::from(side);
+                    let first = ((start * side_f).round() as u32).min(side.saturating_sub(1));
+                    let last = (((start + length) * side_f).round() as u32).min(side);
+                    (first, last.saturating_sub(first).max(1))
+                };
+                let ((x, w), (y, h)) = (along(x, w, width), along(y, h, height));
+                [x, y, w, h]
+            }
+        };
+        let fits =
+            |start: u32, length: u32, side: u32| length > 0 && start.checked_add(length).is_some_and(|end| end <= side);
+        (fits(x, w, width) && fits(y, h, height)).then_some([x, y, w, h])
+    }
 }
 
 impl Scene {
-    /// The camera for `view`. One of width and height given keeps the camera's aspect ratio.
+    /// The camera for `view`, of its window of the picture. One of width and height given keeps the camera's aspect
+    /// ratio.
+    ///
+    /// # Errors
+    /// No camera has the name, the size is zero or too large, or the window is not within the picture.
+    pub fn camera(&self, view: &View) -> Result<Camera> {
+        let whole = self.whole_camera(view)?;
+        Ok(self.window(view, whole.size())?.map_or(whole, |window| whole.window(window)))
+    }
+
+    /// The window that is rendered of a picture of that size, in pixels, if not all of it.
+    ///
+    /// # Errors
+    /// It is not within the picture.
+    pub fn window(&self, view: &View, size: (u32, u32)) -> Result<Option<[u32; 4]>> {
+        let Some(crop) = view.crop.or(self.picture.crop.map(Crop::Shares)) else { return Ok(None) };
+        let window = crop.window(size).ok_or_else(|| {
+            let (width, height) = size;
+            let cause = format!("--crop: the window is not within the picture of {width} x {height} pixels");
+            Error::new(Kind::Usage, "command line", cause).hint(
+                "it is X,Y,W,H: left edge, top edge, width and height, in pixels or in shares such as 0.25,0,0.5,1",
+            )
+        })?;
+        Ok(Some(window).filter(|window| *window != [0, 0, size.0, size.1]))
+    }
+
+    /// The camera for `view`, of the whole picture.
     ///
     /// # Errors
     /// No camera has the name, or the size is zero or too large.
-    pub fn camera(&self, view: &View) -> Result<Camera> {
+    pub fn whole_camera(&self, view: &View) -> Result<Camera> {
         let default;
         let described = match &view.camera {
             Some(name) => self.cameras.iter().find(|c| &c.name == name).ok_or_else(|| {
@@ -90,7 +152,7 @@ impl Scene {
         };
         let position = described.to_world.translation - self.origin;
         let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
-        Ok(camera.shifted(described.shift.into()))
+        Ok(camera.shifted(described.shift.into()).filtered(view.filter))
     }
 
     /// A view of the whole scene from the front, a little from above.

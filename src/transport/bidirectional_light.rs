@@ -128,9 +128,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
         self.record.contribution(Technique::Camera { light: vertex.depth() }, value, sample.lens, ratios);
         let value = value * way.left;
         if value.max_element() > 0.0 {
-            let (width, height) = eye.camera.size();
-            let (x, y) = ((sample.film.x as u32).min(width - 1), (sample.film.y as u32).min(height - 1));
-            let (pixel, light) = (y * width + x, vertex.depth());
+            let Some(((x, y), weight)) = eye.camera.pixel(sample.film, || draws.two(Purpose::Splat)) else { return };
+            let value = value * weight;
+            let (pixel, light) = (y * eye.camera.size().0 + x, vertex.depth());
             let shares = shares(vertex, seen, (sample.wi, Transport::Importance, f), eye.classes);
             let splat = |(class, share)| Splat { pixel, light, class, value: value * share, ratios };
             self.left.splats.extend(shares.iter().map(splat));

@@ -32,8 +32,7 @@ fn main() {
     for path in arguments.iter().filter(|a| !a.contains('=')) {
         let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-        let camera =
-            scene.camera(&View { camera: None, width: Some(width), height: None }).unwrap_or_else(|e| panic!("{e}"));
+        let camera = scene.camera(&View { width: Some(width), ..View::default() }).unwrap_or_else(|e| panic!("{e}"));
         for way in ways {
             let settings = Settings::of(way);
             let settings = Settings { levels: levels.unwrap_or(settings.levels), ..settings };

@@ -126,7 +126,7 @@ fn looks() -> Value {
 fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-    let view = View { camera: None, width: Some(width), height: None };
+    let view = View { width: Some(width), ..View::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
     let mut rows = Vec::new();
     for levels in [1, 5] {

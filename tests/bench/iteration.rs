@@ -17,7 +17,7 @@ fn main() {
     let (width, rounds) = (number(1, 1280), number(2, 3));
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-    let view = View { camera: None, width: Some(width), height: None };
+    let view = View { width: Some(width), ..View::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
     let variants = [
         ("five levels, two eye paths", Levels { count: 5, two_paths: true }, 20),

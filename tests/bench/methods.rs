@@ -80,7 +80,7 @@ struct Cost {
 
 /// Processor seconds of an iteration, the first left out (it merges nothing, and it is cold); least of some runs.
 fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
-    let camera = scene.camera(&View { camera: None, width: Some(512), height: Some(512) }).expect("a camera");
+    let camera = scene.camera(&View { width: Some(512), height: Some(512), ..View::default() }).expect("a camera");
     let settings = Settings {
         method,
         initial: InitialBandwidth::Footprint,

@@ -32,7 +32,7 @@ fn race(mut a: impl FnMut(), mut b: impl FnMut()) -> (f64, f64) {
 
 /// Rays of eye paths: from the camera, and from what those hit in a random direction.
 fn rays(scene: &Scene) -> Vec<Ray> {
-    let view = View { camera: None, width: Some(640), height: None };
+    let view = View { width: Some(640), ..View::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
     let (width, height) = camera.size();
     let mut rays = Vec::new();

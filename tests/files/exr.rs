@@ -34,7 +34,7 @@ fn sorted(mut set: LayerSet) -> LayerSet {
 fn attributes() -> Attributes {
     let mut attributes = Attributes::of(&serde_json::json!({"scene": "Bl\u{fc}te \u{1f308}.glb", "seed": 7})).unwrap();
     for key in ["name", "hash", "conversion", "manifest"] {
-        attributes.0.insert(format!("cryptomatte/abcdef0/{key}"), format!("value of {key}"));
+        attributes.texts.insert(format!("cryptomatte/abcdef0/{key}"), format!("value of {key}"));
     }
     attributes
 }
@@ -155,7 +155,43 @@ fn blender_names() {
     // Roles are found under both conventions.
     assert_eq!(back.beauty().unwrap(), set.beauty().unwrap());
     assert_eq!(back.find(Role::Albedo).unwrap().triples(), set.get("albedo").unwrap().triples());
-    assert_eq!(back.find(Role::Normal).unwrap().triples(), set.get("normal").unwrap().triples());
+    // Blender's z is up, and its y goes away from us.
+    let turned = |[x, y, z]: [f32; 3]| [x, -z, y];
+    let expected: Vec<[f32; 3]> = set.get("normal").unwrap().triples().into_iter().map(turned).collect();
+    assert_eq!(back.find(Role::Normal).unwrap().triples(), expected);
+}
+
+/// A window of a picture lies within the display window, and its camera and colours are told.
+#[test]
+fn windows_cameras_and_colours_are_in_the_header() {
+    use ::exr::math::Vec2;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let set = fixture(3, 2);
+    let world_to_camera = std::array::from_fn(|i| i as f32);
+    let world_to_ndc = std::array::from_fn(|i| -(i as f32));
+    let frame = exr::Frame { display: [8, 5], corner: [4, 1], world_to_camera, world_to_ndc };
+    let attributes = Attributes { frame: Some(frame), ..Attributes::default() };
+    for naming in [Naming::Plain, Naming::Blender] {
+        exr::write(&path, &set, &attributes, Options { naming, ..Options::default() }).unwrap();
+        let header = ::exr::meta::MetaData::read_from_file(&path, true).unwrap().headers.remove(0);
+        assert_eq!(header.shared_attributes.display_window.size, Vec2(8, 5));
+        assert_eq!((header.layer_size, header.own_attributes.layer_position), (Vec2(3, 2), Vec2(4, 1)));
+        assert_eq!(header.shared_attributes.chromaticities.expect("primaries").red, Vec2(0.64, 0.33));
+        assert!(header.own_attributes.software_name.expect("a program").to_string().starts_with("caustique "));
+        let found = header.own_attributes.world_to_camera.expect("a camera");
+        // The same point by the coordinates of the file: (1, 2, 3), and (1, -3, 2) for Blender.
+        let point = if naming == Naming::Plain { [1.0, 2.0, 3.0, 1.0] } else { [1.0, -3.0, 2.0, 1.0] };
+        let x = |m: &[f32; 16], p: [f32; 4]| (0..4).map(|row| p[row] * m[4 * row]).sum::<f32>();
+        assert_eq!(x(&found, point), x(&world_to_camera, [1.0, 2.0, 3.0, 1.0]));
+        assert!(header.own_attributes.world_to_normalized_device.is_some());
+        // Reading gives the whole picture, black beside the window.
+        let (back, _) = exr::read(&path).unwrap();
+        assert_eq!((back.width, back.height), (8, 5));
+        let beauty = back.beauty().unwrap();
+        assert_eq!(beauty[8 + 4], set.beauty().unwrap()[0]);
+        assert_eq!(beauty[0], [0.0; 3]);
+    }
 }
 
 #[test]
@@ -177,7 +213,7 @@ fn names_that_break_other_programs_are_refused() {
         assert!(!path.exists());
     }
     let mut attributes = Attributes::default();
-    attributes.0.insert("caustique".into(), "\u{fc}".into());
+    attributes.texts.insert("caustique".into(), "\u{fc}".into());
     let error = exr::write(&path, &fixture(1, 1), &attributes, Options::default()).unwrap_err();
     assert!(error.cause.contains("ASCII"), "{error}");
     let error = exr::write(&path, &LayerSet::new(4, 4), &Attributes::default(), Options::default()).unwrap_err();

@@ -10,6 +10,7 @@ mod bsdf;
 mod classes;
 mod contact;
 mod dispersion;
+mod filters;
 mod furnaces;
 mod glints;
 mod guide;

@@ -125,7 +125,7 @@ class Tells(Installed):
     def test_settings_of_blender_that_are_left_aside(self):
         limits, render = part_of_addon("limits"), self.scene.render
         self.assertEqual(limits.ignored(self.scene), [])
-        for name in ("use_motion_blur", "use_multiview", "film_transparent", "use_freestyle"):
+        for name in ("use_motion_blur", "use_multiview", "use_freestyle"):
             setattr(render, name, True)
         render.pixel_aspect_x = 2
         lines = limits.ignored(self.scene)

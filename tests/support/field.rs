@@ -140,7 +140,7 @@ impl Field {
 
 /// The picture, with so many pixels for every one of [`SIZE`] across and down.
 pub fn view(finer: u32) -> View {
-    View { camera: None, width: Some(SIZE.0 * finer), height: Some(SIZE.1 * finer) }
+    View { width: Some(SIZE.0 * finer), height: Some(SIZE.1 * finer), ..View::default() }
 }
 
 /// What photons bring to a pixel, on average over its iterations.

@@ -147,7 +147,7 @@ pub fn build(description: Description) -> Scene {
 
 /// A view of `size x size` pixels.
 pub fn square(size: u32) -> View {
-    View { camera: None, width: Some(size), height: Some(size) }
+    View { width: Some(size), height: Some(size), ..View::default() }
 }
 
 /// A room with a lamp below the ceiling.

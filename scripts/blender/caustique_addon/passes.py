@@ -63,9 +63,6 @@ def fill(render_layer, picture, frame=None):
             if one.name.replace(_COMBINED, "", 1) not in _PARTS:
                 missing.append(one.name)
             continue
-        if one.name in {"Position", "Normal"}:
-            x, y, z = planes
-            planes = [x, -z, y]  # glTF's y is up, Blender's z
         put(one, planes, picture, frame)
     return missing
 

@@ -47,7 +47,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let threads = rayon::current_num_threads();
     let Loaded { scene, removed } = scene::read(&args.scene, args.progress, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
-    let view = View { camera: args.camera.clone(), width: args.width, height: args.height };
+    let view = View { camera: args.camera.clone(), width: args.width, height: args.height, ..View::default() };
     let camera = scene.camera(&view)?;
     let windows = windows(args, &camera)?;
     for run in &runs {

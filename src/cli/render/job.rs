@@ -3,6 +3,7 @@
 use crate::cli::finish::FinishArgs;
 use crate::cli::number::{between, positive, relative_error, whole};
 use crate::cli::scene::SceneArgs;
+use caustique::camera::{Filter, WIDEST};
 use caustique::error::{Error, Kind, Result};
 use caustique::estimator::InitialBandwidth;
 use caustique::estimator::bandwidth::SCREEN_CAP;
@@ -14,7 +15,7 @@ use caustique::render::Strategy;
 use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
-use caustique::scene::{MAX_SIZE, View};
+use caustique::scene::{Crop, MAX_SIZE, View};
 use caustique::transport::MAX_LEVELS;
 use clap::ValueEnum;
 use serde::Serialize;
@@ -123,6 +124,15 @@ pub struct Job {
     /// Height in pixels; without a width the camera's aspect is kept
     #[arg(long, value_name = "H", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
     pub height: Option<u32>,
+    /// Render a window of the picture alone: left edge, top edge, width and height, in pixels, or in shares such as
+    /// 0.25,0,0.5,1 [default: the scene's, else all]
+    #[arg(long, value_name = "X,Y,W,H", help_heading = "Picture")]
+    pub crop: Option<CropChoice>,
+    /// Pixel filter and its width in pixels, as Blender counts it: 'box' [1], 'gaussian' [1.5] or 'blackman-harris' [1.5]
+    /// [default: box 1]
+    #[arg(long, num_args = 1..=2, action = clap::ArgAction::Set, value_names = ["box|gaussian|blackman-harris", "WIDTH"])]
+    #[arg(help_heading = "Picture")]
+    pub filter: Option<Vec<String>>,
     /// Camera by name [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
@@ -296,6 +306,65 @@ pub struct ShardChoice {
     pub count: u64,
 }
 
+/// A window of the picture.
+#[derive(Clone, Debug, Serialize)]
+pub struct CropChoice {
+    /// As it was written.
+    pub window: String,
+    /// What it means.
+    #[serde(skip)]
+    pub crop: Crop,
+}
+
+impl FromStr for CropChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let fault =
+            || "it must be X,Y,W,H, in pixels (320,0,640,720) or in shares of the picture (0.25,0,0.5,1)".to_string();
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        let parts: [&str; 4] = parts.try_into().map_err(|_| fault())?;
+        let shares = parts.iter().any(|part| part.contains('.')) || parts[2..] == ["1", "1"];
+        let crop = if shares {
+            let numbers = parts.map(|part| part.parse::<f64>().ok().filter(|x| (0.0..=1.0).contains(x)));
+            let [Some(x), Some(y), Some(w), Some(h)] = numbers else { return Err(fault()) };
+            Crop::Shares([x, y, w, h])
+        } else {
+            let numbers = parts.map(|part| part.parse::<u32>().ok());
+            let [Some(x), Some(y), Some(w), Some(h)] = numbers else { return Err(fault()) };
+            Crop::Pixels([x, y, w, h])
+        };
+        // What is empty or beyond any picture is beyond this one.
+        match crop.window((MAX_SIZE, MAX_SIZE)) {
+            Some(_) => Ok(CropChoice { window: text.into(), crop }),
+            None => Err("the window is empty or not within the picture".into()),
+        }
+    }
+}
+
+/// The filter of a name and perhaps a width.
+fn filter(words: &[String]) -> Result<Filter> {
+    let fault = |cause: String| {
+        let error = Error::new(Kind::Usage, "command line", cause);
+        error.hint(
+            "give --filter box, gaussian or blackman-harris and perhaps a width in pixels, and the scene before it",
+        )
+    };
+    let width = match words.get(1) {
+        None => None,
+        Some(text) => match text.parse::<f32>().ok().filter(|width| (0.1..=WIDEST).contains(width)) {
+            Some(width) => Some(width),
+            None => return Err(fault(format!("--filter: '{text}' is no width from 0.1 to {WIDEST} pixels"))),
+        },
+    };
+    match words.first().map(String::as_str) {
+        Some("box") => Ok(Filter::Box(width.unwrap_or(1.0))),
+        Some("gaussian") => Ok(Filter::Gaussian(width.unwrap_or(1.5))),
+        Some("blackman-harris") => Ok(Filter::BlackmanHarris(width.unwrap_or(1.5))),
+        other => Err(fault(format!("--filter: there is no filter '{}'", other.unwrap_or_default()))),
+    }
+}
+
 impl FromStr for ShardChoice {
     type Err = String;
     fn from_str(text: &str) -> std::result::Result<Self, String> {
@@ -326,8 +395,13 @@ pub(super) fn idle(option: &str, method: &str, other: &str) -> Error {
 
 impl Job {
     /// The picture asked for.
-    pub fn view(&self) -> View {
-        View { camera: self.camera.clone(), width: self.width, height: self.height }
+    ///
+    /// # Errors
+    /// A filter that there is not.
+    pub fn view(&self) -> Result<View> {
+        let crop = self.crop.as_ref().map(|choice| choice.crop);
+        let filter = self.filter.as_deref().map_or(Ok(Filter::default()), filter)?;
+        Ok(View { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
     }
 
     /// Errors: options that say nothing to the method.

@@ -48,7 +48,7 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         .transpose()?;
     let order = Order {
         scene: args.job.scene.order(),
-        view: args.job.view(),
+        view: args.job.view()?,
         settings,
         photons: args.job.photons,
         max_depth: args.job.max_depth,
@@ -137,9 +137,9 @@ impl Watch for Telling<'_> {
         self.preview.as_mut().is_some_and(Preview::due)
     }
 
-    fn picture(&mut self, picture: Result<LayerSet>) {
+    fn picture(&mut self, picture: Result<LayerSet>, frame: &exr::Frame) {
         if let Some(preview) = &mut self.preview {
-            preview.show(picture);
+            preview.show(picture, Some(*frame));
         }
     }
 
@@ -162,7 +162,7 @@ impl Telling<'_> {
         let pictured = args.picture.write_png(&set, &made_for);
         let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if let Some(mut preview) = preview {
-            preview.show(beauty(&set));
+            preview.show(beauty(&set), attributes.frame);
         }
         if talk {
             summary.tell();

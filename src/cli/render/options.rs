@@ -31,8 +31,9 @@ pub struct RenderArgs {
     #[serde(flatten)]
     pub job: Job,
 
-    /// Layers of the EXR: 'all', 'beauty', or names separated by commas
-    #[arg(long, value_name = "all|beauty|LIST", default_value = "all", help_heading = "Output")]
+    /// Layers of the EXR: 'all', 'comp' (the picture, its parts, albedo, normal, depth, cryptomattes; half floats where
+    /// they serve), 'beauty', or names separated by commas
+    #[arg(long, value_name = "all|comp|beauty|LIST", default_value = "all", help_heading = "Output")]
     pub layers: String,
     /// Names of the EXR's channels: 'blender' writes those that Blender's own renders have
     #[arg(long, value_enum, default_value_t = Naming::Plain, help_heading = "Output")]

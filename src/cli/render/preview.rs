@@ -4,7 +4,7 @@ use super::options::RenderArgs;
 use crate::cli::{output, say};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{LayerSet, Naming};
-use caustique::image::exr::{self, Attributes, Compression};
+use caustique::image::exr::{self, Attributes, Compression, Frame};
 use caustique::image::png;
 use caustique::render::Clock;
 use caustique::scene::description::Picture;
@@ -93,9 +93,10 @@ impl<'a> Preview<'a> {
         !self.failed && self.began >= self.next
     }
 
-    /// Shows a picture. A failure is said once, and ends the preview alone.
-    pub fn show(&mut self, picture: Result<LayerSet>) {
-        if let Err(error) = picture.and_then(|set| self.write(&set)) {
+    /// Shows a picture, which is a window of a larger one as `frame` says. A failure is said once, and ends the preview
+    /// alone.
+    pub fn show(&mut self, picture: Result<LayerSet>, frame: Option<Frame>) {
+        if let Err(error) = picture.and_then(|set| self.write(&set, frame)) {
             say(&format!("warning: --preview: {error}; the render goes on without"));
             self.failed = true;
         }
@@ -103,7 +104,7 @@ impl<'a> Preview<'a> {
         self.next = now + (RATIO * (now - self.began)).max(EVERY);
     }
 
-    fn write(&mut self, set: &LayerSet) -> Result<()> {
+    fn write(&mut self, set: &LayerSet, frame: Option<Frame>) -> Result<()> {
         match self.target {
             Target::Png(path) => {
                 let (exposure, curve) = self.args.picture.look(&self.made_for);
@@ -111,7 +112,7 @@ impl<'a> Preview<'a> {
             }
             Target::Exr(path) => {
                 let options = exr::Options { compression: Compression::None, naming: Naming::Plain };
-                exr::write(path, set, &Attributes::default(), options)
+                exr::write(path, set, &Attributes { frame, ..Attributes::default() }, options)
             }
             Target::Tev => self.stream(set).map_err(|cause| {
                 Error::new(Kind::Io, format!("tev at {TEV}"), cause).hint("start tev on this machine first")

@@ -13,15 +13,37 @@ use std::collections::BTreeMap;
 pub use read::read;
 pub use write::{Compression, Options, write};
 
+/// Name and version of the program, for headers.
+const SOFTWARE: &str = concat!("caustique ", env!("CARGO_PKG_VERSION"));
+
 use crate::error::{Error, Kind, Result};
 use crate::film::ascii_json;
 
 /// Name of the attribute that holds our JSON object.
 pub const ATTRIBUTE: &str = "caustique";
 
-/// String attributes of a header by name, ASCII only: Python's OpenEXR refuses a whole file for one byte above 127.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Attributes(pub BTreeMap<String, String>);
+/// What a header says besides its channels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Attributes {
+    /// String attributes by name, ASCII only: Python's OpenEXR refuses a whole file for one byte above 127.
+    pub texts: BTreeMap<String, String>,
+    /// Where the picture is in a larger one, and what camera has seen it. Not read from files.
+    pub frame: Option<Frame>,
+}
+
+/// A picture as a part of a larger one, the display window, and its camera. Matrices are OpenEXR's: row by row, for row
+/// vectors on their left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Width and height of the display window (pixels).
+    pub display: [u32; 2],
+    /// Left and top edge of the picture in it (pixels).
+    pub corner: [u32; 2],
+    /// World to camera: x to the right, y up, z along the view.
+    pub world_to_camera: [f32; 16],
+    /// World to the display window: x to the right and y down, both from 0 to 1.
+    pub world_to_ndc: [f32; 16],
+}
 
 impl Attributes {
     /// The attribute `caustique` with this object.
@@ -35,12 +57,12 @@ impl Attributes {
     pub fn insert(&mut self, name: &str, object: &impl serde::Serialize) -> Result<()> {
         let json = serde_json::to_string(object)
             .map_err(|cause| Error::new(Kind::Image, format!("attribute \"{name}\""), cause))?;
-        self.0.insert(name.to_owned(), ascii_json(&json));
+        self.texts.insert(name.to_owned(), ascii_json(&json));
         Ok(())
     }
 
     /// The object in the attribute `caustique`; `None` if the file is not ours.
     pub fn object(&self) -> Option<serde_json::Value> {
-        serde_json::from_str(self.0.get(ATTRIBUTE)?).ok()
+        serde_json::from_str(self.texts.get(ATTRIBUTE)?).ok()
     }
 }

@@ -237,7 +237,7 @@ fn attributes(headers: &[Header]) -> Attributes {
     for header in headers {
         for (name, value) in header.own_attributes.other.iter().chain(&header.shared_attributes.other) {
             if let AttributeValue::Text(text) = value {
-                found.0.entry(name.to_string()).or_insert_with(|| text.to_string());
+                found.texts.entry(name.to_string()).or_insert_with(|| text.to_string());
             }
         }
     }

@@ -7,12 +7,15 @@ use std::path::Path;
 
 use exr::block::writer::ChunksWriter;
 use exr::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
-use exr::meta::attribute::{AttributeValue, ChannelDescription, LineOrder, SampleType, Text};
+use exr::math::Vec2;
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LineOrder, SampleType, Text,
+};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{SmallVec, f16};
 use rayon::prelude::*;
 
-use super::{Attributes, header};
+use super::{Attributes, Frame, SOFTWARE, header};
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Plane, Sample, check};
 use crate::image::atomic;
@@ -47,9 +50,13 @@ pub struct Options {
 /// not ASCII, the file system.
 pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Options) -> Result<()> {
     check(set, options.naming).map_err(|error| error.within(path.display()))?;
-    let mut planes: Vec<(String, &Plane)> = Vec::new();
+    let mut planes: Vec<(String, Source<'_>)> = Vec::new();
     for layer in &set.layers {
-        planes.extend(layer.planes.iter().map(|plane| (options.naming.channel(&layer.name, &plane.component), plane)));
+        for plane in &layer.planes {
+            let (component, negated) = options.naming.axis(&layer.name, &plane.component);
+            let source = Source { plane: layer.plane(component).unwrap_or(plane), negated };
+            planes.push((options.naming.channel(&layer.name, &plane.component), source));
+        }
     }
     if planes.is_empty() || set.pixels() == 0 {
         let cause = format!("{} channels of {} x {} pixels are no picture", planes.len(), set.width, set.height);
@@ -57,11 +64,19 @@ pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Opti
     }
     planes.sort_by(|(a, _), (b, _)| a.cmp(b));
     let header = header(set, &planes, attributes, options).map_err(|error| error.within(path.display()))?;
-    let planes: Vec<&Plane> = planes.into_iter().map(|(_, plane)| plane).collect();
+    let planes: Vec<Source<'_>> = planes.into_iter().map(|(_, plane)| plane).collect();
     atomic::write(path, |file| {
         write_chunks(file, set.width, &planes, header).map_err(|error| failure(path, error))?;
         sort(file).map_err(|error| atomic::failure(path, &error))
     })
+}
+
+/// What a channel is written from.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    plane: &'a Plane,
+    /// With its sign changed.
+    negated: bool,
 }
 
 fn sort(file: &mut BufWriter<&mut File>) -> std::io::Result<()> {
@@ -76,13 +91,18 @@ fn failure(path: &Path, error: exr::error::Error) -> Error {
     }
 }
 
-fn header(set: &LayerSet, planes: &[(String, &Plane)], attributes: &Attributes, options: Options) -> Result<Header> {
+fn header(
+    set: &LayerSet,
+    planes: &[(String, Source<'_>)],
+    attributes: &Attributes,
+    options: Options,
+) -> Result<Header> {
     use exr::meta::BlockDescription::ScanLines;
     use exr::meta::attribute::Compression as Packing;
     let channels: SmallVec<[ChannelDescription; 5]> = planes
         .iter()
-        .map(|(name, plane)| {
-            let sample = if plane.sample == Sample::Half { SampleType::F16 } else { SampleType::F32 };
+        .map(|(name, source)| {
+            let sample = if source.plane.sample == Sample::Half { SampleType::F16 } else { SampleType::F32 };
             ChannelDescription::named(name.as_str(), sample)
         })
         .collect();
@@ -93,23 +113,38 @@ fn header(set: &LayerSet, planes: &[(String, &Plane)], attributes: &Attributes, 
         Compression::None => Packing::Uncompressed,
     };
     let mut other = HashMap::new();
-    for (name, value) in &attributes.0 {
+    for (name, value) in &attributes.texts {
         let error = |cause| Error::new(Kind::Image, format!("attribute \"{name}\""), cause);
         let key = Text::new_or_none(name).ok_or_else(|| error("its name is not ASCII"))?;
         let text =
             Text::new_or_none(value).filter(|_| value.is_ascii()).ok_or_else(|| error("its text is not ASCII"))?;
         other.insert(key, AttributeValue::Text(text));
     }
-    Ok(Header::new(Text::default(), (set.width, set.height), channels)
-        .with_encoding(compression, ScanLines, LineOrder::Increasing)
-        .with_attributes(LayerAttributes { other, ..LayerAttributes::default() }))
+    let mut own = LayerAttributes { other, software_name: Some(Text::from(SOFTWARE)), ..LayerAttributes::default() };
+    let mut header = Header::new(Text::default(), (set.width, set.height), channels).with_encoding(
+        compression,
+        ScanLines,
+        LineOrder::Increasing,
+    );
+    header.shared_attributes.chromaticities = Some(REC_709);
+    if let Some(Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc }) = attributes.frame {
+        header.shared_attributes.display_window = IntegerBounds::from_dimensions(Vec2(width as usize, height as usize));
+        own.layer_position = Vec2(x as i32, y as i32);
+        own.world_to_camera = Some(options.naming.from_file_axes(world_to_camera));
+        own.world_to_normalized_device = Some(options.naming.from_file_axes(world_to_ndc));
+    }
+    Ok(header.with_attributes(own))
 }
+
+/// Primaries and white of the picture's colours.
+const REC_709: Chromaticities =
+    Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.3, 0.6), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.329) };
 
 /// Compresses batches of blocks in parallel and writes them in order.
 fn write_chunks(
     file: &mut BufWriter<&mut File>,
     width: usize,
-    planes: &[&Plane],
+    planes: &[Source<'_>],
     header: Header,
 ) -> exr::error::UnitResult {
     let headers: exr::meta::Headers = std::iter::once(header).collect();
@@ -123,9 +158,9 @@ fn write_chunks(
                     let channels = &meta.headers[0].channels;
                     let block = UncompressedBlock::from_lines(channels, index, |line| {
                         let at = line.location;
-                        let plane = planes[at.channel];
+                        let Source { plane, negated } = planes[at.channel];
                         let start = at.position.y() * width + at.position.x();
-                        fill(line.value, &plane.values[start..start + at.sample_count], plane.sample);
+                        fill(line.value, &plane.values[start..start + at.sample_count], plane.sample, negated);
                     });
                     block.compress_to_chunk(&meta.headers)
                 })
@@ -139,16 +174,17 @@ fn write_chunks(
 }
 
 /// Samples of one line in the machine's byte order.
-fn fill(bytes: &mut [u8], values: &[f32], sample: Sample) {
+fn fill(bytes: &mut [u8], values: &[f32], sample: Sample, negated: bool) {
+    let signed = |value: f32| if negated { -value } else { value };
     match sample {
         Sample::Float => {
             for (out, value) in bytes.chunks_exact_mut(4).zip(values) {
-                out.copy_from_slice(&value.to_ne_bytes());
+                out.copy_from_slice(&signed(*value).to_ne_bytes());
             }
         }
         Sample::Half => {
             for (out, &value) in bytes.chunks_exact_mut(2).zip(values) {
-                out.copy_from_slice(&f16::from_f32(value).to_ne_bytes());
+                out.copy_from_slice(&f16::from_f32(signed(value)).to_ne_bytes());
             }
         }
     }

@@ -137,15 +137,14 @@ impl Reader<'_> {
         if exposure.is_some_and(|ev| !ev.is_finite()) {
             return Err(fault(place, "extras.caustique.exposure must be finite"));
         }
-        if crop.is_some() {
-            self.out.warnings.push(format!("{place}: its crop is ignored: the whole picture is rendered"));
+        let within = |[x, y, width, height]: [f64; 4]| {
+            x >= 0.0 && y >= 0.0 && width > 0.0 && height > 0.0 && x + width <= 1.0 + 1e-6 && y + height <= 1.0 + 1e-6
+        };
+        if crop.is_some_and(|crop| !within(crop)) {
+            let cause = "extras.caustique.crop must be left edge, top edge, width and height within 0 and 1";
+            return Err(fault(place, cause));
         }
-        if film_transparent {
-            self.out
-                .warnings
-                .push(format!("{place}: its film_transparent is ignored: the environment is part of the picture"));
-        }
-        self.out.picture = Picture { resolution, exposure, tonemap };
+        self.out.picture = Picture { resolution, exposure, tonemap, film_transparent, crop };
         Ok(())
     }
 

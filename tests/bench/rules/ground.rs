@@ -36,7 +36,7 @@ impl Ground {
         let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.glb"));
         let description = read(&path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-        let view = View { camera: None, width: Some(width), height: None };
+        let view = View { width: Some(width), ..View::default() };
         let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
         Ground { name: name.into(), scene, camera }
     }

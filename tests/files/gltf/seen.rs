@@ -3,8 +3,8 @@
 use super::glb::Glb;
 use super::{message, read, try_read};
 use caustique::light::SpotEdge;
-use caustique::scene::View;
 use caustique::scene::description::{Picture, PunctualKind, ToneCurve};
+use caustique::scene::{Crop, View};
 use serde_json::{Value, json};
 
 fn caustique(keys: Value) -> Value {
@@ -21,12 +21,20 @@ fn what_the_picture_was_made_for() {
     }));
     let description = read(&file);
     let (exposure, tonemap) = (Some(-1.5), Some(ToneCurve::Filmic));
-    assert_eq!(description.picture, Picture { resolution: Some([640, 200]), exposure, tonemap });
+    let crop = Some([0.0, 0.0, 0.5, 1.0]);
+    let resolution = Some([640, 200]);
+    assert_eq!(description.picture, Picture { resolution, exposure, tonemap, film_transparent: true, crop });
     assert!(description.environment_hidden_from_camera);
     let said = |what: &str| description.warnings.iter().filter(|warning| warning.contains(what)).count();
-    assert_eq!((said("Hair"), said("crop is ignored"), said("film_transparent is ignored")), (1, 1, 1));
+    assert_eq!((said("Hair"), said("ignored")), (1, 0));
     let scene = caustique::scene::Scene::build(description, 1).expect("a scene");
-    let size = |width, height| scene.camera(&View { camera: None, width, height }).expect("a camera").size();
+    let whole = Some(Crop::Shares([0.0, 0.0, 1.0, 1.0]));
+    let size = |width, height| {
+        let halved = scene.camera(&View { width, height, ..View::default() }).expect("a camera").size();
+        let whole = scene.camera(&View { width, height, crop: whole, ..View::default() }).expect("a camera").size();
+        assert_eq!(halved, (whole.0 / 2, whole.1));
+        whole
+    };
     assert_eq!(size(None, None), (640, 200));
     assert_eq!(size(Some(320), None), (320, 100));
     assert_eq!(size(None, Some(50)), (160, 50));
@@ -40,6 +48,8 @@ fn wrong_values_are_errors() {
         (json!({"resolution": [200]}), "invalid length 1"),
         (json!({"tonemap": "sepia"}), "unknown variant `sepia`"),
         (json!({"losses": "all"}), "expected a sequence"),
+        (json!({"crop": [0.5, 0, 0.6, 1]}), "within 0 and 1"),
+        (json!({"crop": [0, 0, 0, 1]}), "within 0 and 1"),
     ] {
         let mut file = Glb::new();
         file.json["scenes"][0]["extras"] = caustique(keys);
@@ -96,7 +106,19 @@ fn lens_shift() {
     file.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 1, "aspectRatio": 2, "znear": 0.1}}]);
     file.node(json!({"camera": 0, "extras": {"caustique": {"shift": [0.5, -0.25]}}}));
     let scene = caustique::scene::Scene::build(read(&file), 1).expect("a scene");
-    let camera = scene.camera(&View { camera: None, width: Some(200), height: Some(100) }).expect("a camera");
+    let camera = scene.camera(&View { width: Some(200), height: Some(100), ..View::default() }).expect("a camera");
     let ray = camera.ray([0.0, 25.0].into(), [0.5; 2].into());
     assert!((ray.direction - camera.forward()).length() < 1e-5, "{:?}", ray.direction);
+}
+
+/// Shares and pixels of a picture, and what is not within it.
+#[test]
+fn windows() {
+    let window = |crop: Crop| crop.window((200, 100));
+    assert_eq!(window(Crop::Shares([0.25, 0.0, 0.5, 1.0])), Some([50, 0, 100, 100]));
+    assert_eq!(window(Crop::Shares([0.999, 0.999, 0.0001, 0.0001])), Some([199, 99, 1, 1]));
+    assert_eq!(window(Crop::Pixels([199, 99, 1, 1])), Some([199, 99, 1, 1]));
+    for wrong in [[199, 99, 2, 1], [0, 0, 0, 5], [0, 100, 1, 1], [u32::MAX, 0, u32::MAX, 1]] {
+        assert_eq!(window(Crop::Pixels(wrong)), None, "{wrong:?}");
+    }
 }
