@@ -2,6 +2,8 @@
 
 mod support;
 
+#[path = "cli/checkpoints.rs"]
+mod checkpoints;
 #[path = "cli/commands.rs"]
 mod commands;
 #[path = "cli/converge.rs"]

@@ -1,11 +1,13 @@
 //! Which instances a pixel's eye paths hit first, and how often: what cryptomattes and alpha are made of.
 
+use serde::{Deserialize, Serialize};
+
 /// Instances kept per pixel: three cryptomatte layers of two ranks.
 pub const RANKS: usize = 6;
 
 /// Counts of first hits by instance. The first [`RANKS`] instances that show up are kept by name; later ones count as
 /// hits only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Coverage {
     /// Instances; entry `i` means something where `counts[i] > 0`.
     instances: [u32; RANKS],

@@ -6,6 +6,7 @@ use crate::photon::ByKind;
 use crate::random;
 use crate::stat::Welford;
 use crate::transport::{EyeMeasure, MAX_LEVELS};
+use serde::{Deserialize, Serialize};
 
 /// What is added to the differences of levels for light gathered in media, relative: bias grows with the radius
 /// squared, which from one level to the next grows by 2^(2/3) there and by 2 on surfaces. With this, a difference is
@@ -13,7 +14,7 @@ use crate::transport::{EyeMeasure, MAX_LEVELS};
 const VOLUME_DIFFERENCE: f32 = 0.702_414_4;
 
 /// Sums over iterations of the additive parts of the level that is the method's own image.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Parts {
     /// Emitters seen directly or through perfect mirrors and clear glass.
     pub emission: DVec3,
@@ -31,7 +32,7 @@ pub struct Parts {
 pub const QUARTERS: usize = random::QUARTERS as usize;
 
 /// Estimates of one quarter of the iterations, of the level that is the method's own image.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quarter {
     /// Sum over the quarter's iterations.
     pub sum: DVec3,
@@ -47,7 +48,7 @@ impl Quarter {
 }
 
 /// Statistics of one pixel over the iterations so far.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Pixel {
     /// Estimates, level 1 (the smallest bandwidth) first.
     pub levels: [Welford; MAX_LEVELS],

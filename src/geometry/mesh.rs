@@ -1,6 +1,6 @@
 //! Triangle meshes and where they stand.
 
-use super::surface::error_within;
+use super::precision::error_within;
 use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
 
 /// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has

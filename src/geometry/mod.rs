@@ -1,9 +1,11 @@
 //! Meshes, their placements, and the surface point a ray has hit.
 
 mod mesh;
+mod precision;
 mod shapes;
 mod surface;
 
 pub use mesh::{Instance, Mesh, Placement};
+pub use precision::{error, spawn};
 pub use shapes::Shapes;
-pub use surface::{Surface, error, spawn};
+pub use surface::Surface;

@@ -1,6 +1,7 @@
 //! The point of a surface that a ray has hit, with everything shading needs.
 
 use super::mesh::Corner;
+use super::precision::spawn;
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -32,11 +33,6 @@ pub struct Surface {
     /// Others lie on it here, and it is known which comes first (`scene/contact.rs`).
     pub touching: bool,
 }
-
-/// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest
-/// coordinate of the position and of its triangle's corners: eight roundings, where the products and sums of a transform (four), of barycentric coordinates (two),
-/// and those of Embree's own corners (two) are.
-const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 
 impl Surface {
     /// The surface at barycentric coordinates (`b1`, `b2`) of triangle `primitive`. `None` for a triangle without area.
@@ -98,23 +94,4 @@ impl Surface {
     pub fn spawn(&self, direction: Vec3) -> Vec3 {
         spawn(self.p, self.ng, direction, self.error)
     }
-}
-
-/// How far from its triangle a position may be, where no coordinate of either is larger than `largest` (scene units).
-#[inline]
-pub(super) fn error_within(largest: f32) -> f32 {
-    POSITION_ERROR * largest.max(1e-3)
-}
-
-/// The same for the points of a triangle with these corners in world space.
-#[inline]
-pub fn error(corners: [Vec3; 3]) -> f32 {
-    let [a, b, c] = corners.map(Vec3::abs);
-    error_within(a.max(b).max(c).max_element())
-}
-
-/// [`Surface::spawn`] for a point of a triangle with unit normal `ng` that may be off by `error`.
-#[inline]
-pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
-    p + ng * error.copysign(direction.dot(ng))
 }

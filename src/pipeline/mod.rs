@@ -4,17 +4,23 @@
 //! that are read.
 
 pub mod check;
+pub mod checkpoint;
 pub mod finish;
 pub mod layers;
 pub mod load;
 pub mod memory;
 pub mod plan;
+mod saver;
 
+pub use checkpoint::Saving;
 pub use finish::Ready;
 pub use load::Loaded;
 
+use checkpoint::Head;
+use saver::Saver;
+
 use crate::camera::Camera;
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Selection, output as film};
 use crate::finish::{Account, Finish, finished_part, reads, reads_for_picture};
 use crate::image::exr::{self, Attributes};
@@ -27,6 +33,7 @@ use crate::render::{
 };
 use crate::scene::{Scene, View};
 use serde_json::{Map, Value, json};
+use std::path::PathBuf;
 
 /// Settings of a way that auto may choose, for a picture of a size; `None` where other wishes rule it out.
 pub type Allowed<'a> = &'a dyn Fn(Strategy, (u32, u32)) -> Option<Settings>;
@@ -65,6 +72,10 @@ pub struct Order<'a> {
     pub arguments: Value,
     /// Leave clocks and the number of threads out of the header.
     pub reproducible: bool,
+    /// Where the state is saved while it renders, if at all.
+    pub saving: Option<Saving>,
+    /// A checkpoint from which it goes on.
+    pub resume: Option<PathBuf>,
 }
 
 /// What may take long without telling how far it is.
@@ -109,6 +120,14 @@ pub trait Watch {
     fn picture(&mut self, picture: Result<LayerSet>, frame: &exr::Frame) {
         let _ = (picture, frame);
     }
+    /// It goes on after so many iterations, of a checkpoint.
+    fn resumed(&mut self, iterations: u64) {
+        let _ = iterations;
+    }
+    /// The state could not be saved; the render goes on.
+    fn unsaved(&mut self, error: &Error) {
+        let _ = error;
+    }
     /// All are; the pixels are still there.
     fn rendered(&mut self, rendered: &Rendered);
 }
@@ -143,33 +162,86 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let camera = scene.camera(&order.view)?;
     let stage = (&scene, &camera);
     let (settings, selection) = checked(&order, stage)?;
-    let choice = choose(&order, auto, stage, &settings, watch)?;
-    let settings = match &choice {
-        Some(choice) => {
-            memory::check(stage, &choice.settings, layers::channels(&choice.settings, &scene.survey))?;
-            choice.settings.clone()
+    let identity = if order.saving.is_some() || order.resume.is_some() { order.hash()? } else { String::new() };
+    let saved = order.resume.as_deref().map(checkpoint::read).transpose()?;
+    if let (Some(path), Some((head, _))) = (&order.resume, &saved) {
+        checkpoint::check(path, head, &identity, &order.arguments)?;
+    }
+    let decided = saved.as_ref().map(|(head, _)| head.way);
+    let (choice, settings, way) = match decided {
+        // What was chosen holds.
+        Some(way) => (None, of_way(&auto, way, camera.size()).unwrap_or(settings), way),
+        None => {
+            let choice = choose(&order, auto, stage, &settings, watch)?;
+            let settings = choice.as_ref().map_or(settings, |choice| choice.settings.clone());
+            let way = choice.as_ref().map(|choice| choice.way);
+            (choice, settings, way)
         }
-        None => settings,
     };
+    memory::check(stage, &settings, layers::channels(&settings, &scene.survey))?;
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
     let mut plan = plan::plan(&asked, settings.method, stage, &removed);
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     watch.begins(&plan, &settings);
-    let decided = choice.as_ref().map(|choice| choice.spent).unwrap_or_default();
-    let frame = frame(&scene, &order.view)?;
-    let stage = Stage::new(&scene, &camera, &settings);
-    let rendered = drive(Session::after(&stage, decided), |progress, session| {
-        watch.progress(progress);
-        preview(session, ready.as_mut(), &frame, watch);
-        if watch.stops() { Control::Stop } else { Control::Continue }
-    });
-    watch.rendered(&rendered);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
+    let frame = frame(&scene, &order.view)?;
+    let stage = Stage::new(&scene, &camera, &settings);
+    let (mut session, told) = match saved {
+        None => {
+            let spent = choice.as_ref().map(|choice| choice.spent).unwrap_or_default();
+            (Session::after(&stage, spent), json!(plan))
+        }
+        Some((head, state)) => {
+            watch.resumed(state.iterations());
+            let path = order.resume.clone().unwrap_or_default();
+            let other = || Error::new(Kind::Usage, path.display(), "is of a picture of another size or method");
+            let session = Session::resume(&stage, state).ok_or_else(other)?;
+            (session, head.plan)
+        }
+    };
+    let head = Head {
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: identity,
+        arguments: order.arguments.clone(),
+        way,
+        plan: told,
+    };
+    let mut saver =
+        order.saving.as_ref().map(|saving| Saver::new(saving, &head, order.resume.as_deref() == Some(&*saving.path)));
+    let stop = drive(&mut session, |progress, session| {
+        watch.progress(progress);
+        preview(session, ready.as_mut(), &frame, watch);
+        if let Some(saver) = &mut saver {
+            saver.save_if_due(session, watch);
+        }
+        if watch.stops() { Control::Stop } else { Control::Continue }
+    });
+    if let Some(saver) = &mut saver {
+        saver.finish(&session, stop, watch);
+    }
+    let rendered = session.finish(stop);
+    watch.rendered(&rendered);
     watch.waits(Some(Wait::Finishing));
-    let delivery = deliver(&order, (&scene, &frame), &plan, rendered, &selection, ready.as_mut());
+    let delivery = deliver(&order, (&scene, &frame), &head.plan, rendered, &selection, ready.as_mut());
     watch.waits(None);
     delivery
+}
+
+impl Order<'_> {
+    /// A hash of the files that it reads.
+    fn hash(&self) -> Result<String> {
+        let environment = match &self.scene.environment {
+            Some(load::Environment::File(path)) => Some(path.as_path()),
+            _ => None,
+        };
+        checkpoint::hash(&self.scene.path, environment)
+    }
+}
+
+/// Settings of a way that auto has chosen before.
+fn of_way(auto: &Option<Auto<'_>>, way: Option<Strategy>, size: (u32, u32)) -> Option<Settings> {
+    (auto.as_ref()?.allowed)(way?, size)
 }
 
 /// Shows the picture as it is to those who look, finished as the last one will be, if quicker.
@@ -260,7 +332,7 @@ fn readied(
 fn deliver(
     order: &Order<'_>,
     (scene, frame): (&Scene, &exr::Frame),
-    plan: &Plan,
+    plan: &Value,
     mut rendered: Rendered,
     selection: &Selection,
     ready: Option<&mut Ready>,
@@ -288,7 +360,7 @@ fn deliver(
     if refusal.is_none() {
         set = selection.apply(set)?;
     }
-    header.insert("plan".into(), json!(plan));
+    header.insert("plan".into(), plan.clone());
     let facts = finished.as_ref().map(|(_, facts, _)| facts.clone());
     complete(&mut header, order, scene, facts, cpu_seconds() - cpu_start);
     attributes.insert(exr::ATTRIBUTE, &header)?;

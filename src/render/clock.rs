@@ -1,6 +1,7 @@
 //! Clocks and memory of the process. The only clocks of a render are here, and decide nothing but when it stops.
 
 use rustix::time::{ClockId, clock_gettime};
+use serde::{Deserialize, Serialize};
 
 /// Wall clock since its making.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +38,7 @@ pub fn peak_memory() -> u64 {
 }
 
 /// Time that a render has taken: its own, not that of others between its iterations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spent {
     /// Wall-clock seconds.
     pub seconds: f64,

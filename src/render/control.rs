@@ -2,7 +2,7 @@
 
 use super::error_estimate::ErrorEstimate;
 use super::told::Told;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What an observer wants after an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct Progress {
 }
 
 /// One moment of a render's history.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct History {
     /// Wall-clock seconds.
     pub seconds: f64,

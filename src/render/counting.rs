@@ -312,6 +312,19 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         work
     }
 
+    fn state(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_allocvec(&(&self.bandwidths, &self.counts))
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        let Ok((bandwidths, counts)) = postcard::from_bytes::<(Vec<R::Bandwidth>, Vec<R::Count>)>(state) else {
+            return false;
+        };
+        let fits = (bandwidths.len(), counts.len()) == (self.bandwidths.len(), self.counts.len());
+        (self.bandwidths, self.counts) = (bandwidths, counts);
+        fits
+    }
+
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {
         // Of three channels the one in the middle.
         let (channels, channel) = if self.channels.is_some() { (3, 1) } else { (1, 0) };

@@ -24,31 +24,34 @@ pub fn render(
     settings: &Settings,
     mut observe: impl FnMut(&Progress, &[Pixel]) -> Control,
 ) -> Rendered {
-    drive(Session::new(&Stage::new(scene, camera, settings)), |progress, session| observe(progress, session.pixels()))
+    let stage = Stage::new(scene, camera, settings);
+    let mut session = Session::new(&stage);
+    let stop = drive(&mut session, |progress, session| observe(progress, session.pixels()));
+    session.finish(stop)
 }
 
-/// Iterates until the session's settings, or `observe`, stop it. What `observe` takes of the time is the render's own
-/// where it says so ([`Session::charge`]).
+/// Iterates until the session's settings, or `observe`, stop it; returns what has. What `observe` takes of the time is the
+/// render's own where it says so ([`Session::charge`]).
 pub fn drive<'a>(
-    mut session: Session<'a>,
+    session: &mut Session<'a>,
     mut observe: impl FnMut(&Progress, &mut Session<'a>) -> Control,
-) -> Rendered {
+) -> StopReason {
     let settings = session.settings();
-    let stop = loop {
+    loop {
         if session.finished() {
-            break StopReason::Iterations;
+            return StopReason::Iterations;
         }
         let progress = session.step();
-        if observe(&progress, &mut session) == Control::Stop {
-            break StopReason::Interrupted;
+        if observe(&progress, session) == Control::Stop {
+            return StopReason::Interrupted;
         }
         // Without a light the black picture is right.
         let error = progress.error.or(session.is_dark().then_some(0.0));
-        if let Some(reason) = settings.stops(session.spent().seconds, error.filter(|_| progress.iteration >= LEAST)) {
-            break reason;
+        let error = error.filter(|_| progress.iteration >= LEAST);
+        if let Some(reason) = settings.stops(session.spent().seconds, error) {
+            return reason;
         }
-    };
-    session.finish(stop)
+    }
 }
 
 impl Settings {

@@ -1,7 +1,9 @@
 //! The estimated error of a picture, by what it is made of.
 
+use serde::{Deserialize, Serialize};
+
 /// The square of [`Rendered::relative_error`](super::Rendered::relative_error), and of what it is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEstimate {
     /// Mean relative variance.
     pub variance: f64,

@@ -25,6 +25,18 @@ pub(super) trait Iterate {
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {
         None
     }
+    /// What it has learnt from iterations and the next one needs, packed; what follows from the settings alone is made
+    /// again.
+    ///
+    /// # Errors
+    /// None: it is written to memory.
+    fn state(&self) -> postcard::Result<Vec<u8>> {
+        Ok(Vec::new())
+    }
+    /// Takes such a state, after [`Iterate::pixels`]; false where it is another's.
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state.is_empty()
+    }
     /// Where its light paths start, if they are guided.
     fn guide(&self) -> Option<&Guide> {
         None

@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
 use crate::transport::Strategies;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Light paths per iteration: the papers' setting.
 pub const DEFAULT_PHOTONS: u32 = 100_000;
@@ -17,7 +17,7 @@ pub const DEFAULT_MAP_KNN: usize = 100;
 pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
 /// How light is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Path tracing with next-event estimation.

@@ -102,13 +102,15 @@ pub(super) struct Pm<'a> {
     surroundings: &'a Surroundings,
     /// Built by the first iteration.
     maps: Option<PhotonMaps>,
+    /// The light paths of the maps are counted.
+    counted: bool,
 }
 
 impl<'a> Pm<'a> {
     /// Nothing done yet.
     pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &'a Settings, surroundings: &'a Surroundings) -> Pm<'a> {
         let eye = settings.eye(scene, camera, surroundings);
-        Pm { eye, settings, surroundings, maps: None }
+        Pm { eye, settings, surroundings, maps: None, counted: false }
     }
 
     fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32) {
@@ -164,6 +166,18 @@ impl Iterate for Pm<'_> {
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();
         self.maps = Some(maps);
-        Work { light_paths: u64::from(traced), photons }
+        // After a pause the maps are made again, of the same paths.
+        let light_paths = if std::mem::replace(&mut self.counted, true) { 0 } else { u64::from(traced) };
+        Work { light_paths, photons }
+    }
+
+    fn state(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_allocvec(&self.counted)
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        let Ok(counted) = postcard::from_bytes(state) else { return false };
+        self.counted = counted;
+        true
     }
 }

@@ -9,10 +9,10 @@ use crate::estimator::{BandwidthState, Pixel, SquaredError};
 use crate::math::DVec3;
 use crate::photon::Kind;
 use crate::stat::floor;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Where the time went: core-seconds (processor time of the whole process) per phase.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Phases {
     /// Pilot pass and initial bandwidths.
     pub pilot: f64,

@@ -8,6 +8,7 @@ use super::iterate::Iterate;
 use super::output;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Levels, Settings};
+use super::state::State;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
@@ -100,6 +101,46 @@ impl<'a> Session<'a> {
             history: Vec::new(),
             next_record: 1,
         }
+    }
+
+    /// Goes on from a saved state; `None` where it is of another picture or method.
+    pub fn resume(stage: &'a Stage<'a>, state: State) -> Option<Session<'a>> {
+        let mut session = Session::new(stage);
+        let State { next, done, light_paths, photons, next_record, history, phases, spent, pilot_seconds, .. } = state;
+        let fits = state.pixels.len() == session.pixels.len() && session.passes.restore(&state.passes);
+        fits.then(|| Session {
+            pixels: state.pixels,
+            phases,
+            spent,
+            pilot_seconds,
+            next,
+            done,
+            light_paths,
+            photons: photons as usize,
+            history,
+            next_record,
+            ..session
+        })
+    }
+
+    /// The state as it is, to be saved.
+    ///
+    /// # Errors
+    /// None: it is written to memory.
+    pub fn state(&self) -> postcard::Result<State<&[Pixel]>> {
+        Ok(State {
+            next: self.next,
+            done: self.done,
+            light_paths: self.light_paths,
+            photons: self.photons as u64,
+            next_record: self.next_record,
+            history: self.history.clone(),
+            phases: self.phases,
+            spent: self.spent,
+            pilot_seconds: self.pilot_seconds,
+            pixels: &self.pixels,
+            passes: self.passes.state()?,
+        })
     }
 
     /// Whether all iterations that were asked for are done.

@@ -2,9 +2,10 @@
 
 use super::method::Method;
 use crate::transport::Indirect;
+use serde::{Deserialize, Serialize};
 
 /// A way to render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Strategy {
     /// How light is found.
     pub method: Method,

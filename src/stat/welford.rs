@@ -1,10 +1,11 @@
 //! Mean and variance in one pass \[Welford 1962\].
 
 use crate::math::{DVec3, Rgb};
+use serde::{Deserialize, Serialize};
 
 /// Running mean and sum of squared deviations of an RGB quantity; the count is kept by the owner, which has many of
 /// these.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Welford {
     /// Mean of the values so far.
     pub mean: DVec3,

@@ -41,6 +41,7 @@ use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::spectrum::{Wavelength, WavelengthSample};
 use crate::trace::Ray;
+use serde::{Deserialize, Serialize};
 use std::f32::consts::FRAC_1_PI;
 
 /// What denoisers want to know about a pixel.
@@ -91,7 +92,7 @@ impl EyeMeasure {
 const LEAST_CHANCE: f32 = 0.1;
 
 /// Who brings light that has been scattered broadly before the eye path's first broad bounce.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Indirect {
     /// Photons.
     #[default]

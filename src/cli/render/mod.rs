@@ -15,6 +15,7 @@ use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Result};
 use caustique::film::LayerSet;
+use caustique::image::atomic;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::plan::why;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
@@ -37,6 +38,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
+    args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
     techniques::prepare(args)?;
     super::pool(args.threads)?.install(|| render(args, settings))
 }
@@ -59,6 +61,8 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         naming: args.exr_naming.into(),
         arguments: json!(args),
         reproducible: args.reproducible,
+        saving: args.saving(),
+        resume: args.resume.clone(),
     };
     let mut told = Telling {
         args,
@@ -141,6 +145,16 @@ impl Watch for Telling<'_> {
         if let Some(preview) = &mut self.preview {
             preview.show(picture, Some(*frame));
         }
+    }
+
+    fn resumed(&mut self, iterations: u64) {
+        if self.args.progress.for_people() {
+            say(&format!("going on after {iterations} iterations"));
+        }
+    }
+
+    fn unsaved(&mut self, error: &Error) {
+        say(&format!("warning: the state of the render is not saved: {error}; the render goes on"));
     }
 
     fn rendered(&mut self, rendered: &Rendered) {

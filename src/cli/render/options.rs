@@ -3,10 +3,11 @@
 
 use super::job::{Job, idle};
 use super::preview::Target;
-use crate::cli::number::threads;
+use crate::cli::number::{positive, threads};
 use crate::cli::output::{Naming, PictureArgs};
 use crate::cli::progress::Form;
-use caustique::error::Result;
+use caustique::error::{Error, Kind, Result};
+use caustique::pipeline::Saving;
 use caustique::render::Settings;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -47,6 +48,23 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.png|FILE.exr|tev", help_heading = "Running")]
     #[serde(skip)]
     pub preview: Option<Target>,
+    /// Save the state of the render every few minutes, so that --resume can go on; kept at the end, to extend the render
+    /// [default: beside the output, and removed at the end]
+    #[arg(long, value_name = "FILE", help_heading = "Running", conflicts_with = "no_checkpoint")]
+    #[serde(skip)]
+    pub checkpoint: Option<PathBuf>,
+    /// Seconds between two saves
+    #[arg(long, value_name = "SECONDS", default_value_t = 300.0, value_parser = positive, help_heading = "Running")]
+    #[serde(skip)]
+    pub checkpoint_every: f64,
+    /// Save nothing
+    #[arg(long, help_heading = "Running")]
+    #[serde(skip)]
+    pub no_checkpoint: bool,
+    /// Go on from a checkpoint: the same options, and more --iterations or --time (both count from the start)
+    #[arg(long, value_name = "FILE", help_heading = "Running")]
+    #[serde(skip)]
+    pub resume: Option<PathBuf>,
     /// Threads; 0 takes all cores. The picture does not depend on it
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     #[serde(skip)]
@@ -76,6 +94,24 @@ impl RenderArgs {
         if self.debug_techniques.is_some() && !settings.method.has_techniques() {
             return Err(idle("--debug-techniques", settings.method.name(), "vcm"));
         }
+        if self.debug_techniques.is_some() && (self.checkpoint.is_some() || self.resume.is_some()) {
+            let cause = "pictures per technique are not part of a checkpoint";
+            return Err(Error::new(Kind::Usage, "command line", cause).hint("leave --debug-techniques out"));
+        }
         Ok(Settings { techniques: self.debug_techniques.is_some(), ..settings })
+    }
+
+    /// Where the state is saved, if at all.
+    pub fn saving(&self) -> Option<Saving> {
+        let beside = || {
+            let name = self.output.file_name().filter(|_| self.output.extension().is_some())?;
+            let mut name = name.to_owned();
+            name.push(".checkpoint");
+            Some(self.output.with_file_name(name))
+        };
+        // Pictures per technique are no part of the state.
+        let saved = !self.no_checkpoint && self.debug_techniques.is_none();
+        let path = saved.then(|| self.checkpoint.clone().or_else(beside)).flatten()?;
+        Some(Saving { path, every: self.checkpoint_every, keep: self.checkpoint.is_some() })
     }
 }

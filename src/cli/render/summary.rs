@@ -100,6 +100,10 @@ impl Summary {
             return Ok(());
         }
         let cause = format!("interrupted after {} iterations, which are written", self.iterations);
-        Err(Error::new(Kind::Interrupted, args.output.display(), cause))
+        let error = Error::new(Kind::Interrupted, args.output.display(), cause);
+        Err(match args.saving().filter(|saving| saving.path.exists()) {
+            Some(saving) => error.hint(format!("the same command with --resume {} goes on", saving.path.display())),
+            None => error,
+        })
     }
 }

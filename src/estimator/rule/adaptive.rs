@@ -21,6 +21,7 @@ use super::memoryless::radius2_factor;
 use crate::math::Frame;
 use crate::photon::{Kernel, kernel::laplacian};
 use crate::transport::Found;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::marker::PhantomData;
 use wide::{CmpLt, f32x8};
@@ -39,7 +40,7 @@ pub struct Adaptive<K>(PhantomData<K>);
 
 /// The bandwidth of one level of one pixel. The sums of the largest level of an eye path stand for all of them, and the
 /// levels keep their ratio.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Bandwidth {
     /// Radius squared (m2).
     pub radius2: f32,

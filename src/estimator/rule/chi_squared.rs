@@ -8,6 +8,7 @@
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
 use crate::transport::{Found, MAX_LEVELS};
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, i32x4, u32x4, u64x4};
 
@@ -121,7 +122,7 @@ impl Tally {
 }
 
 /// The bandwidth of one level of one pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
     /// Radius squared (m2).
     pub radius2: f32,

@@ -10,6 +10,7 @@
 use super::CountingRule;
 use crate::math::Frame;
 use crate::transport::{Found, MAX_LEVELS};
+use serde::{Deserialize, Serialize};
 use wide::{CmpLt, f32x8};
 
 /// The rule.
@@ -20,7 +21,7 @@ pub struct LocalStatistics {
 }
 
 /// The bandwidth of one level of one pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
     /// Radius squared (m2).
     pub radius2: f32,

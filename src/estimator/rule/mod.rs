@@ -9,14 +9,16 @@ pub mod volume;
 
 use crate::math::Frame;
 use crate::transport::Found;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one
 /// eye path are counted and updated together.
 pub trait CountingRule: Sync {
     /// State of a level of a pixel, kept between iterations.
-    type Bandwidth: Copy + Send + Sync;
+    type Bandwidth: Copy + Send + Sync + Serialize + DeserializeOwned;
     /// What is kept beside it.
-    type Count: Copy + Default + Send + Sync;
+    type Count: Copy + Default + Send + Sync + Serialize + DeserializeOwned;
     /// What the photons of one eye path add up to, at all its levels.
     type Tally: Default;
 

@@ -1,0 +1,62 @@
+//! When a render is saved.
+
+use super::Watch;
+use super::checkpoint::{self, Head, Saving};
+use crate::error::{Error, Kind, Result};
+use crate::render::{Clock, Session, Spent, StopReason};
+
+/// Saves a render every so often.
+pub(super) struct Saver<'a> {
+    saving: &'a Saving,
+    head: &'a Head,
+    clock: Clock,
+    /// When it is due (seconds).
+    next: f64,
+    /// It has failed, and said so.
+    failed: bool,
+    /// The file is ours.
+    written: bool,
+}
+
+impl<'a> Saver<'a> {
+    /// `written`: the file is there already, for the render goes on from it.
+    pub fn new(saving: &'a Saving, head: &'a Head, written: bool) -> Saver<'a> {
+        Saver { saving, head, clock: Clock::start(), next: saving.every, failed: false, written }
+    }
+
+    /// Saves the state if that is due; its time is the render's.
+    pub fn save_if_due(&mut self, session: &mut Session<'_>, watch: &mut dyn Watch) {
+        if self.clock.seconds() < self.next {
+            return;
+        }
+        let mut spent = Spent::default();
+        spent.during(|| self.save(session, watch));
+        session.charge(spent);
+        self.next = self.clock.seconds() + self.saving.every;
+    }
+
+    /// After the last iteration: what was interrupted, or is to be kept, is saved as it is; of what is done nothing stays.
+    pub fn finish(&mut self, session: &Session<'_>, stop: StopReason, watch: &mut dyn Watch) {
+        if self.saving.keep || stop == StopReason::Interrupted {
+            self.save(session, watch);
+        } else if self.written {
+            // Nobody misses a file that is not there.
+            let _ = std::fs::remove_file(&self.saving.path);
+        }
+    }
+
+    fn save(&mut self, session: &Session<'_>, watch: &mut dyn Watch) {
+        match self.write(session) {
+            Ok(()) => (self.written, self.failed) = (true, false),
+            // Said once as long as it lasts.
+            Err(error) if !std::mem::replace(&mut self.failed, true) => watch.unsaved(&error),
+            Err(_) => {}
+        }
+    }
+
+    fn write(&self, session: &Session<'_>) -> Result<()> {
+        let path = &self.saving.path;
+        let state = session.state().map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
+        checkpoint::write(path, self.head, &state)
+    }
+}

@@ -1,0 +1,112 @@
+//! Checkpoints: a render that was killed and goes on is the render that was not.
+
+use crate::Folder;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+const COMMON: &str = "render scene.glb --width 48 --height 32 --reproducible --no-combine --seed 5 --progress none";
+
+fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
+    std::fs::read(folder.path(name)).expect("the file is there")
+}
+
+/// Kills a render once it has saved itself, and waits for its end.
+fn killed(folder: &Folder, arguments: &str, checkpoint: &Path, moment: Duration) {
+    let mut render = folder.command(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
+    let start = Instant::now();
+    while !checkpoint.exists() {
+        assert!(start.elapsed() < Duration::from_secs(120), "no checkpoint was written");
+        assert!(render.try_wait().expect("it can be asked").is_none(), "the render has ended");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    std::thread::sleep(moment);
+    render.kill().expect("it can be killed");
+    render.wait().expect("it ends");
+}
+
+/// Every method, killed at some moment, goes on to the same bytes. What auto chooses depends on how long it may take, so
+/// it is asked for as many iterations as in the end.
+#[test]
+fn what_was_killed_goes_on_to_the_same_bytes() {
+    let methods = ["path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "auto"];
+    for (i, method) in methods.into_iter().enumerate() {
+        let folder = Folder::new();
+        let common = format!("{COMMON} --method {method}");
+        let (first, moment) = if method == "auto" { (400, 0) } else { (1_000_000, 7 * i as u64) };
+        let state = folder.path("cut.exr.checkpoint");
+        let cut = format!("{common} --iterations {first} -o cut.exr --checkpoint-every 0.001");
+        killed(&folder, &cut, &state, Duration::from_millis(moment));
+        assert!(!folder.path("cut.exr").exists());
+        // So many more that some are left to do.
+        let (head, done) = state_of(&folder, "cut.exr.checkpoint");
+        assert_eq!(head["version"], env!("CARGO_PKG_VERSION"));
+        let total = if method == "auto" { 400 } else { done + 7 };
+        let resumed = folder.run(&format!("{common} --iterations {total} -o cut.exr --resume cut.exr.checkpoint"));
+        assert_eq!(resumed.code, Some(0), "{method}: {}", resumed.stderr);
+        let whole = folder.run(&format!("{common} --iterations {total} -o whole.exr"));
+        assert_eq!(whole.code, Some(0), "{method}: {}", whole.stderr);
+        assert!(
+            bytes(&folder, "whole.exr") == bytes(&folder, "cut.exr"),
+            "{method}: other bytes after a kill at {done}"
+        );
+        // Who is killed while writing leaves the half beside the whole.
+        let files: Vec<String> = folder.files().into_iter().filter(|name| !name.ends_with(".part")).collect();
+        assert_eq!(files, ["cut.exr", "whole.exr"], "{method}: the checkpoint is removed");
+    }
+}
+
+/// What a checkpoint says of itself, and after how many iterations it was written.
+fn state_of(folder: &Folder, name: &str) -> (serde_json::Value, u64) {
+    let (head, state) = caustique::pipeline::checkpoint::read(&folder.path(name)).expect("it can be read");
+    (serde_json::to_value(head).expect("it is an object"), state.iterations())
+}
+
+/// A checkpoint that was asked for stays, and a render that was done can be extended.
+#[test]
+fn a_render_that_was_done_is_extended() {
+    let folder = Folder::new();
+    let run = |more: &str| {
+        let outcome = folder.run(&format!("{COMMON} --method cppm {more}"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    };
+    run("--iterations 12 -o whole.exr");
+    run("--iterations 5 -o part.exr --checkpoint state");
+    run("--iterations 12 -o part.exr --resume state --no-checkpoint");
+    let [whole, part] = ["whole.exr", "part.exr"].map(|name| folder.read(name).0);
+    assert!(whole.layers == part.layers);
+    assert!(folder.path("state").exists());
+}
+
+#[test]
+fn what_does_not_belong_is_refused_by_name() {
+    let folder = Folder::new();
+    let run = |more: &str| folder.run(&format!("{COMMON} --iterations 2 -o a.exr {more}"));
+    assert_eq!(run("--method path --checkpoint state").code, Some(0));
+    let refused = |more: &str, what: &str| {
+        let outcome = run(more);
+        assert!(outcome.code != Some(0) && outcome.stderr.contains(what), "{more}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains("hint: "), "{}", outcome.stderr);
+    };
+    refused("--method vcm --resume state", "another --method");
+    refused("--method path --seed 6 --resume state", "another --seed");
+    refused("--method path --width 50 --resume state", "another --width");
+    refused("--method path --resume scene.glb", "is no checkpoint");
+    refused("--method path --resume nowhere", "No such file");
+    let whole = bytes(&folder, "state");
+    for place in [30, whole.len() / 2, whole.len() - 3] {
+        let mut damaged = whole.clone();
+        damaged[place] ^= 4;
+        std::fs::write(folder.path("damaged"), damaged).expect("it can be written");
+        refused("--method path --resume damaged", "the checkpoint is damaged");
+    }
+    std::fs::write(folder.path("damaged"), &whole[..whole.len() / 3]).expect("it can be written");
+    refused("--method path --resume damaged", "the checkpoint is damaged");
+    std::fs::write(folder.path("damaged"), &whole[..25]).expect("it can be written");
+    refused("--method path --resume damaged", "the checkpoint is damaged");
+    let mut scene = bytes(&folder, "scene.glb");
+    let name = scene.windows(5).position(|letters| letters == b"floor").expect("there is a floor");
+    scene[name..name + 5].copy_from_slice(b"table");
+    std::fs::write(folder.path("scene.glb"), scene).expect("it can be written");
+    refused("--method path --resume state", "another scene");
+}
