@@ -3,8 +3,8 @@
 use crate::math::Vec3;
 
 /// Relative error of a position computed from barycentric coordinates and a transform, in units of the largest
-/// coordinate of the position and of its triangle's corners: eight roundings, where the products and sums of a transform (four), of barycentric coordinates (two),
-/// and those of Embree's own corners (two) are.
+/// coordinate of the position and of its triangle's corners: eight roundings, where the products and sums of a
+/// transform (four), of barycentric coordinates (two), and those of Embree's own corners (two) are.
 const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 
 /// How far from its triangle a position may be, where no coordinate of either is larger than `largest` (scene units).
@@ -20,7 +20,7 @@ pub fn error(corners: [Vec3; 3]) -> f32 {
     error_within(a.max(b).max(c).max_element())
 }
 
-/// [`Surface::spawn`] for a point of a triangle with unit normal `ng` that may be off by `error`.
+/// [`Surface::spawn`](super::Surface::spawn) for a point of a triangle with unit normal `ng` that may be off by `error`.
 #[inline]
 pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
     p + ng * error.copysign(direction.dot(ng))
