@@ -127,9 +127,9 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
 ///
 /// # Errors
 /// Its scene or an option is another.
-pub fn check(path: &Path, head: &Head, scene: &str, arguments: &Value) -> Result<()> {
+pub fn check(path: &Path, head: &Head, scene: Option<&str>, arguments: &Value) -> Result<()> {
     let error = |cause: String| Error::new(Kind::Usage, path.display(), cause);
-    if head.scene != scene {
+    if Some(head.scene.as_str()) != scene {
         let cause = "is of another scene, or the scene's files have changed since";
         return Err(error(cause.into()).hint("give the same scene, or start anew without --resume"));
     }
@@ -149,11 +149,15 @@ pub fn check(path: &Path, head: &Head, scene: &str, arguments: &Value) -> Result
     Ok(())
 }
 
-/// A hash of a scene's files: the file itself, and those in its folder that it or the command line names.
+/// A hash of a scene's files: the file itself, and those in its folder that it or the command line names. `None` of a
+/// scene that comes through a pipe, and is gone.
 ///
 /// # Errors
 /// The scene cannot be read.
-pub fn hash(scene: &Path, environment: Option<&Path>) -> Result<String> {
+pub fn hash(scene: &Path, environment: Option<&Path>) -> Result<Option<String>> {
+    if !scene.is_file() {
+        return Ok(None);
+    }
     let bytes = std::fs::read(scene).map_err(|cause| Error::io(scene, &cause))?;
     let mut hasher = blake3::Hasher::new();
     hasher.update(&bytes);
@@ -162,10 +166,10 @@ pub fn hash(scene: &Path, environment: Option<&Path>) -> Result<String> {
     if let Some(json) = document(&bytes) {
         names(&json, &mut |name| named.push(folder.join(name)));
     }
-    for bytes in named.iter().filter_map(|path| std::fs::read(path).ok()) {
+    for bytes in named.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
         hasher.update(&bytes);
     }
-    Ok(hasher.finalize().to_hex().to_string())
+    Ok(Some(hasher.finalize().to_hex().to_string()))
 }
 
 /// The JSON of a glTF file, or the one in a GLB.

@@ -162,10 +162,10 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let camera = scene.camera(&order.view)?;
     let stage = (&scene, &camera);
     let (settings, selection) = checked(&order, stage)?;
-    let identity = if order.saving.is_some() || order.resume.is_some() { order.hash()? } else { String::new() };
+    let identity = if order.saving.is_some() || order.resume.is_some() { order.hash()? } else { None };
     let saved = order.resume.as_deref().map(checkpoint::read).transpose()?;
     if let (Some(path), Some((head, _))) = (&order.resume, &saved) {
-        checkpoint::check(path, head, &identity, &order.arguments)?;
+        checkpoint::check(path, head, identity.as_deref(), &order.arguments)?;
     }
     let decided = saved.as_ref().map(|(head, _)| head.way);
     let (choice, settings, way) = match decided {
@@ -200,15 +200,16 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
             (session, head.plan)
         }
     };
+    // What a pipe has brought nobody can bring again.
+    let saving = order.saving.as_ref().filter(|_| identity.is_some());
     let head = Head {
         version: env!("CARGO_PKG_VERSION").into(),
-        scene: identity,
+        scene: identity.unwrap_or_default(),
         arguments: order.arguments.clone(),
         way,
         plan: told,
     };
-    let mut saver =
-        order.saving.as_ref().map(|saving| Saver::new(saving, &head, order.resume.as_deref() == Some(&*saving.path)));
+    let mut saver = saving.map(|saving| Saver::new(saving, &head, order.resume.as_deref() == Some(&*saving.path)));
     let stop = drive(&mut session, |progress, session| {
         watch.progress(progress);
         preview(session, ready.as_mut(), &frame, watch);
@@ -230,7 +231,7 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
 
 impl Order<'_> {
     /// A hash of the files that it reads.
-    fn hash(&self) -> Result<String> {
+    fn hash(&self) -> Result<Option<String>> {
         let environment = match &self.scene.environment {
             Some(load::Environment::File(path)) => Some(path.as_path()),
             _ => None,

@@ -83,7 +83,9 @@ fn a_signal_writes_what_is_finished() {
         assert!(iterations >= 1 && set.get("Level1").is_some());
         assert_eq!(header["stopped"], "interrupted");
         let last = format!("out.exr: interrupted after {iterations} iterations, which are written\n");
-        assert!(text.ends_with(&last), "{text}");
+        let hint = "hint: the same command with --resume out.exr.checkpoint goes on\n";
+        assert!(text.ends_with(&format!("{last}{hint}")), "{text}");
+        assert!(folder.path("out.exr.checkpoint").exists());
     }
 }
 

@@ -327,10 +327,11 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
         "--strict",
         "--effects",
         "--reproducible",
+        "--checkpoint-every",
+        "--resume",
     ] {
         assert!(help.stdout.contains(option), "{option}");
     }
-    assert!(!help.stdout.contains("--checkpoint"));
     // No such network comes with the program.
     assert!(help.stdout.contains("--model <compact|FILE.onnx>"));
     let commands = folder.run("--help").stdout;
