@@ -129,7 +129,7 @@ class Tells(Installed):
             setattr(render, name, True)
         render.pixel_aspect_x = 2
         lines = limits.ignored(self.scene)
-        self.assertEqual(len(lines), 5)
+        self.assertEqual(len(lines), 4)
         self.assertTrue(all(": " in line for line in lines))
 
     def test_simulations_are_named(self):
