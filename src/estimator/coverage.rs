@@ -1,20 +1,16 @@
 //! Which instances a pixel's eye paths hit first, and how often: what cryptomattes and alpha are made of.
 
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
-/// Instances kept per pixel: three cryptomatte layers of two ranks.
-pub const RANKS: usize = 6;
+/// Instances of which a pixel has room without a list apart.
+const USUAL: usize = 4;
 
-/// Counts of first hits by instance. The first [`RANKS`] instances that show up are kept by name; later ones count as
-/// hits only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Counts of first hits by instance, which do not depend on the order of paths.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Instances; entry `i` means something where `counts[i] > 0`.
-    instances: [u32; RANKS],
-    /// Paths that hit them first.
-    counts: [u32; RANKS],
-    /// Paths that hit anything.
-    hits: u32,
+    /// Instances and the paths that hit them first, in order of appearance.
+    counts: SmallVec<[(u32, u32); USUAL]>,
     /// All paths.
     paths: u32,
 }
@@ -24,26 +20,35 @@ impl Coverage {
     #[inline]
     pub fn add(&mut self, instance: Option<u32>) {
         self.paths += 1;
-        let Some(instance) = instance else { return };
-        self.hits += 1;
-        for i in 0..RANKS {
-            if self.counts[i] == 0 || self.instances[i] == instance {
-                self.instances[i] = instance;
-                self.counts[i] += 1;
-                return;
-            }
+        if let Some(instance) = instance {
+            self.count(instance, 1);
         }
+    }
+
+    #[inline]
+    fn count(&mut self, instance: u32, paths: u32) {
+        match self.counts.iter_mut().find(|(known, _)| *known == instance) {
+            Some((_, count)) => *count += paths,
+            None => self.counts.push((instance, paths)),
+        }
+    }
+
+    /// Adds other paths.
+    pub fn join(&mut self, other: &Coverage) {
+        self.paths += other.paths;
+        other.counts.iter().for_each(|&(instance, count)| self.count(instance, count));
     }
 
     /// Fraction of paths that hit anything, 0 to 1; 0 before the first path.
     pub fn hit_fraction(&self) -> f32 {
-        self.fraction(self.hits)
+        self.fraction(self.counts.iter().map(|(_, count)| count).sum())
     }
 
-    /// Instances and the fractions of paths that hit them first, in order of appearance.
+    /// Instances and the fractions of paths that hit them first, the largest first.
     pub fn fractions(&self) -> impl Iterator<Item = (u32, f32)> {
-        let shares = self.instances.iter().zip(&self.counts).filter(|&(_, &count)| count > 0);
-        shares.map(|(&instance, &count)| (instance, self.fraction(count)))
+        let mut counts = self.counts.clone();
+        counts.sort_unstable_by_key(|&(instance, count)| (!count, instance));
+        counts.into_iter().map(|(instance, count)| (instance, self.fraction(count)))
     }
 
     fn fraction(&self, count: u32) -> f32 {
@@ -56,14 +61,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fractions_count_paths_and_a_seventh_instance_is_a_hit_without_a_name() {
+    fn fractions_count_paths_by_instance_in_any_order_and_join() {
         let mut coverage = Coverage::default();
         assert_eq!(coverage.hit_fraction(), 0.0);
-        for instance in [None, Some(7), Some(7), Some(0), Some(1), Some(2), Some(3), Some(4), Some(5), Some(0)] {
-            coverage.add(instance);
-        }
+        let hits = [None, Some(7), Some(7), Some(0), Some(1), Some(2), Some(3), Some(4), Some(5), Some(0)];
+        hits.iter().for_each(|&instance| coverage.add(instance));
         let shares: Vec<_> = coverage.fractions().collect();
-        assert_eq!(shares, [(7, 0.2), (0, 0.2), (1, 0.1), (2, 0.1), (3, 0.1), (4, 0.1)]);
+        assert_eq!(shares, [(0, 0.2), (7, 0.2), (1, 0.1), (2, 0.1), (3, 0.1), (4, 0.1), (5, 0.1)]);
         assert_eq!(coverage.hit_fraction(), 0.9);
+        let (mut early, mut late) = (Coverage::default(), Coverage::default());
+        hits[..4].iter().for_each(|&instance| early.add(instance));
+        hits[4..].iter().for_each(|&instance| late.add(instance));
+        late.join(&early);
+        assert_eq!(late.fractions().collect::<Vec<_>>(), shares);
+        assert_eq!(late.hit_fraction(), 0.9);
     }
 }

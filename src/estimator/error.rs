@@ -3,7 +3,7 @@
 //! The kernel's bias grows with the bandwidth squared \[Knaus and Zwicker 2011, 3\], and the next larger level has
 //! twice the squared bandwidth in every iteration: with bias `b` at level k it has `2 b`. The difference of the two
 //! levels' means therefore expects `b` itself. Squared, it expects `b^2` plus the variance of the difference, which its
-//! own Welford statistics tell; what is left estimates the squared bias. It may come out negative where there is little
+//! own iterations tell; what is left estimates the squared bias. It may come out negative where there is little
 //! bias: sums over pixels keep the sign and stay unbiased, a single pixel cuts it off at zero.
 //!
 //! In media squared bandwidths are a factor 2^(2/3) apart; the difference is scaled to tell the bias there, too
@@ -27,17 +27,14 @@ pub struct SquaredError {
 impl SquaredError {
     /// The error of level `own` (from 0) of `count`; `None` before two iterations.
     pub fn of(pixel: &Pixel, own: usize, count: usize) -> Option<SquaredError> {
-        let n = f64::from(pixel.iterations);
-        if n < 2.0 {
+        if pixel.iterations < 2 {
             return None;
         }
-        let squared_bias = if own + 1 < count {
-            let difference = &pixel.differences[own];
-            difference.mean * difference.mean - difference.variance_of_mean(n)
-        } else {
-            DVec3::ZERO
+        let squared_bias = match pixel.difference() {
+            Some([mean, variance]) if own + 1 < count => mean * mean - variance,
+            _ => DVec3::ZERO,
         };
-        Some(SquaredError { variance: pixel.levels[own].variance_of_mean(n), squared_bias })
+        Some(SquaredError { variance: pixel.variance_of_mean(own), squared_bias })
     }
 
     /// Estimated standard error with bias: the root of variance plus squared bias, the latter at least zero.
@@ -52,6 +49,7 @@ mod tests {
     use super::*;
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
+    use crate::transport::EyeMeasure;
 
     /// Levels whose bias halves from one to the next and whose noise is uniform: over many pixels the estimates average
     /// to the bias squared, and to nothing without bias. Over 4000 pixels of 16 iterations the mean of (D^2 - var) has
@@ -61,15 +59,15 @@ mod tests {
         for bias in [0.0, 0.3] {
             let (mut squared_bias, mut variance) = (0.0, 0.0);
             for index in 0..4000 {
-                let mut pixel = Pixel::new([1.0; 2]);
-                for i in 1..=16u32 {
-                    let draws = Stream::new(9, u64::from(i), Domain::Test, index).vertex(0);
+                let mut pixel = Pixel::new(2, 0, [1.0; 2]);
+                for i in 1..=16 {
+                    let draws = Stream::new(9, i, Domain::Test, index).vertex(0);
                     let noise = draws.two(Purpose::Pixel);
                     let small = 1.0 + bias + 0.8 * (noise.x - 0.5);
                     let large = 1.0 + 2.0 * bias + 0.8 * (noise.y - 0.5);
-                    pixel.iterations = i;
-                    pixel.levels[0].add(Rgb::splat(small), 1.0 / f64::from(i));
-                    pixel.differences[0].add(Rgb::splat(large - small), 1.0 / f64::from(i));
+                    let mut measure = EyeMeasure::default();
+                    measure.indirect_photons[..2].copy_from_slice(&[small, large].map(Rgb::splat));
+                    pixel.add(i, &measure, None);
                 }
                 let error = SquaredError::of(&pixel, 0, 2).expect("two iterations are done");
                 squared_bias += error.squared_bias.x / 4000.0;
@@ -85,8 +83,8 @@ mod tests {
 
     #[test]
     fn one_iteration_tells_nothing() {
-        let mut pixel = Pixel::new([1.0; 2]);
-        pixel.iterations = 1;
+        let mut pixel = Pixel::new(5, 0, [1.0; 2]);
+        pixel.add(1, &EyeMeasure::default(), None);
         assert_eq!(SquaredError::of(&pixel, 3, 5), None);
     }
 }

@@ -9,8 +9,8 @@ pub mod rule;
 mod state;
 
 pub use bandwidth::InitialBandwidth;
-pub use coverage::{Coverage, RANKS};
+pub use coverage::Coverage;
 pub use error::SquaredError;
-pub use pixel::{Parts, Pixel, QUARTERS, Quarter};
+pub use pixel::{FAR, Parts, Pixel, QUARTERS};
 pub use quarters::variance_ratio;
 pub use state::{BandwidthState, Schedule, level_factor2};

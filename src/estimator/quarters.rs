@@ -1,9 +1,9 @@
 //! What four independent groups of iterations tell of the noise.
 //!
-//! Iterations within a quarter share low-discrepancy points: they are not independent, and Welford's statistics over
-//! them tell more variance than their mean has. Quarters are scrambled apart, so the scatter of their means is right,
-//! but has three degrees of freedom a pixel. The layers take the shape of the noise from Welford and its size, over
-//! windows, from the quarters.
+//! Iterations within a quarter share low-discrepancy points: they are not independent, and the sample variance over
+//! them tells more than their mean has. Quarters are scrambled apart, so the scatter of their means is right,
+//! but has three degrees of freedom a pixel. The layers take the shape of the noise from the sample variance and its size,
+//! over windows, from the quarters.
 
 use super::{Pixel, SquaredError};
 use rayon::prelude::*;
@@ -11,21 +11,21 @@ use rayon::prelude::*;
 /// Pixels to each side of the windows over which either variance is summed: 81 pixels have 243 degrees of freedom.
 const REACH: usize = 4;
 
-/// Variance by quarters over that by Welford's statistics, of the own image at every pixel over a window; 1 where
+/// Variance by quarters over the sample variance, of the own image at every pixel over a window; 1 where
 /// neither is known or there is no variance. `own` is the level (from 0) that quarters are of. Pixels row by row,
 /// `width` a row.
 pub fn variance_ratio(pixels: &[Pixel], width: usize, own: usize) -> Vec<f32> {
     let of_pixel = |pixel: &Pixel| {
-        let welford = SquaredError::of(pixel, own, own + 1).map(|error| error.variance);
-        match (pixel.variance_by_quarters(), welford) {
-            (Some(quarters), Some(welford)) => [quarters.element_sum(), welford.element_sum()],
+        let sample = SquaredError::of(pixel, own, own + 1).map(|error| error.variance);
+        match (pixel.variance_by_quarters(), sample) {
+            (Some(quarters), Some(sample)) => [quarters.element_sum(), sample.element_sum()],
             _ => [0.0; 2],
         }
     };
     let own: Vec<[f64; 2]> = pixels.par_iter().map(of_pixel).collect();
     let rows = window_sums(&own, |index| (index % width, width), 1);
     let sums = window_sums(&rows, |index| (index / width, pixels.len() / width), width);
-    let ratio = |[quarters, welford]: &[f64; 2]| if *welford > 0.0 { (quarters / welford) as f32 } else { 1.0 };
+    let ratio = |[quarters, sample]: &[f64; 2]| if *sample > 0.0 { (quarters / sample) as f32 } else { 1.0 };
     sums.par_iter().map(ratio).collect()
 }
 
@@ -54,14 +54,14 @@ mod tests {
     /// low-discrepancy points do.
     fn picture(antithetic: bool) -> Vec<Pixel> {
         let pixel = |index: u64| {
-            let mut pixel = Pixel::new([0.0; 2]);
+            let mut pixel = Pixel::new(1, 0, [0.0; 2]);
             for pass in 1..=32u64 {
                 let (quarter, at) = (quarter(pass), (pass - 1) / QUARTERS);
                 let pair = if antithetic { at / 2 } else { at };
                 let draw = Stream::new(3, quarter * 100 + pair, Domain::Test, index).vertex(0).one(Purpose::Pixel);
                 let value = if antithetic && at % 2 == 1 { 1.0 - draw } else { draw };
                 let measure = EyeMeasure { direct: Rgb::splat(value), ..EyeMeasure::default() };
-                pixel.add(pass, &measure, None, (1, 0));
+                pixel.add(pass, &measure, None);
             }
             pixel
         };
@@ -78,7 +78,7 @@ mod tests {
         assert!((mean - 1.0).abs() < 0.08, "{mean}");
         assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 5.0 * (2f32 / 75.0).sqrt()));
         assert!(variance_ratio(&picture(true), 32, 0).iter().all(|ratio| *ratio < 1e-9));
-        assert!(variance_ratio(&[Pixel::new([0.0; 2]); 6], 3, 0).iter().all(|ratio| *ratio == 1.0));
+        assert!(variance_ratio(&vec![Pixel::new(1, 0, [0.0; 2]); 6], 3, 0).iter().all(|ratio| *ratio == 1.0));
         let column = picture(false);
         assert_eq!(variance_ratio(&column, 1, 0).len(), column.len());
     }

@@ -112,7 +112,8 @@ mod tests {
     #[test]
     fn what_a_rule_has_counted_takes_the_place_of_the_schedule_on_surfaces_alone() {
         let schedule = Schedule::new(1, 2, 0.5, 0.5);
-        let pixel = Pixel { volume_bandwidth: 5.0, ..Pixel::new([1.0, 2.0]) };
+        let mut pixel = Pixel::new(2, 0, [1.0, 2.0]);
+        pixel.volume_bandwidth = 5.0;
         let plain = BandwidthState::memoryless(schedule);
         assert_eq!([0, 1].map(|level| plain.radius2(7, &pixel, Kind::Caustic, level)), [2.0, 4.0]);
         let counted = BandwidthState::new(schedule, Some([vec![], vec![1.0, 2.0, 3.0, 4.0]]));

@@ -14,14 +14,14 @@
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
-use crate::estimator::{BandwidthState, Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
+use crate::estimator::{BandwidthState, FAR, Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
 use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Part};
 use rayon::prelude::*;
 
 /// Depth of the background.
-pub const BACKGROUND: f32 = 1e10;
+pub const BACKGROUND: f32 = FAR;
 /// Pixels that are taken through all layers while they are in the cache.
 const BLOCK: usize = 2048;
 
@@ -52,7 +52,7 @@ struct At<'a> {
     /// Of the pixel, row by row from the top.
     index: usize,
     bandwidths: &'a BandwidthState,
-    /// By which variances of Welford's statistics are too large.
+    /// By which sample variances are too large.
     ratio: f64,
 }
 
@@ -116,13 +116,13 @@ fn columns(shape: &Shape) -> Vec<Column> {
             components: "RGBA",
             get: Box::new(move |at| {
                 let alpha = if environment { 1.0 } else { at.pixel.coverage.hit_fraction() };
-                at.pixel.levels[own].mean.as_vec3().extend(alpha).to_array()
+                at.pixel.mean(own).as_vec3().extend(alpha).to_array()
             }),
         },
-        Column::rgb("Noisy", move |p| p.levels[own].mean),
+        Column::rgb("Noisy", move |p| p.mean(own)),
     ];
     for level in 0..levels {
-        columns.push(Column::rgb(format!("Level{}", level + 1), move |p| p.levels[level].mean));
+        columns.push(Column::rgb(format!("Level{}", level + 1), move |p| p.mean(level)));
     }
     for level in 0..levels {
         columns.push(Column::noise(format!("Variance{}", level + 1), move |at| variance(at.pixel, level) * at.ratio));
@@ -138,7 +138,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
         columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", radius));
     }
     for quarter in 0..QUARTERS {
-        columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarters[quarter].mean()));
+        columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarter(quarter)));
     }
     let parts: [(Part, &str, OfParts); 5] = [
         (Part::Direct, "Direct", |parts| parts.direct),
@@ -150,22 +150,19 @@ fn columns(shape: &Shape) -> Vec<Column> {
     let present = |part: Part| classes.has_part(part) && (part != Part::Volume || volume);
     for (part, name, get) in parts {
         if present(part) {
-            columns.push(Column::rgb(name, move |p| mean(get(&p.parts), p.iterations)));
+            columns.push(Column::rgb(name, move |p| mean(get(&p.parts()), p.iterations)));
         }
     }
     columns.extend([
         Column::noise("Error", move |at| match SquaredError::of(at.pixel, own, compared) {
             Some(error) => SquaredError { variance: error.variance * at.ratio, ..error }.root(),
-            None => at.pixel.levels[own].mean.abs(),
+            None => at.pixel.mean(own).abs(),
         }),
-        Column::rgb("albedo", |p| mean(p.albedo, p.features)),
-        Column::xyz("normal", |p| p.normal.normalize_or_zero().as_vec3()),
-        Column::one("depth", "Z", |at| match at.pixel.depths {
-            0 => BACKGROUND,
-            depths => (at.pixel.depth / f64::from(depths)) as f32,
-        }),
-        Column::one("Z", "Z", |at| at.pixel.z),
-        Column::xyz("P", |p| p.p),
+        Column::rgb("albedo", Pixel::albedo),
+        Column::xyz("normal", |p| p.normal().as_vec3()),
+        Column::one("depth", "Z", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
+        Column::one("Z", "Z", |at| at.pixel.first().0),
+        Column::xyz("P", |p| p.first().1),
         Column::one("Rejected", "X", |at| at.pixel.rejected as f32),
     ]);
     columns
@@ -173,11 +170,10 @@ fn columns(shape: &Shape) -> Vec<Column> {
 
 /// Variance of the mean of a level; before two iterations the square of the mean.
 fn variance(pixel: &Pixel, level: usize) -> DVec3 {
-    let welford = &pixel.levels[level];
     if pixel.iterations < 2 {
-        welford.mean * welford.mean
+        pixel.mean(level) * pixel.mean(level)
     } else {
-        welford.variance_of_mean(f64::from(pixel.iterations))
+        pixel.variance_of_mean(level)
     }
 }
 
@@ -287,12 +283,13 @@ mod tests {
 
     #[test]
     fn the_parts_sum_to_the_image_and_radii_halve_their_squares() {
-        let mut pixel = Pixel { volume_bandwidth: 3.0, ..Pixel::new([2.0, 4.0]) };
+        let mut pixel = Pixel::new(5, 0, [2.0, 4.0]);
+        pixel.volume_bandwidth = 3.0;
         for i in 0..5 {
             let x = 0.1 + 0.37 * i as f32;
-            pixel.add(i + 1, &measure(x, true), Some(&measure(1.1 * x, i != 0)), (5, 3));
+            pixel.add(i + 1, &measure(x, true), Some(&measure(1.1 * x, i != 0)));
         }
-        let set = layers((1, 1), &[pixel], &bandwidths(), &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &SHAPE, |_| true).expect("one pixel");
         for c in ["R", "G", "B"] {
             let parts = ["Direct", "Indirect", "Caustic", "Emission", "Volume"];
             let sum: f32 = parts.iter().map(|part| value(&set, part, c)).sum();
@@ -316,7 +313,7 @@ mod tests {
             assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
         }
         let focused = Shape { kinds: [false, true], ..SHAPE };
-        let alone = layers((1, 1), &[pixel], &bandwidths(), &focused, |_| true).expect("one pixel");
+        let alone = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &focused, |_| true).expect("one pixel");
         assert!((value(&alone, "Radius5", "X") - 4.0 * surface).abs() < 1e-6 && alone.get("CausticRadius5").is_none());
         // One of ten eye paths missed: it counts for alpha and albedo, not for depth.
         assert_eq!(value(&set, "", "A"), 0.9);
@@ -330,13 +327,13 @@ mod tests {
     /// Squares of what f32 can hold are not always f32.
     #[test]
     fn the_variance_of_great_radiance_is_finite() {
-        let mut pixel = Pixel::new([1.0; 2]);
+        let mut pixel = Pixel::new(5, 0, [1.0; 2]);
         for pass in 1..=4 {
             let light = Rgb::splat(if pass % 2 == 0 { 1e20 } else { 3e20 });
             let measure = EyeMeasure { direct: light, ..EyeMeasure::default() };
-            pixel.add(pass, &measure, Some(&measure), (5, 3));
+            pixel.add(pass, &measure, Some(&measure));
         }
-        let set = layers((1, 1), &[pixel], &bandwidths(), &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &SHAPE, |_| true).expect("one pixel");
         assert_eq!(value(&set, "Variance2", "R"), f32::MAX);
         // (1e20)^2 four times, over 4 and 3, and the root of it.
         assert!((value(&set, "Error", "R") / (1e20 / 3f32.sqrt()) - 1.0).abs() < 1e-3);
@@ -344,9 +341,9 @@ mod tests {
 
     #[test]
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
-        let mut pixel = Pixel::new([1.0; 2]);
-        pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)), (5, 3));
-        let set = layers((1, 1), &[pixel], &bandwidths(), &SHAPE, |_| true).expect("one pixel");
+        let mut pixel = Pixel::new(5, 0, [1.0; 2]);
+        pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)));
+        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &SHAPE, |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");
         assert!((value(&set, "Variance2", "R") / (mean * mean) - 1.0).abs() < 1e-6);
         assert_eq!(value(&set, "Error", "G"), value(&set, "Noisy", "G"));

@@ -125,6 +125,12 @@ impl Lights {
         self.choice.is_none()
     }
 
+    /// The power of two of all light together; 0 if there is none.
+    pub fn exponent(&self) -> i32 {
+        let power: f64 = self.emitters.iter().map(|emitter| emitter.power(&self.sky)).sum();
+        if power.is_normal() { ((power.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
+    }
+
     /// The lights; indices are those of [`EmissionSample::light`].
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters

@@ -247,16 +247,13 @@ impl<'a> Passes<'a> {
 
     /// Adds the measures of iteration `i` to the pixels.
     fn add(&self, i: u64, pixels: &mut [Pixel]) {
-        let levels = self.settings.levels;
+        let eye = self.eye();
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
             let slot = self.tiles.slot(index as u32);
             let measure = &self.measures[0][slot];
-            if let (0, Some(first)) = (pixel.iterations, measure.first) {
-                pixel.z = self.camera.depth(first.p);
-                pixel.p = (first.p.as_dvec3() + self.scene.origin).as_vec3();
-            }
+            pixel.see(i, || eye.seen(measure));
             let others = self.measures.get(1).map(|measures| &measures[slot]);
-            pixel.add(i, measure, others, (levels.count, levels.own()));
+            pixel.add(i, measure, others);
         });
     }
 }
@@ -264,8 +261,9 @@ impl<'a> Passes<'a> {
 impl Iterate for Passes<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
         let (width, height) = self.camera.size();
+        let pixel = self.settings.pixel(self.scene);
         if !self.settings.method.has_bandwidths() {
-            return vec![Pixel::new([0.0; 2]); width as usize * height as usize];
+            return vec![pixel([0.0; 2]); width as usize * height as usize];
         }
         // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
         let initial = match self.settings.initial {
@@ -286,7 +284,7 @@ impl Iterate for Passes<'_> {
             _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
         };
         self.covered = std::f32::consts::PI * pixels * pixels;
-        all.into_iter().map(Pixel::new).collect()
+        all.into_iter().map(pixel).collect()
     }
 
     fn guide(&self) -> Option<&Guide> {

@@ -10,7 +10,7 @@ use super::iterate::{Iterate, Work};
 use super::method::Method;
 use super::result::Phases;
 use super::settings::Settings;
-use super::sppm::{Sppm, keep_first_hit};
+use super::sppm::Sppm;
 use super::volume::Maps;
 use crate::camera::{band, par_pixels};
 use crate::estimator::rule::CountingRule;
@@ -251,8 +251,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                         add_photons(others, &measure(pixel, start, channel, 1..count));
                     }
                 }
-                keep_first_hit(&eye, pixel, &first);
-                pixel.add(i, &first, others.as_ref(), (count, levels.own()));
+                pixel.see(i, || eye.seen(&first));
+                pixel.add(i, &first, others.as_ref());
             }
         });
     }

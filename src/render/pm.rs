@@ -16,7 +16,7 @@ use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
-use super::sppm::{keep_first_hit, trace_some};
+use super::sppm::trace_some;
 use crate::camera::{Camera, band, par_pixels};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
@@ -131,7 +131,7 @@ impl<'a> Pm<'a> {
 impl Iterate for Pm<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
         let (width, height) = self.eye.camera.size();
-        vec![Pixel::new([0.0; 2]); width as usize * height as usize]
+        vec![self.settings.pixel(self.eye.scene)([0.0; 2]); width as usize * height as usize]
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
@@ -158,8 +158,8 @@ impl Iterate for Pm<'_> {
                     let pixel = &mut pixels[place.at];
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
                     let measure = eye.measure(scratch, start, &maps, None, neighbours, kernel::Box);
-                    keep_first_hit(eye, pixel, &measure);
-                    pixel.add(i, &measure, None, (1, 0));
+                    pixel.see(i, || eye.seen(&measure));
+                    pixel.add(i, &measure, None);
                 }
             },
         );

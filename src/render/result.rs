@@ -93,7 +93,7 @@ pub(super) fn error_estimate(pixels: &[Pixel], settings: &Settings) -> Option<Er
     let (own, compared) = (settings.levels.own(), settings.compared_levels());
     let (mut variance, mut squared_bias) = (0.0, 0.0);
     let (mut lit, mut unknown) = (false, 0.0);
-    let value = |pixel: &Pixel| pixel.levels[own].mean.element_sum() / 3.0;
+    let value = |pixel: &Pixel| pixel.mean(own).element_sum() / 3.0;
     let floor = floor::relative(pixels.iter().map(value));
     for pixel in pixels {
         let Some(error) = SquaredError::of(pixel, own, compared) else {
@@ -120,35 +120,46 @@ pub(super) fn error_estimate(pixels: &[Pixel], settings: &Settings) -> Option<Er
 
 /// Whether a surface is seen that is not black.
 fn could_show_light(pixel: &Pixel) -> bool {
-    pixel.depths > 0 && pixel.albedo != DVec3::ZERO
+    pixel.depth().is_some() && pixel.albedo() != DVec3::ZERO
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rgb;
+    use crate::math::{Rgb, Vec3};
     use crate::render::Levels;
+    use crate::transport::{EyeMeasure, Features};
+
+    /// So many samples, the first of them not finite; each sees a surface of this albedo if it sees any.
+    fn pixel(finite: u64, broken: u64, light: Rgb, albedo: Option<Rgb>) -> Pixel {
+        let mut pixel = Pixel::new(1, 0, [1.0; 2]);
+        for pass in 1..=finite + broken {
+            let depth = if albedo.is_some() { 1.0 } else { 0.0 };
+            let features = Features { albedo: albedo.unwrap_or_default(), normal: Vec3::ZERO, depth };
+            let direct = if pass > broken { light } else { Rgb::NAN };
+            pixel.add(pass, &EyeMeasure { direct, features, ..EyeMeasure::default() }, None);
+        }
+        pixel
+    }
 
     /// Two finite samples, equal ones: no error at all.
     fn certain() -> Pixel {
-        let mut pixel = Pixel::new([1.0; 2]);
-        for n in 1..=2 {
-            pixel.iterations = n;
-            pixel.levels[0].add(Rgb::ONE, 1.0 / f64::from(n));
-        }
-        pixel
+        pixel(2, 0, Rgb::ONE, None)
     }
 
     #[test]
     fn pixels_without_finite_samples_are_errors() {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };
-        let rejected = Pixel { rejected: 2, ..Pixel::new([1.0; 2]) };
-        let once = Pixel { rejected: 1, iterations: 1, ..Pixel::new([1.0; 2]) };
-        let relative_error = |pixels: &[Pixel], s: &Settings| error_estimate(pixels, s).map(|e| e.root());
-        assert_eq!(relative_error(&[certain(), certain()], &levels), Some(0.0));
-        assert_eq!(relative_error(&[certain(), rejected, certain(), certain()], &levels), Some(0.5));
-        assert_eq!(relative_error(&[certain(), once, certain(), certain()], &levels), Some(0.5));
-        assert_eq!(relative_error(&[rejected, once], &levels), None);
+        let [rejected, once] = [pixel(0, 2, Rgb::ONE, None), pixel(1, 1, Rgb::ONE, None)];
+        let relative_error = |pixels: &[&Pixel], s: &Settings| {
+            let pixels: Vec<Pixel> = pixels.iter().map(|&pixel| pixel.clone()).collect();
+            error_estimate(&pixels, s).map(|e| e.root())
+        };
+        let certain = &certain();
+        assert_eq!(relative_error(&[certain, certain], &levels), Some(0.0));
+        assert_eq!(relative_error(&[certain, &rejected, certain, certain], &levels), Some(0.5));
+        assert_eq!(relative_error(&[certain, &once, certain, certain], &levels), Some(0.5));
+        assert_eq!(relative_error(&[&rejected, &once], &levels), None);
     }
 
     /// Of four pixels two are lit. A black one counts once in so many iterations and two if it shows a surface, and not
@@ -157,10 +168,10 @@ mod tests {
     fn light_that_is_not_seen_is_not_known_to_be_none() {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };
         let relative_error = |pixels: &[Pixel]| error_estimate(pixels, &levels).map(|e| e.root());
-        let empty = Pixel { iterations: 14, ..Pixel::new([1.0; 2]) };
-        let dark = Pixel { depths: 14, albedo: DVec3::splat(7.0), ..empty };
-        assert_eq!(relative_error(&[certain(), certain(), empty, empty]), Some(0.0));
-        assert_eq!(relative_error(&[certain(), certain(), empty, dark]), Some(0.125));
-        assert_eq!(relative_error(&[dark, dark, empty]), None);
+        let empty = || pixel(14, 0, Rgb::ZERO, None);
+        let dark = || pixel(14, 0, Rgb::ZERO, Some(Rgb::splat(0.5)));
+        assert_eq!(relative_error(&[certain(), certain(), empty(), empty()]), Some(0.0));
+        assert_eq!(relative_error(&[certain(), certain(), empty(), dark()]), Some(0.125));
+        assert_eq!(relative_error(&[dark(), dark(), empty()]), None);
     }
 }

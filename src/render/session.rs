@@ -247,7 +247,7 @@ impl<'a> Session<'a> {
     /// The method's own image as it is, row by row from the top.
     pub fn picture(&self) -> Vec<[f32; 3]> {
         let own = self.stage.settings.levels.own();
-        self.pixels.iter().map(|pixel| pixel.levels[own].mean.as_vec3().to_array()).collect()
+        self.pixels.iter().map(|pixel| pixel.mean(own).as_vec3().to_array()).collect()
     }
 
     /// Counts time that was spent on the render between its iterations as its own.

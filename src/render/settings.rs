@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
-use crate::estimator::{InitialBandwidth, Schedule};
+use crate::estimator::{InitialBandwidth, Pixel, Schedule};
 use crate::photon::ByKind;
 #[cfg(doc)]
 use crate::photon::kernel;
@@ -189,6 +189,12 @@ impl Settings {
     pub(super) fn eye<'a>(&self, scene: &'a Scene, camera: &'a Camera, surroundings: &Surroundings) -> Eye<'a> {
         let Settings { max_depth, indirect, classes, .. } = *self;
         Eye { scene, camera, interior: surroundings.eye, max_depth, indirect, classes }
+    }
+
+    /// What makes its pixels before the first iteration, from their largest initial bandwidths.
+    pub(super) fn pixel(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> Pixel + use<> {
+        let (levels, exponent) = (self.levels.count, scene.lights.exponent());
+        move |bandwidths| Pixel::new(levels, exponent, bandwidths)
     }
 
     /// The number (from 1) of the last of so many iterations of this shard.

@@ -20,7 +20,7 @@ use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
 use crate::transport::{
-    EqualFlux, Eye, EyeMeasure, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path,
+    EqualFlux, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -95,25 +95,18 @@ fn eye_pass(
                     let others = usize::from(levels.count > 1)..levels.count;
                     let volume = maps.volume(pixel, others.clone());
                     let correlated = eye.measure(scratch, correlated, photons, volume, &radii(others), kernel);
-                    keep_first_hit(eye, pixel, &independent);
-                    pixel.add(i, &independent, Some(&correlated), (levels.count, levels.own()));
+                    pixel.see(i, || eye.seen(&independent));
+                    pixel.add(i, &independent, Some(&correlated));
                 }
                 None => {
                     let volume = maps.volume(pixel, 0..levels.count);
                     let all = eye.measure(scratch, start, photons, volume, &radii(0..levels.count), kernel);
-                    keep_first_hit(eye, pixel, &all);
-                    pixel.add(i, &all, None, (levels.count, levels.own()));
+                    pixel.see(i, || eye.seen(&all));
+                    pixel.add(i, &all, None);
                 }
             }
         }
     });
-}
-
-pub(super) fn keep_first_hit(eye: &Eye<'_>, pixel: &mut Pixel, measure: &EyeMeasure) {
-    if let (0, Some(first)) = (pixel.iterations, measure.first) {
-        pixel.z = eye.camera.depth(first.p);
-        pixel.p = (first.p.as_dvec3() + eye.scene.origin).as_vec3();
-    }
 }
 
 /// Median over photons of the squared distance to the k-th nearest; infinite where there are too few.
@@ -248,7 +241,7 @@ impl Iterate for Sppm<'_> {
         if let (InitialBandwidth::Nearest(k), Indirect::Paths) = (initial, self.settings.indirect) {
             self.later2 = usual_radius2(&maps[Kind::Caustic as usize], k);
         }
-        let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(Pixel::new).collect();
+        let mut pixels: Vec<Pixel> = bandwidths.into_iter().map(self.settings.pixel(self.eye.scene)).collect();
         if self.eye.scene.survey.scattering {
             let pilot = PhotonMap::build(pilot.volume);
             let bandwidths = initial_volume_bandwidths(&self.eye, initial, widest[1], seed, &pilot);

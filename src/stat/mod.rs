@@ -1,8 +1,10 @@
 //! Running statistics, and fits.
 
 pub mod floor;
+mod moments;
 mod power_law;
-mod welford;
+pub mod sum;
 
+pub use moments::{Grids, Moments, variance_of_mean};
 pub use power_law::PowerLaw;
-pub use welford::Welford;
+pub use sum::{Rounding, Sum, Total};

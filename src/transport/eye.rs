@@ -496,6 +496,13 @@ pub struct Eye<'a> {
 }
 
 impl Eye<'_> {
+    /// Camera depth and position of what a measure has seen first, if anything (scene units; of the scene as it was
+    /// read).
+    pub fn seen(&self, measure: &EyeMeasure) -> Option<(f32, Vec3)> {
+        let p = measure.first?.p;
+        Some((self.camera.depth(p), (p.as_dvec3() + self.scene.origin).as_vec3()))
+    }
+
     /// The first ray of an eye path through a uniform point of pixel `(x, y)`.
     #[inline]
     pub fn start(&self, pixel: (u32, u32), stream: Stream) -> PathStart {

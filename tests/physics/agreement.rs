@@ -48,7 +48,7 @@ fn by_photons(
             };
             let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
             assert_eq!(rendered.rejected(), 0);
-            tiles(|index| rendered.pixels[index].levels[0].mean.element_sum() / 3.0)
+            tiles(|index| rendered.pixels[index].mean(0).element_sum() / 3.0)
         })
         .collect()
 }

@@ -32,7 +32,7 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
         let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
         assert_eq!(rendered.rejected(), 0);
         for (level, means) in means.iter_mut().enumerate() {
-            let sum = rendered.pixels.iter().map(|p| p.levels[level].mean.x).sum::<f64>();
+            let sum = rendered.pixels.iter().map(|p| p.mean(level).x).sum::<f64>();
             means.push(sum / rendered.pixels.len() as f64);
         }
     }
@@ -266,7 +266,7 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
         let camera = scene.camera(&square(4)).expect("a camera");
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         for pixel in &rendered.pixels {
-            assert_eq!((pixel.parts.caustic.x, pixel.parts.indirect.x), (0.0, 0.0), "{what}");
+            assert_eq!((pixel.parts().caustic.x, pixel.parts().indirect.x), (0.0, 0.0), "{what}");
         }
     }
 }
@@ -290,7 +290,7 @@ fn the_two_eye_paths_are_independent() {
         let settings = Settings { seed, ..settings(2, 0, 0.05) };
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         for (i, pixel) in rendered.pixels.iter().enumerate() {
-            values[i * seeds as usize + seed as usize] = std::array::from_fn(|k| pixel.levels[k].mean.x);
+            values[i * seeds as usize + seed as usize] = std::array::from_fn(|k| pixel.mean(k).x);
         }
     }
     // Per-pixel deviations from the mean over seeds, then one correlation over all of them.

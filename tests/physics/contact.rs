@@ -33,7 +33,7 @@ fn white_sky() -> Description {
 fn picture(scene: &Scene, camera: &Camera, method: Method, iterations: u64, seed: u64) -> Vec<f64> {
     let settings = Settings { method, iterations: Some(iterations), photons: 4000, seed, ..Settings::default() };
     let rendered = render(scene, camera, &settings, |_, _| Control::Continue);
-    rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.element_sum() / 3.0).collect()
+    rendered.pixels.iter().map(|pixel| pixel.mean(0).element_sum() / 3.0).collect()
 }
 
 /// The mean of a picture is 1; photons are found at fewer places than paths, so that they take more of them and tell 12

@@ -601,7 +601,7 @@ fn furnace() {
             for seed in 0..10 {
                 let rendered = render(&scene, method, 8, &photons(100, 0.05, 300, seed));
                 for (c, means) in means.iter_mut().enumerate() {
-                    means.push(rendered.pixels.iter().map(|p| p.levels[0].mean[c]).sum::<f64>() / 64.0);
+                    means.push(rendered.pixels.iter().map(|p| p.mean(0)[c]).sum::<f64>() / 64.0);
                 }
             }
             let critical = t_critical(ERROR_RATE, 3, 9.0);
@@ -619,7 +619,7 @@ fn furnace() {
 }
 
 fn bytes(rendered: &Rendered) -> Vec<[u64; 3]> {
-    rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.to_array().map(f64::to_bits)).collect()
+    rendered.pixels.iter().map(|pixel| pixel.mean(0).to_array().map(f64::to_bits)).collect()
 }
 
 /// Dispersion of nothing, of what does not refract, and of what nobody wears changes no bit; the same bits come from

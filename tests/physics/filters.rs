@@ -51,7 +51,7 @@ fn columns(scene: &Scene, method: Method, filter: Filter) -> Vec<Vec<f64>> {
                 Settings { method, seed, levels: Levels::new(1), iterations: Some(256), ..Settings::default() };
             let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
             let of = |x: u32| (0..SIDE).map(move |y| (y * SIDE + x) as usize);
-            let value = |index: usize| rendered.pixels[index].levels[0].mean.x;
+            let value = |index: usize| rendered.pixels[index].mean(0).x;
             (0..SIDE).map(|x| of(x).map(value).sum::<f64>() / f64::from(SIDE)).collect()
         })
         .collect()

@@ -81,7 +81,7 @@ fn means(scene: &Scene, method: Method) -> Vec<f64> {
     };
     let mean = |seed| {
         let rendered = render(scene, &camera, &Settings { seed, ..settings.clone() }, |_, _| Control::Continue);
-        let all = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.element_sum() / 3.0);
+        let all = rendered.pixels.iter().map(|pixel| pixel.mean(0).element_sum() / 3.0);
         all.sum::<f64>() / rendered.pixels.len() as f64
     };
     (1..=SEEDS).map(mean).collect()

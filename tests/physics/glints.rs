@@ -40,8 +40,8 @@ fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
     assert_eq!(rendered.rejected(), 0);
     let pixels = rendered.pixels.len() as f64;
     let own = settings.levels.own();
-    let all: f64 = rendered.pixels.iter().map(|pixel| pixel.levels[own].mean.x).sum();
-    let shared: f64 = rendered.pixels.iter().map(|pixel| pixel.parts.indirect.x / f64::from(pixel.iterations)).sum();
+    let all: f64 = rendered.pixels.iter().map(|pixel| pixel.mean(own).x).sum();
+    let shared: f64 = rendered.pixels.iter().map(|pixel| pixel.parts().indirect.x / f64::from(pixel.iterations)).sum();
     (all / pixels, shared / pixels)
 }
 
@@ -121,7 +121,7 @@ fn bandwidths_shrink_on_metal() {
             let count = rendered.pixels.len();
             let radii = (0..count).map(|index| rendered.radius2(index, Kind::Caustic, 0).sqrt());
             let radius = radii.sum::<f32>() / (count as f32 * first);
-            let mean = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.x).sum::<f64>() / count as f64;
+            let mean = rendered.pixels.iter().map(|pixel| pixel.mean(0).x).sum::<f64>() / count as f64;
             println!("{method:?}, {radius_rule:?}, {iterations}: {radius} of the first bandwidth, {mean:.3}");
             assert!(radius < 0.8, "{radius}");
             1.0 - mean

@@ -210,7 +210,7 @@ fn lamps_have_budgets_of_their_own() {
     let picture = |guided| {
         let wide = InitialBandwidth::Fixed(0.2);
         light_and_variance(&scene, Settings { photons: 4000, guided, initial: wide, ..Settings::default() }, |p| {
-            p.parts.indirect
+            p.parts().indirect
         })
     };
     let ((light, unguided), (same, guided)) = (picture(false), picture(true));
@@ -230,7 +230,7 @@ fn rules_that_count_photons_can_be_guided() {
             let seeds = (1..=16).map(|seed| {
                 let narrow = InitialBandwidth::Fixed(0.05);
                 let settings = Settings { photons: 10_000, guided, initial: narrow, seed, ..Settings::default() };
-                light_and_variance(&scene, Settings { method, ..settings }, |p| p.parts.caustic).0
+                light_and_variance(&scene, Settings { method, ..settings }, |p| p.parts().caustic).0
             });
             mean_and_error(&seeds.collect::<Vec<f64>>())
         };
@@ -250,7 +250,7 @@ fn the_caustic_of_a_small_ball_is_found() {
     let variance = |guided, indirect| {
         let narrow = InitialBandwidth::Fixed(0.02);
         let settings = Settings { photons: 20_000, guided, indirect, initial: narrow, ..Settings::default() };
-        light_and_variance(&scene, settings, |p| p.parts.caustic)
+        light_and_variance(&scene, settings, |p| p.parts().caustic)
     };
     let (_, unguided) = variance(false, Indirect::Photons);
     for indirect in [Indirect::Photons, Indirect::Paths] {
@@ -352,7 +352,7 @@ fn effects_are_weighed() {
         let classes = PathClass::ALL.into_iter().filter(|class| effects.contains(&class.effect())).collect();
         let settings = Settings { classes, photons: 20_000, iterations: Some(48), ..Settings::default() };
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-        rendered.pixels.iter().map(|pixel| pixel.levels[3].mean.element_sum()).sum()
+        rendered.pixels.iter().map(|pixel| pixel.mean(3).element_sum()).sum()
     };
     let all = light(&Effect::ALL);
     for effect in [Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Sds] {
@@ -420,7 +420,7 @@ fn properties_of_the_scene_are_weighed() {
     let picture = |scene: &Scene| -> Vec<f64> {
         let settings = Settings { photons: 20_000, iterations: Some(64), ..Settings::default() };
         let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
-        rendered.pixels.iter().map(|pixel| pixel.levels[3].mean.element_sum() / 3.0).collect()
+        rendered.pixels.iter().map(|pixel| pixel.mean(3).element_sum() / 3.0).collect()
     };
     let whole = picture(&pinhole);
     for effect in [Effect::Textures, Effect::Environment] {
@@ -486,7 +486,7 @@ fn caustics_are_left_to_guided_light_paths() {
     let light = |way| {
         let settings = Settings { iterations: Some(16), ..Settings::of(way) };
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-        rendered.pixels.iter().map(|pixel| pixel.parts.caustic.element_sum()).sum::<f64>()
+        rendered.pixels.iter().map(|pixel| pixel.parts().caustic.element_sum()).sum::<f64>()
     };
     let (guided, unguided) = (light(Strategy::FOCUSED), light(Strategy::USUAL));
     println!("{guided:.3e} of caustics by guided light paths, {unguided:.3e} by others");

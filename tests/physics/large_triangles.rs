@@ -39,7 +39,7 @@ fn extremes(half: f32, method: Method, turn: DQuat) -> (f64, f64) {
         Settings { method, levels: Levels::new(1), iterations: Some(4), photons: 100, ..Settings::default() };
     let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
     let expected = 0.5 / PI * 3.0 * normal.dot(light);
-    let values = rendered.pixels.iter().map(|pixel| pixel.levels[0].mean.x / expected);
+    let values = rendered.pixels.iter().map(|pixel| pixel.mean(0).x / expected);
     values.fold((f64::INFINITY, 0.0), |(least, largest), value| (least.min(value), largest.max(value)))
 }
 

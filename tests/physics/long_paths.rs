@@ -25,7 +25,7 @@ fn means(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> Vec<f64> 
         let rendered = render(scene, &camera, &Settings { seed, ..settings.clone() }, |_, _| Control::Continue);
         assert_eq!(rendered.rejected(), 0);
         let own = rendered.settings.levels.own();
-        rendered.pixels.iter().map(|p| p.levels[own].mean.x).sum::<f64>() / rendered.pixels.len() as f64
+        rendered.pixels.iter().map(|p| p.mean(own).x).sum::<f64>() / rendered.pixels.len() as f64
     };
     (0..seeds).map(mean).collect()
 }

@@ -165,7 +165,7 @@ fn means(scene: &Scene, method: Method, size: u32, seeds: u64, of: impl Fn(u64) 
         let rendered = render(scene, method, size, &settings);
         let own = rendered.settings.levels.own();
         for (c, means) in means.iter_mut().enumerate() {
-            let sum = rendered.pixels.iter().map(|p| p.levels[own].mean[c]).sum::<f64>();
+            let sum = rendered.pixels.iter().map(|p| p.mean(own)[c]).sum::<f64>();
             means.push(sum / rendered.pixels.len() as f64);
         }
     }
@@ -308,7 +308,7 @@ fn kernels_that_reach_behind_borders_lose_nothing() {
             for seed in 0..8 {
                 let one = Settings { kernel, levels: Levels::new(1), ..photons(10_000, 0.6, 6, seed) };
                 let rendered = render(&scene, Method::Sppm, 12, &one);
-                let of = |c: usize| rendered.pixels.iter().map(move |p| p.parts.volume[c] / f64::from(p.iterations));
+                let of = |c: usize| rendered.pixels.iter().map(move |p| p.parts().volume[c] / f64::from(p.iterations));
                 for (c, values) in values.iter_mut().enumerate() {
                     values.push(of(c).sum::<f64>() / rendered.pixels.len() as f64);
                 }

@@ -19,7 +19,7 @@ use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, mirror, po
 /// Variance of one iteration.
 fn variance(pixel: &Pixel) -> f64 {
     let n = f64::from(pixel.iterations);
-    pixel.levels[0].variance_of_mean(n).x * n
+    pixel.variance_of_mean(0).x * n
 }
 
 /// Mean and variance of one iteration at one pixel.
@@ -29,7 +29,7 @@ fn moments(scene: &Scene, settings: &Settings) -> (f64, f64) {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let rendered = one.install(|| render(scene, &camera, settings, |_, _| Control::Continue));
     let pixel = &rendered.pixels[0];
-    (pixel.levels[0].mean.x, variance(pixel))
+    (pixel.mean(0).x, variance(pixel))
 }
 
 const LAMP: f32 = 0.2;
@@ -119,7 +119,7 @@ fn caustics_on_glossy_surfaces_stay_noisy() {
         let (mut sum, mut mean2) = (0.0, 0.0);
         for pixel in &rendered.pixels {
             sum += variance(pixel);
-            mean2 += pixel.levels[0].mean.x.powi(2);
+            mean2 += pixel.mean(0).x.powi(2);
         }
         sum / mean2
     };

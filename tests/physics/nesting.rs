@@ -49,7 +49,7 @@ fn furnace_of_nested_shells() {
                     ..Settings::default()
                 };
                 let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-                rendered.pixels.iter().map(|p| p.levels[0].mean.x).sum::<f64>() / rendered.pixels.len() as f64
+                rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / rendered.pixels.len() as f64
             };
             let means: Vec<f64> = (0..6).map(mean).collect();
             let (mean, error) = mean_and_error(&means);

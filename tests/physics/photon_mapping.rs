@@ -40,7 +40,7 @@ fn picture(scene: &Scene, settings: &Settings) -> Rendered {
 }
 
 fn mean(rendered: &Rendered) -> f64 {
-    rendered.pixels.iter().map(|p| p.levels[0].mean.x).sum::<f64>() / rendered.pixels.len() as f64
+    rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / rendered.pixels.len() as f64
 }
 
 /// Checks the mean over seeds against `expected`; `detects` is a relative shift that is told.
@@ -141,7 +141,7 @@ fn threads_and_shards_change_nothing() {
     let base = Settings { photon_memory: 20_000 * PHOTON_BYTES, ..settings(50_000, 3) };
     let all = |settings: &Settings, threads: usize| -> Vec<DVec3> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| picture(&scene, settings)).pixels.iter().map(|p| p.levels[0].mean).collect()
+        pool.install(|| picture(&scene, settings)).pixels.iter().map(|p| p.mean(0)).collect()
     };
     let whole = all(&base, 1);
     assert!(whole == all(&base, 3), "threads change the picture");

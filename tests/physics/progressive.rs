@@ -92,7 +92,7 @@ fn a_uniform_field_has_no_bias_at_any_bandwidth() {
                 let initial = InitialBandwidth::Fixed(radius);
                 let settings = Settings { seed, initial, photons: 6000, iterations: Some(12), ..settings.clone() };
                 let rendered = picture(&scene, 8, &settings);
-                rendered.pixels.iter().map(|p| p.levels[0].mean.x).sum::<f64>() / 64.0
+                rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / 64.0
             };
             let values: Vec<f64> = (0..10).map(mean).collect();
             let (mean, error) = mean_and_error(&values);
@@ -123,7 +123,7 @@ fn all_agree_with_path_tracing() {
                 let iterations = Some(iterations);
                 let rendered =
                     picture(&scene, SIZE, &Settings { seed, iterations, photons, initial, ..settings.clone() });
-                tiles(|index| rendered.pixels[index].levels[0].mean.element_sum() / 3.0)
+                tiles(|index| rendered.pixels[index].mean(0).element_sum() / 3.0)
             })
             .collect()
     };
@@ -266,7 +266,7 @@ fn measurement_points_follow_the_talks_curves() {
         };
         let rendered = picture(&scene, 8, &settings);
         let radius2 = (0..64).map(|index| f64::from(rendered.radius2(index, Kind::Indirect, 0))).sum::<f64>() / 64.0;
-        let error = rendered.pixels.iter().map(|p| (p.levels[0].mean.x - 1.0).powi(2)).sum::<f64>() / 64.0;
+        let error = rendered.pixels.iter().map(|p| (p.mean(0).x - 1.0).powi(2)).sum::<f64>() / 64.0;
         (radius2 / f64::from(radius * radius), error.sqrt())
     };
     let (mut last_radius2, mut last_error) = (1.0, f64::INFINITY);

@@ -62,7 +62,7 @@ fn a_black_picture_is_not_finished() {
     let settings =
         Settings { method: Method::Path, iterations: Some(40), target_error: Some(0.9), ..Settings::default() };
     let dark = rendered(&scene, &settings);
-    assert!(dark.pixels.iter().all(|pixel| pixel.levels[0].mean == DVec3::ZERO));
+    assert!(dark.pixels.iter().all(|pixel| pixel.mean(0) == DVec3::ZERO));
     assert_eq!((dark.stop, dark.iterations, dark.relative_error()), (StopReason::Iterations, 40, None));
     // Photons find it.
     let seen = rendered(&scene, &Settings { method: Method::Sppm, photons: 3000, ..settings });

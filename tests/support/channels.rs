@@ -17,7 +17,7 @@ pub fn tiles(rendered: &Rendered) -> Vec<f64> {
     for (index, pixel) in (0..).zip(&rendered.pixels) {
         let tile = (index / SIZE / TILE * (SIZE / TILE) + index % SIZE / TILE) as usize;
         for c in 0..3 {
-            sums[3 * tile + c] += pixel.levels[own].mean[c] / f64::from(TILE * TILE);
+            sums[3 * tile + c] += pixel.mean(own)[c] / f64::from(TILE * TILE);
         }
     }
     sums

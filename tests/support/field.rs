@@ -145,7 +145,7 @@ pub fn view(finer: u32) -> View {
 
 /// What photons bring to a pixel, on average over its iterations.
 pub fn photons_of(pixel: &Pixel) -> f64 {
-    (pixel.parts.caustic.x + pixel.parts.indirect.x) / f64::from(pixel.iterations.max(1))
+    (pixel.parts().caustic.x + pixel.parts().indirect.x) / f64::from(pixel.iterations.max(1))
 }
 
 /// What one iteration gives a pixel.

@@ -66,11 +66,11 @@ pub(super) fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Leve
     let size = Size { width: width as usize, height: height as usize };
     let value = |index: usize| {
         let near = window(size, index, REACH);
-        let mut near: Vec<f64> = near.map(|index| mean(pixels[index].levels[smoothest].mean)).collect();
+        let mut near: Vec<f64> = near.map(|index| mean(pixels[index].mean(smoothest))).collect();
         let middle = near.len() / 2;
         let median = *near.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let own = &pixels[index].levels;
-        if levels.two_paths { median.max(mean(own[0].mean).min(mean(own[smoothest].mean))) } else { median }
+        let own = &pixels[index];
+        if levels.two_paths { median.max(mean(own.mean(0)).min(mean(own.mean(smoothest)))) } else { median }
     };
     (0..pixels.len()).map(value).collect()
 }

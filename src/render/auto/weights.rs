@@ -89,7 +89,7 @@ fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<Pixel>, 
 
 /// Sums of the additive parts of a pixel.
 fn parts(pixel: &Pixel) -> [DVec3; 5] {
-    let parts = &pixel.parts;
+    let parts = pixel.parts();
     [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume]
 }
 

@@ -137,9 +137,9 @@ impl Shot {
         let pixels = session.pixels();
         let photons = pixels.iter().map(|pixel| {
             let count = f64::from(pixel.iterations.max(1));
-            (pixel.parts.indirect + pixel.parts.caustic) / count
+            (pixel.parts().indirect + pixel.parts().caustic) / count
         });
-        Shot { all: pixels.iter().map(|pixel| pixel.levels[0].mean).collect(), photons: photons.collect() }
+        Shot { all: pixels.iter().map(|pixel| pixel.mean(0)).collect(), photons: photons.collect() }
     }
 }
 

@@ -40,7 +40,7 @@ pub fn surface(ground: &Ground, photons: u32, iterations: u64, window: [usize; 4
             while session.iterations() < iterations {
                 session.step();
             }
-            picture = session.pixels().iter().map(|p| p.levels[0].mean).collect::<Vec<DVec3>>();
+            picture = session.pixels().iter().map(|p| p.mean(0)).collect::<Vec<DVec3>>();
             let layers = session.layers(|name| name == "Radius1").unwrap_or_else(|e| panic!("{e}"));
             layers.get("Radius1").map(|l| l.triples().iter().map(|v| v[0]).collect()).unwrap_or_default()
         })

@@ -51,9 +51,9 @@ fn parts(parts: &Parts) -> [DVec3; 5] {
 /// The largest difference between what two pictures add up to and a third, part by part, relative to the mean.
 fn apart(a: &Rendered, b: &Rendered, sum: &Rendered) -> f64 {
     let mut worst = 0f64;
-    let mean = sum.pixels.iter().map(|p| p.levels[0].mean.element_sum() / 3.0).sum::<f64>() / sum.pixels.len() as f64;
+    let mean = sum.pixels.iter().map(|p| p.mean(0).element_sum() / 3.0).sum::<f64>() / sum.pixels.len() as f64;
     for ((a, b), sum) in a.pixels.iter().zip(&b.pixels).zip(&sum.pixels) {
-        for ((a, b), sum) in parts(&a.parts).into_iter().zip(parts(&b.parts)).zip(parts(&sum.parts)) {
+        for ((a, b), sum) in parts(&a.parts()).into_iter().zip(parts(&b.parts())).zip(parts(&sum.parts())) {
             worst = worst.max(((a + b - sum).abs().max_element()) / (mean + sum.max_element()));
         }
     }
@@ -86,7 +86,7 @@ fn a_class_and_all_others_are_the_whole() {
             let apart_by = apart(&one, &others, &whole);
             assert!(apart_by < 1e-4, "{method:?} {indirect:?} {effect:?}: {apart_by}");
             let light =
-                |rendered: &Rendered| rendered.pixels.iter().map(|p| p.levels[0].mean.element_sum()).sum::<f64>();
+                |rendered: &Rendered| rendered.pixels.iter().map(|p| p.mean(0).element_sum()).sum::<f64>();
             // Light paths connected to the camera do not find what is behind glass.
             if method != Method::Light || effect != Effect::Sds {
                 assert!(light(&one) > 0.0 && light(&others) < light(&whole), "{method:?} {effect:?}");
@@ -104,7 +104,7 @@ fn every_method_leaves_out_what_is_switched_off() {
     for method in [Method::Pm, Method::Ppm, Method::Appm, Method::Cppm] {
         let off = settings(method, Indirect::Photons, without(&[Effect::Caustic, Effect::Sds, Effect::Emission]));
         let rendered = picture(&scene, 16, &off);
-        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts).element_sum()).sum::<f64>();
+        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
         assert_eq!((sum(|p| p.caustic), sum(|p| p.emission)), (0.0, 0.0), "{method:?}");
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
         let layers = rendered.layers(&scene.survey, |_| true).expect("there are layers");
@@ -112,7 +112,7 @@ fn every_method_leaves_out_what_is_switched_off() {
         // Nothing is left for photons.
         let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);
         let rendered = picture(&scene, 16, &settings(method, Indirect::Photons, lit));
-        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts).element_sum()).sum::<f64>();
+        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) == 0.0, "{method:?}");
         assert!(rendered.pixels.iter().all(|p| p.iterations > 0), "{method:?}");
     }
@@ -128,7 +128,7 @@ fn photons_that_nobody_wants_are_not_traced() {
     let plain = of(without(&[Effect::Caustic, Effect::Sds]));
     assert!(plain.photons < whole.photons && plain.light_paths == whole.light_paths);
     for (a, b) in plain.pixels.iter().zip(&whole.pixels) {
-        let [a, b] = [a, b].map(|p| [p.parts.emission, p.parts.direct, p.parts.indirect]);
+        let [a, b] = [a, b].map(|p| [p.parts().emission, p.parts().direct, p.parts().indirect]);
         assert_eq!(a, b);
     }
     let caustics = of(without(&[Effect::Indirect, Effect::Glossy]));
@@ -136,7 +136,7 @@ fn photons_that_nobody_wants_are_not_traced() {
     let none = of(without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy]));
     assert_eq!((none.photons, none.light_paths), (0, 0));
     for (a, b) in none.pixels.iter().zip(&whole.pixels) {
-        assert_eq!(a.parts.emission, b.parts.emission);
+        assert_eq!(a.parts().emission, b.parts().emission);
     }
     let paths = picture(&scene, 24, &settings(Method::Sppm, Indirect::Paths, only(Effect::Direct)));
     assert_eq!(paths.light_paths, 0);
@@ -153,7 +153,7 @@ fn by(scene: &Scene, way: (Method, Indirect), effect: Effect, iterations: u64, p
             ..settings(way.0, way.1, only(effect))
         };
         let rendered = picture(scene, SIZE, &settings);
-        tiles(|index| rendered.pixels[index].levels[0].mean.element_sum() / 3.0)
+        tiles(|index| rendered.pixels[index].mean(0).element_sum() / 3.0)
     };
     (0..10).map(of).collect()
 }

@@ -1,0 +1,139 @@
+//! Mean and variance from sums that do not depend on the order of their terms.
+//!
+//! The sum of squares loses the digits that the square of the mean takes: relative variances of single values below
+//! 10^-9 are not told from none.
+
+use super::sum::{Grid, Rounding, Sum};
+use crate::math::{DVec3, Rgb};
+use serde::{Deserialize, Serialize};
+
+/// The grids of some values and of their squares.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grids {
+    values: Grid,
+    squares: Grid,
+}
+
+impl Grids {
+    /// The finest, relative to two to this exponent, see [`Grid::new`].
+    pub fn new(exponent: i32) -> Grids {
+        Grids { values: Grid::new(exponent), squares: Grid::new(2 * exponent) }
+    }
+
+    /// With room for values of this size.
+    #[inline]
+    #[must_use]
+    pub fn holding(self, most: f64) -> Grids {
+        Grids { values: self.values.holding(most), squares: self.squares.holding(most * most) }
+    }
+
+    /// The coarser of either.
+    #[must_use]
+    pub fn max(self, other: Grids) -> Grids {
+        Grids { values: self.values.max(other.values), squares: self.squares.max(other.squares) }
+    }
+
+    /// What rounds values and squares.
+    #[inline]
+    pub fn rounding(self) -> [Rounding; 2] {
+        [self.values.rounding(), self.squares.rounding()]
+    }
+
+    /// Takes a sum of values to other grids.
+    #[inline]
+    pub fn coarsen_values(self, sum: &mut Sum<DVec3>, to: Grids) {
+        sum.coarsen(self.values, to.values);
+    }
+
+    /// Takes a sum of squares to other grids.
+    #[inline]
+    pub fn coarsen_squares(self, sum: &mut Sum<DVec3>, to: Grids) {
+        sum.coarsen(self.squares, to.squares);
+    }
+}
+
+/// Sums of an RGB quantity and of its squares; their grids and their count are kept by the owner, which has many of
+/// these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Moments {
+    /// Sum of the values.
+    pub values: Sum<DVec3>,
+    /// Sum of their squares.
+    pub squares: Sum<DVec3>,
+}
+
+impl Moments {
+    /// Adds a value.
+    #[inline(always)]
+    pub fn add(&mut self, value: Rgb, [values, squares]: [Rounding; 2]) {
+        let value = value.as_dvec3();
+        self.values.add(value, values);
+        self.squares.add(value * value, squares);
+    }
+
+    /// Mean of `count` values, zero for none.
+    #[inline]
+    pub fn mean(&self, count: f64) -> DVec3 {
+        if count == 0.0 { DVec3::ZERO } else { self.values.value() / count }
+    }
+
+    /// Variance of the mean of `count` values, see [`variance_of_mean`].
+    #[inline]
+    pub fn variance_of_mean(&self, count: f64) -> DVec3 {
+        variance_of_mean(self.values.value(), self.squares.value(), count)
+    }
+
+    /// Goes over to grids that are no finer.
+    #[inline]
+    pub fn coarsen(&mut self, from: Grids, to: Grids) {
+        from.coarsen_values(&mut self.values, to);
+        from.coarsen_squares(&mut self.squares, to);
+    }
+
+    /// Adds those of other values on the same grids.
+    pub fn join(&mut self, other: &Moments) {
+        self.values.join(&other.values);
+        self.squares.join(&other.squares);
+    }
+}
+
+/// Variance of the mean of `count` values from their sum and that of their squares; infinite for fewer than two:
+/// nothing is known.
+#[inline]
+pub fn variance_of_mean(sum: DVec3, squares: DVec3, count: f64) -> DVec3 {
+    if count < 2.0 {
+        return DVec3::INFINITY;
+    }
+    (squares - sum * sum / count).max(DVec3::ZERO) / (count * (count - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agrees_with_two_passes_far_from_zero() {
+        let values: Vec<f64> = (0..1000).map(|i| 1e3 + f64::from((i * 7919) % 101)).collect();
+        let grids = Grids::default().holding(2e3);
+        let mut moments = Moments::default();
+        values.iter().for_each(|&v| moments.add(Rgb::splat(v as f32), grids.rounding()));
+        let mean = values.iter().sum::<f64>() / 1000.0;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (1000.0 * 999.0);
+        assert!((moments.mean(1000.0).x / mean - 1.0).abs() < 1e-12);
+        assert!((moments.variance_of_mean(1000.0).x / variance - 1.0).abs() < 1e-6);
+        assert_eq!(Moments::default().variance_of_mean(1.0).x, f64::INFINITY);
+    }
+
+    /// Of values that are all alike no more is seen than the sum of squares has digits.
+    #[test]
+    fn equal_values_have_next_to_no_variance() {
+        let mut worst = 0.0f64;
+        for value in (0..200).map(|i| 1.1f32.powi(i - 100)) {
+            let grids = Grids::default().holding(f64::from(value));
+            let mut moments = Moments::default();
+            (0..100).for_each(|_| moments.add(Rgb::splat(value), grids.rounding()));
+            worst = worst.max(99.0 * moments.variance_of_mean(100.0).x / f64::from(value).powi(2));
+        }
+        assert!(worst < 2f64.powi(-29), "{worst}");
+    }
+}

@@ -1,0 +1,237 @@
+//! Sums that do not depend on the order of their terms, so that parts of a render made anywhere join to the bytes of the
+//! whole.
+//!
+//! Grids of multiples of a power of two lie [`STEP`] powers apart. A term is rounded to the coarsest grid that has room
+//! for the largest one so far, and what is left to the next finer one. Both sums are exact, so that terms commute; what
+//! is cut off, less than 2^-30 of the largest term, is cut off each term alike wherever it stands. When a larger term
+//! calls for a coarser grid, the coarse sum becomes the fine one, which is what it would have been from the beginning
+//! \[Demmel and Nguyen 2015, Parallel Reproducible Summation\].
+
+use crate::math::DVec3;
+use serde::{Deserialize, Serialize};
+use std::ops::{Add, AddAssign, Sub};
+
+/// Powers of two from one grid to the next.
+const STEP: i16 = 30;
+/// The finest coarse grid: below the squares of all that f32 can hold.
+const LOWEST: i16 = -330;
+/// Terms that can be added before a sum may lose a digit: a term has at most [`STEP`] digits of a grid, an f64 has 53.
+pub const MOST_TERMS: u64 = 1 << (53 - STEP as u64);
+
+/// What can be summed.
+pub trait Term: Copy + Default + Add<Output = Self> + AddAssign + Sub<Output = Self> {
+    /// To the nearest multiple of what `magic` stands for, see [`magic`].
+    #[must_use]
+    fn rounded(self, magic: f64) -> Self;
+}
+
+impl Term for f64 {
+    #[inline(always)]
+    fn rounded(self, magic: f64) -> f64 {
+        (self + magic) - magic
+    }
+}
+
+impl Term for DVec3 {
+    #[inline(always)]
+    fn rounded(self, magic: f64) -> DVec3 {
+        (self + magic) - magic
+    }
+}
+
+/// A number whose neighbours in f64 are apart by two to this exponent on either side.
+#[inline]
+fn magic(exponent: i16) -> f64 {
+    1.5 * two_to(52 + exponent)
+}
+
+/// Two to this exponent, which f64 can hold.
+#[inline]
+fn two_to(exponent: i16) -> f64 {
+    f64::from_bits(((1023 + i64::from(exponent)) as u64) << 52)
+}
+
+/// The coarse grid of sums: multiples of two to this exponent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Grid(i16);
+
+impl Default for Grid {
+    fn default() -> Grid {
+        Grid::new(0)
+    }
+}
+
+impl Grid {
+    /// The finest. Grids stand relative to `exponent`: terms times a power of two, on grids whose exponent is larger by
+    /// as much, have sums times that power.
+    pub fn new(exponent: i32) -> Grid {
+        Grid(LOWEST + exponent.rem_euclid(i32::from(STEP)) as i16)
+    }
+
+    /// This or the next coarser one that has room for `most`, which is finite: the largest size of a term.
+    #[inline]
+    #[must_use]
+    pub fn holding(self, most: f64) -> Grid {
+        let mut grid = self;
+        // Half of the next grid's step, which would round to it.
+        while most >= two_to(grid.0 + STEP - 1) {
+            grid.0 += STEP;
+        }
+        grid
+    }
+
+    /// What rounds terms.
+    #[inline]
+    pub fn rounding(self) -> Rounding {
+        Rounding { coarse: magic(self.0), fine: magic(self.0 - STEP) }
+    }
+}
+
+/// How terms are rounded to a [`Grid`] and the next finer one.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounding {
+    coarse: f64,
+    fine: f64,
+}
+
+/// A sum; its grid is kept by the owner, which has many of these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sum<T> {
+    coarse: T,
+    fine: T,
+}
+
+impl<T: Term> Sum<T> {
+    /// Adds a term for which the grid has room.
+    #[inline(always)]
+    pub fn add(&mut self, term: T, rounding: Rounding) {
+        let coarse = term.rounded(rounding.coarse);
+        self.coarse += coarse;
+        self.fine += (term - coarse).rounded(rounding.fine);
+    }
+
+    /// The sum.
+    #[inline]
+    pub fn value(&self) -> T {
+        self.coarse + self.fine
+    }
+
+    /// Goes over to a grid that is no finer.
+    #[inline]
+    pub fn coarsen(&mut self, from: Grid, to: Grid) {
+        match to.0 - from.0 {
+            0 => {}
+            STEP => *self = Sum { coarse: T::default(), fine: self.coarse },
+            _ => *self = Sum::default(),
+        }
+    }
+
+    /// Adds another sum on the same grid.
+    pub fn join(&mut self, other: &Sum<T>) {
+        self.coarse += other.coarse;
+        self.fine += other.fine;
+    }
+}
+
+/// A sum with a grid of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Total {
+    grid: Grid,
+    sum: Sum<f64>,
+}
+
+impl Total {
+    /// Adds a finite term.
+    #[inline]
+    pub fn add(&mut self, term: f64) {
+        self.reach(self.grid.holding(term.abs()));
+        self.sum.add(term, self.grid.rounding());
+    }
+
+    /// The sum.
+    pub fn value(&self) -> f64 {
+        self.sum.value()
+    }
+
+    /// Adds another sum.
+    pub fn join(&mut self, other: &Total) {
+        let mut other = *other;
+        let grid = self.grid.max(other.grid);
+        self.reach(grid);
+        other.reach(grid);
+        self.sum.join(&other.sum);
+    }
+
+    #[inline]
+    fn reach(&mut self, grid: Grid) {
+        if grid != self.grid {
+            self.sum.coarsen(self.grid, grid);
+            self.grid = grid;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Domain, Purpose, Stream};
+
+    /// Terms of either sign over 60 powers of ten, so that grids change many times.
+    fn terms(count: u64) -> Vec<f64> {
+        let draw = |index| Stream::new(5, 1, Domain::Test, index).vertex(0).two(Purpose::Pixel);
+        let term = |u: crate::math::Vec2| {
+            let size = 10f32.powf(60.0 * u.x - 30.0);
+            f64::from(if u.y < 0.4 { -size } else { size })
+        };
+        (0..count).map(|index| term(draw(index))).collect()
+    }
+
+    fn total(terms: &[f64]) -> Total {
+        let mut total = Total::default();
+        terms.iter().for_each(|&term| total.add(term));
+        total
+    }
+
+    #[test]
+    fn the_order_of_terms_and_of_parts_changes_no_bit() {
+        let terms = terms(4000);
+        let whole = total(&terms);
+        let mut backwards = terms.clone();
+        backwards.reverse();
+        assert_eq!(total(&backwards), whole);
+        for parts in [2, 3, 7, 64] {
+            let part = |index: usize| total(&terms.iter().copied().skip(index).step_by(parts).collect::<Vec<_>>());
+            let mut joined = part(parts - 1);
+            (0..parts - 1).for_each(|index| joined.join(&part(index)));
+            assert_eq!(joined, whole, "{parts} parts");
+        }
+        // The same terms summed plainly in either order differ: there is something to be independent of.
+        assert_ne!(terms.iter().sum::<f64>(), backwards.iter().sum::<f64>());
+    }
+
+    #[test]
+    fn a_sum_is_right_to_a_part_in_a_thousand_million_of_its_largest_term() {
+        for range in [1e-30, 1.0, 1e30] {
+            let terms: Vec<f64> = terms(1000).iter().map(|term| range * term.abs().powf(0.01)).collect();
+            let largest = terms.iter().fold(0.0, |most: f64, term| most.max(*term));
+            let (plain, sum) = (terms.iter().sum::<f64>(), total(&terms).value());
+            assert!((sum - plain).abs() < 1e-9 * largest * 1000.0 && sum > 0.0, "{sum} {plain}");
+        }
+        assert_eq!(total(&[]).value(), 0.0);
+        let squares = [f64::from(f32::MAX).powi(2), f64::from(f32::MIN_POSITIVE).powi(2)];
+        assert!(squares.iter().all(|&square| (total(&[square]).value() / square - 1.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn sums_scale_exactly_with_their_grids() {
+        for power in [-70, -31, -1, 0, 3, 29, 30, 90] {
+            let scale = f64::from(power).exp2();
+            let scaled = |exponent: i32, scale: f64| {
+                let mut total = Total { grid: Grid::new(exponent), ..Total::default() };
+                [0.3, 1.7e4, 2.9e-6, 0.1].iter().for_each(|term| total.add(term * scale));
+                total.value()
+            };
+            assert_eq!(scaled(power, scale), scaled(0, 1.0) * scale);
+        }
+    }
+}
