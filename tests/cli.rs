@@ -10,6 +10,8 @@ mod commands;
 mod converge;
 #[path = "cli/files.rs"]
 mod files;
+#[path = "cli/merge.rs"]
+mod merge;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/running.rs"]

@@ -35,7 +35,7 @@ pub struct CombineArgs {
 }
 
 /// Names as Blender gives them back to ours. Layers with names that we cannot write are left out and returned.
-fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
+pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
     let known = ["", "Z", "P", "albedo", "normal", "depth"];
     for layer in &mut set.layers {
         if let Some(plain) = known.iter().find(|plain| Naming::Blender.layer(plain) == layer.name) {

@@ -6,10 +6,10 @@ use caustique::finish::DenoiserChoice;
 use caustique::pipeline::Ready;
 use caustique::pipeline::finish::{Order, open};
 use clap::ValueEnum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What makes the denoised picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Denoise {
     /// Open Image Denoise where its library is found, else our own

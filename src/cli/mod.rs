@@ -7,6 +7,7 @@ mod doctor;
 mod finish;
 mod info;
 mod layout;
+mod merge;
 mod number;
 mod output;
 mod plan;
@@ -41,6 +42,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     /// Finish a rendered EXR, also one of another renderer
     Combine(combine::CombineArgs),
+    /// Put the shards of a render together, or renders of other seeds
+    Merge(merge::MergeArgs),
     /// Measure the error of an image against a reference
     Compare(compare::CompareArgs),
     /// Compare methods and settings: accuracy against time
@@ -92,6 +95,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Combine(args) => combine::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),

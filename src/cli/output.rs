@@ -8,7 +8,7 @@ use caustique::image::tonemap::ToneMap;
 use caustique::image::{atomic, exr};
 use caustique::scene::description::{Picture, ToneCurve};
 use clap::ValueEnum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// From scene-linear light to the PNG's colours.
@@ -23,7 +23,7 @@ pub enum Tonemap {
 }
 
 /// Names of the EXR's channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Naming {
     /// R G B A at the root, the others as Layer.C

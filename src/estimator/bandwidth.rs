@@ -13,6 +13,7 @@ use crate::random::{Domain, Stream, Streams};
 use crate::transport::{Eye, GatherPoint, PathStart};
 use bumpalo::Bump;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the
 /// picture says nothing about a place.
@@ -31,7 +32,7 @@ pub const LEAST_ASKED: f32 = 1e-5;
 const NEIGHBOURHOOD: usize = 3;
 
 /// What sets the largest initial bandwidth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum InitialBandwidth {
     /// Distance to the k-th nearest pilot photon.
     Nearest(usize),

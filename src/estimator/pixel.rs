@@ -115,7 +115,7 @@ impl Pixel {
 
     /// Number of levels.
     #[inline]
-    fn levels(&self) -> usize {
+    pub fn levels(&self) -> usize {
         self.others.len().max(1)
     }
 
@@ -409,7 +409,7 @@ mod tests {
                     normal: (draw(5) - draw(6)).normalize(),
                     depth: draw(7).x,
                 },
-                first: (pass % 3 > 0).then(|| FirstHit { p: draw(8), instance: (pass % 10) as u32 }),
+                first: (!pass.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (pass % 10) as u32 }),
             }
         })
     }

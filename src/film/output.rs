@@ -19,6 +19,7 @@ use crate::math::{DVec3, Vec3};
 use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Part};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Depth of the background.
 pub const BACKGROUND: f32 = FAR;
@@ -26,7 +27,7 @@ pub const BACKGROUND: f32 = FAR;
 const BLOCK: usize = 2048;
 
 /// What the layers of a render depend on besides its pixels.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Shape {
     /// Bandwidth levels.
     pub levels: usize,
@@ -170,11 +171,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
 
 /// Variance of the mean of a level; before two iterations the square of the mean.
 fn variance(pixel: &Pixel, level: usize) -> DVec3 {
-    if pixel.iterations < 2 {
-        pixel.mean(level) * pixel.mean(level)
-    } else {
-        pixel.variance_of_mean(level)
-    }
+    if pixel.iterations < 2 { pixel.mean(level) * pixel.mean(level) } else { pixel.variance_of_mean(level) }
 }
 
 /// Names of the layers that [`layers`] can make.

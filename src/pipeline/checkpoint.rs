@@ -1,24 +1,25 @@
 //! Checkpoints: the state of a render in a file that is whole or not there, and that says what render it belongs to.
 //!
-//! A line that names the kind of file, the length of a JSON object (eight bytes, little endian) and the object, the state
-//! packed by postcard and LZ4 (levels that a method does not have are zeros), and the BLAKE3 hash of all before.
+//! A line that names the kind of file, and [`records`]: a JSON object, the state but for its pixels, and these in blocks,
+//! both as postcard packs them.
 
+use super::records::{self, Record};
 use crate::error::{Error, Kind, Result};
 use crate::estimator::Pixel;
 use crate::image::atomic;
 use crate::render::{State, Strategy};
-use lz4_flex::frame::{FrameDecoder, FrameEncoder};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::io::{self, Read, Write};
+use std::fs::File;
+use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
-const MAGIC: &[u8] = b"caustique checkpoint 1\n";
-/// Bytes of the hash at the end.
-const HASH: usize = blake3::OUT_LEN;
+const MAGIC: &[u8; 23] = b"caustique checkpoint 2\n";
+/// Pixels packed together.
+pub(super) const BLOCK: usize = 2048;
 /// Options that may be others when a render goes on: when it stops, and how its files are written.
-const FREE: [&str; 6] = ["iterations", "time", "target-error", "layers", "exr-naming", "compression"];
+const FREE: [&str; 8] = ["iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
 
 /// Where and how often a render is saved.
 #[derive(Clone, Debug)]
@@ -46,47 +47,22 @@ pub struct Head {
     pub plan: Value,
 }
 
-/// Writes everything through to a file, and hashes it.
-struct Hashing<W> {
-    inner: W,
-    hasher: blake3::Hasher,
-    /// Why the file takes no more, which who packs does not tell.
-    failure: Option<io::ErrorKind>,
-}
-
-impl<W: Write> Write for Hashing<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.inner.write(bytes).inspect_err(|error| self.failure = Some(error.kind()))?;
-        self.hasher.update(&bytes[..written]);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
-    }
-}
-
 /// Saves a state; the file is replaced at once, or stays as it was.
 ///
 /// # Errors
 /// The file system.
-pub fn write(path: &Path, head: &Head, state: &State<&[Pixel]>) -> Result<()> {
+pub fn write(path: &Path, head: &Head, state: State<&[Pixel]>) -> Result<()> {
     let head = serde_json::to_vec(head).map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
+    let (state, pixels) = state.exchange(());
+    let state = postcard::to_allocvec(&state).map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
     atomic::write(path, |file| {
-        let mut out = Hashing { inner: file, hasher: blake3::Hasher::new(), failure: None };
-        let start = out
+        let written = file
             .write_all(MAGIC)
-            .and_then(|()| out.write_all(&(head.len() as u64).to_le_bytes()))
-            .and_then(|()| out.write_all(&head));
-        start.map_err(|cause| atomic::failure(path, &cause))?;
-        let mut packed = FrameEncoder::new(&mut out);
-        let whole = postcard::to_io(state, &mut packed).is_ok() && packed.finish().is_ok();
-        if !whole {
-            let cause = io::Error::from(out.failure.unwrap_or(io::ErrorKind::Other));
-            return Err(atomic::failure(path, &cause));
-        }
-        let hash = out.hasher.finalize();
-        out.inner.write_all(hash.as_bytes()).map_err(|cause| atomic::failure(path, &cause))
+            .and_then(|()| Record::new(&head).write(file))
+            .and_then(|()| Record::new(&state).write(file))
+            .and_then(|()| records::write_blocks(file, pixels, BLOCK))
+            .and_then(|()| records::end(file));
+        written.map_err(|cause| atomic::failure(path, &cause))
     })
 }
 
@@ -98,29 +74,28 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
     let error = |cause: &str| Error::new(Kind::Io, path.display(), cause);
     let missing =
         |cause| Error::io(path, &cause).hint("name a file that --checkpoint wrote, or start anew without --resume");
-    let bytes = std::fs::read(path).map_err(missing)?;
-    let Some(rest) = bytes.strip_prefix(MAGIC) else {
+    let mut file = BufReader::new(File::open(path).map_err(missing)?);
+    let mut magic = [0; MAGIC.len()];
+    if file.read_exact(&mut magic).is_err() || magic != *MAGIC {
         return Err(
             error("is no checkpoint of this version of caustique").hint("name the file that --checkpoint wrote")
         );
-    };
-    let damaged = || error("the checkpoint is damaged").hint("start anew without --resume");
-    let (whole, hash) = bytes.split_at(bytes.len().saturating_sub(HASH));
-    if whole.len() < MAGIC.len() + 8 || blake3::hash(whole).as_bytes() != hash {
-        return Err(damaged());
     }
-    let rest = &rest[..rest.len() - HASH];
-    let (length, rest) = rest.split_at(8);
-    let length = usize::try_from(u64::from_le_bytes(length.try_into().map_err(|_| damaged())?)).unwrap_or(usize::MAX);
-    let (head, state) = rest.split_at_checked(length).ok_or_else(damaged)?;
-    let head: Head = serde_json::from_slice(head).map_err(|_| damaged())?;
+    let damaged = || error("the checkpoint is damaged").hint("start anew without --resume");
+    let mut record = || Record::read(&mut file).ok().flatten().and_then(|record| record.unpack().ok());
+    let head: Head = serde_json::from_slice(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
     if head.version != env!("CARGO_PKG_VERSION") {
         let cause = format!("is of version {} of caustique; this is {}", head.version, env!("CARGO_PKG_VERSION"));
         return Err(error(&cause).hint("go on with that version, or start anew without --resume"));
     }
-    let mut unpacked = Vec::new();
-    FrameDecoder::new(state).read_to_end(&mut unpacked).map_err(|_| damaged())?;
-    Ok((head, postcard::from_bytes(&unpacked).map_err(|_| damaged())?))
+    let state: State<()> = postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
+    let mut pixels: Vec<Pixel> = Vec::new();
+    let read = records::read_blocks(&mut file, |block| {
+        pixels.extend(block);
+        Ok(())
+    });
+    read.map_err(|_| damaged())?;
+    Ok((head, state.exchange(pixels).0))
 }
 
 /// Whether a checkpoint is of the render that is asked for.
@@ -133,20 +108,23 @@ pub fn check(path: &Path, head: &Head, scene: Option<&str>, arguments: &Value) -
         let cause = "is of another scene, or the scene's files have changed since";
         return Err(error(cause.into()).hint("give the same scene, or start anew without --resume"));
     }
-    let none = Map::new();
-    let (there, here) = (head.arguments.as_object().unwrap_or(&none), arguments.as_object().unwrap_or(&none));
-    let mut keys: Vec<&String> = there.keys().chain(here.keys()).collect();
-    keys.sort();
-    keys.dedup();
-    let (null, free) = (Value::Null, |key: &str| FREE.contains(&key) || key == "scene" || key == "path");
-    for key in keys.into_iter().filter(|key| !free(key)) {
-        let [there, here] = [there, here].map(|arguments| arguments.get(key).unwrap_or(&null));
-        if there != here {
-            let cause = format!("was rendered with another --{key}: {there} there, {here} here");
-            return Err(error(cause).hint("give the same options, or start anew without --resume"));
-        }
+    if let Some((key, there, here)) = difference(&head.arguments, arguments, &FREE) {
+        let cause = format!("was rendered with another --{key}: {there} there, {here} here");
+        return Err(error(cause).hint("give the same options, or start anew without --resume"));
     }
     Ok(())
+}
+
+/// The first option, in their order by name, that is not the same there and here, and what it is; some are free.
+pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(String, Value, Value)> {
+    let none = Map::new();
+    let (there, here) = (there.as_object().unwrap_or(&none), here.as_object().unwrap_or(&none));
+    let mut keys: Vec<&String> = there.keys().chain(here.keys()).collect();
+    keys.sort();
+    keys.into_iter().filter(|key| !free.contains(&key.as_str())).find_map(|key| {
+        let [there, here] = [there, here].map(|arguments| arguments.get(key).cloned().unwrap_or_default());
+        (there != here).then(|| (key.clone(), there, here))
+    })
 }
 
 /// A hash of a scene's files: the file itself, and those in its folder that it or the command line names. `None` of a

@@ -3,14 +3,14 @@
 use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
+use crate::film::output::Shape;
 use crate::film::{Layer, LayerSet, Naming, Selection, describe, output as film};
 use crate::finish::finished_part;
 use crate::image::exr::Attributes;
-use crate::render::output::shape;
-use crate::render::{Rendered, Settings};
+use crate::render::Rendered;
 use crate::scene::Scene;
-use crate::scene::Survey;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Kinds of cryptomattes.
 const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
@@ -20,9 +20,9 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
     (0..RANKS / 2).map(move |index| format!("{kind}{index:02}"))
 }
 
-/// Names of the layers that a render with these settings can have, finished or not.
-fn names(settings: &Settings, survey: &Survey, finished: bool) -> Vec<String> {
-    let mut names = film::names(&shape(settings, survey));
+/// Names of the layers that a render of this shape can have, finished or not.
+fn names(shape: &Shape, finished: bool) -> Vec<String> {
+    let mut names = film::names(shape);
     if finished {
         names.extend(names.iter().filter_map(|name| finished_part(name)).collect::<Vec<_>>());
     }
@@ -30,47 +30,64 @@ fn names(settings: &Settings, survey: &Survey, finished: bool) -> Vec<String> {
     names
 }
 
-/// Channels that a render with these settings can have.
-pub fn channels(settings: &Settings, survey: &Survey) -> usize {
-    names(settings, survey, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
+/// Channels that a render of this shape can have.
+pub fn channels(shape: &Shape) -> usize {
+    names(shape, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
 
 /// The layers asked for (`all`, `beauty`, or names separated by commas), checked against what this render will have.
 ///
 /// # Errors
 /// There is no such layer.
-pub fn selection(asked: &str, settings: &Settings, survey: &Survey, finished: bool) -> Result<Selection> {
+pub fn selection(asked: &str, shape: &Shape, finished: bool) -> Result<Selection> {
     let selection = Selection::parse(asked)?;
-    let layers = names(settings, survey, finished).into_iter().map(|name| Layer { name, planes: vec![] }).collect();
+    let layers = names(shape, finished).into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;
     Ok(selection)
 }
 
+/// Names of objects and materials, and whose each instance is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Named {
+    objects: Vec<String>,
+    materials: Vec<String>,
+    /// Object and material of each instance.
+    instances: Vec<[u32; 2]>,
+}
+
+impl Named {
+    /// Those of a scene.
+    pub fn of(scene: &Scene) -> Named {
+        Named {
+            objects: scene.objects.clone(),
+            materials: scene.materials.list.iter().map(|material| material.name.clone()).collect(),
+            instances: scene.shapes.instances.iter().map(|instance| [instance.object, instance.material]).collect(),
+        }
+    }
+}
+
 /// Adds the cryptomattes of objects and materials that are asked for; returns their attributes.
 pub(super) fn cryptomattes(
-    scene: &Scene,
+    named: &Named,
     rendered: &Rendered,
     selection: &Selection,
     naming: Naming,
     set: &mut LayerSet,
 ) -> Result<Attributes> {
     let mut attributes = Attributes::default();
-    let instances = &scene.shapes.instances;
-    let materials = scene.materials.list.iter().map(|material| material.name.clone());
-    let objects = Cryptomatte::new(CRYPTOMATTES[0], scene.objects.iter().cloned());
-    let materials = Cryptomatte::new(CRYPTOMATTES[1], materials);
-    let kinds: [(Cryptomatte, &(dyn Fn(u32) -> u32 + Sync)); 2] = [
-        (objects, &|instance| instances[instance as usize].object),
-        (materials, &|instance| instances[instance as usize].material),
-    ];
-    for ((mattes, of_instance), kind) in kinds.into_iter().zip(CRYPTOMATTES) {
+    let lists = [&named.objects, &named.materials];
+    for (which, (kind, names)) in CRYPTOMATTES.into_iter().zip(lists).enumerate() {
         if !cryptomatte_layers(kind).any(|name| selection.wants(&name)) {
             continue;
         }
+        let mattes = Cryptomatte::new(kind, names.iter().cloned());
         let ranks = |pixel: &Pixel| {
             let mut ranks = PixelRanks::default();
             for (instance, fraction) in pixel.coverage.fractions() {
-                ranks.add(mattes.ids()[of_instance(instance) as usize], fraction);
+                let of = named.instances.get(instance as usize).map(|of| of[which] as usize);
+                if let Some(id) = of.and_then(|of| mattes.ids().get(of)) {
+                    ranks.add(*id, fraction);
+                }
             }
             ranks
         };

@@ -5,32 +5,39 @@
 
 pub mod check;
 pub mod checkpoint;
+mod deliver;
+mod facts;
 pub mod finish;
 pub mod layers;
 pub mod load;
 pub mod memory;
+pub mod merge;
 pub mod plan;
+pub mod records;
 mod saver;
+pub mod seeds;
+pub mod shard;
 
 pub use checkpoint::Saving;
+pub use deliver::Delivery;
+pub use facts::Facts;
 pub use finish::Ready;
 pub use load::Loaded;
 
 use checkpoint::Head;
+use deliver::{Writing, deliver};
 use saver::Saver;
+use shard::Tail;
 
 use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Selection, output as film};
-use crate::finish::{Account, Finish, finished_part, reads, reads_for_picture};
-use crate::image::exr::{self, Attributes};
+use crate::finish::{Finish, finished_part, reads_for_picture};
+use crate::image::exr;
 use crate::plan::{Plan, Switches};
 use crate::render::auto::{self, Choice};
 use crate::render::output::shape;
-use crate::render::{
-    Clock, Control, Progress, Rendered, Session, Settings, Spent, Stage, Strategy, TechniquePicture, cpu_seconds,
-    drive, peak_memory,
-};
+use crate::render::{Control, Progress, Rendered, Session, Settings, Spent, Stage, Strategy, drive};
 use crate::scene::{Scene, View};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -132,22 +139,6 @@ pub trait Watch {
     fn rendered(&mut self, rendered: &Rendered);
 }
 
-/// What a render gives.
-pub struct Delivery {
-    /// The layers that were asked for, finished; unfinished with what a finish reads, where that failed.
-    pub set: LayerSet,
-    /// The header's attributes.
-    pub attributes: Attributes,
-    /// Pictures per sampling technique, if they were asked for.
-    pub techniques: Vec<TechniquePicture>,
-    /// What finished the picture, and what it did.
-    pub finished: Option<(String, Account)>,
-    /// Seconds from the last iteration to here.
-    pub finishing: f64,
-    /// Why the picture is not finished, though that was asked for.
-    pub refusal: Option<Error>,
-}
-
 /// Renders. All that can be wrong is found before the first light path, but for a finish that fails, which loses no
 /// picture ([`Delivery::refusal`]).
 ///
@@ -162,7 +153,8 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let camera = scene.camera(&order.view)?;
     let stage = (&scene, &camera);
     let (settings, selection) = checked(&order, stage)?;
-    let identity = if order.saving.is_some() || order.resume.is_some() { order.hash()? } else { None };
+    let kept = order.saving.is_some() || order.resume.is_some() || settings.is_shard();
+    let identity = if kept { order.hash()? } else { None };
     let saved = order.resume.as_deref().map(checkpoint::read).transpose()?;
     if let (Some(path), Some((head, _))) = (&order.resume, &saved) {
         checkpoint::check(path, head, identity.as_deref(), &order.arguments)?;
@@ -178,14 +170,14 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
             (choice, settings, way)
         }
     };
-    memory::check(stage, &settings, layers::channels(&settings, &scene.survey))?;
+    memory::check(stage, &settings, layers::channels(&shape(&settings, &scene.survey)))?;
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
     let mut plan = plan::plan(&asked, settings.method, stage, &removed);
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     watch.begins(&plan, &settings);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
-    let frame = frame(&scene, &order.view)?;
+    let facts = Facts::new(&scene, &order.view, &settings)?;
     let stage = Stage::new(&scene, &camera, &settings);
     let (mut session, told) = match saved {
         None => {
@@ -212,7 +204,7 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let mut saver = saving.map(|saving| Saver::new(saving, &head, order.resume.as_deref() == Some(&*saving.path)));
     let stop = drive(&mut session, |progress, session| {
         watch.progress(progress);
-        preview(session, ready.as_mut(), &frame, watch);
+        preview(session, ready.as_mut(), &facts.frame, watch);
         if let Some(saver) = &mut saver {
             saver.save_if_due(session, watch);
         }
@@ -224,9 +216,21 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     let rendered = session.finish(stop);
     watch.rendered(&rendered);
     watch.waits(Some(Wait::Finishing));
-    let delivery = deliver(&order, (&scene, &frame), &head.plan, rendered, &selection, ready.as_mut());
+    let writing = Writing {
+        facts: &facts,
+        selection: &selection,
+        naming: order.naming,
+        plan: &head.plan,
+        arguments: &order.arguments,
+        reproducible: order.reproducible,
+        more: Map::new(),
+    };
+    let part = rendered.settings.is_shard().then(|| rendered.part());
+    let delivered = deliver(writing, rendered, ready.as_mut(), part.is_some());
     watch.waits(None);
-    delivery
+    let (delivery, pixels) = delivered?;
+    let tail = part.map(|part| Tail { head, facts, part, pixels });
+    Ok(Delivery { tail, ..delivery })
 }
 
 impl Order<'_> {
@@ -270,9 +274,9 @@ fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Set
     check::media(&order.scene.path, &order.settings, scene)?;
     check::bandwidth(&order.scene.path, &order.settings, scene)?;
     let settings = sized(order.settings.clone(), order.photons, camera.size());
-    let selection = layers::selection(&order.layers, &settings, &scene.survey, order.finish.is_some())?;
+    let selection = layers::selection(&order.layers, &shape(&settings, &scene.survey), order.finish.is_some())?;
     // Before anything is tried, which takes time.
-    memory::check((scene, camera), &settings, layers::channels(&settings, &scene.survey))?;
+    memory::check((scene, camera), &settings, layers::channels(&shape(&settings, &scene.survey)))?;
     Ok((settings, selection))
 }
 
@@ -292,8 +296,9 @@ fn choose(
     let chosen = match auto {
         None => None,
         Some(mut auto) => {
-            let has_layers =
-                |of: &Settings| layers::selection(&order.layers, of, &scene.survey, order.finish.is_some()).is_ok();
+            let has_layers = |of: &Settings| {
+                layers::selection(&order.layers, &shape(of, &scene.survey), order.finish.is_some()).is_ok()
+            };
             let techniques = settings.techniques;
             let make = |way: Strategy| {
                 let able = !techniques || way.method.has_techniques();
@@ -310,7 +315,8 @@ fn choose(
     Ok(chosen)
 }
 
-/// The finish, if there is to be one; its time is part of the time that was asked for.
+/// The finish, if there is to be one; its time is part of the time that was asked for. Shards are finished when they are
+/// joined.
 fn readied(
     order: &Order<'_>,
     (scene, camera): (&Scene, &Camera),
@@ -318,7 +324,7 @@ fn readied(
     selection: &Selection,
     watch: &mut dyn Watch,
 ) -> Result<(Option<Ready>, Settings)> {
-    let Some(asked) = &order.finish else { return Ok((None, settings)) };
+    let Some(asked) = order.finish.as_ref().filter(|_| !settings.is_shard()) else { return Ok((None, settings)) };
     let mut ready = finish::open(asked, Some(settings.levels.count))?;
     watch.finishes(ready.missing.as_ref());
     let Some(time) = settings.time else { return Ok((Some(ready), settings)) };
@@ -327,75 +333,4 @@ fn readied(
     let (width, height) = camera.size();
     let left = time - ready.reserve(time, width as usize * height as usize, wanted)?;
     Ok((Some(ready), Settings { time: Some(left), ..settings }))
-}
-
-/// From pixels to the layers that were asked for, finished, and the header that tells of all.
-fn deliver(
-    order: &Order<'_>,
-    (scene, frame): (&Scene, &exr::Frame),
-    plan: &Value,
-    mut rendered: Rendered,
-    selection: &Selection,
-    ready: Option<&mut Ready>,
-) -> Result<Delivery> {
-    let mut header = rendered.account((!order.reproducible).then_some(rayon::current_num_threads()));
-    let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let finishes = ready.is_some();
-    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
-    let mut set = rendered.layers(&scene.survey, wanted)?;
-    let mut attributes = layers::cryptomattes(scene, &rendered, selection, order.naming, &mut set)?;
-    attributes.frame = Some(*frame);
-    let techniques = std::mem::take(&mut rendered.techniques);
-    // The pixels are most of the memory, and all that is wanted of them is in the layers now.
-    drop(rendered);
-    let applied = ready.map(|ready| {
-        let account = ready.finish().apply(&mut set, |name| selection.wants(name))?;
-        Ok((ready.name(), ready.facts(&account), account))
-    });
-    let finishing = clock.seconds();
-    let (finished, refusal) = match applied.transpose() {
-        Ok(finished) => (finished, None),
-        Err(error) => (None, Some(error)),
-    };
-    // A render that is still to be finished keeps what that reads.
-    if refusal.is_none() {
-        set = selection.apply(set)?;
-    }
-    header.insert("plan".into(), plan.clone());
-    let facts = finished.as_ref().map(|(_, facts, _)| facts.clone());
-    complete(&mut header, order, scene, facts, cpu_seconds() - cpu_start);
-    attributes.insert(exr::ATTRIBUTE, &header)?;
-    let finished = finished.map(|(name, _, account)| (name, account));
-    Ok(Delivery { set, attributes, techniques, finished, finishing, refusal })
-}
-
-/// Where the picture is in the whole one, and its camera.
-fn frame(scene: &Scene, view: &View) -> Result<exr::Frame> {
-    let whole = scene.whole_camera(view)?;
-    let (width, height) = whole.size();
-    let [x, y, ..] = scene.window(view, (width, height))?.unwrap_or_default();
-    let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
-    Ok(exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc })
-}
-
-/// What the header says besides the render's own account.
-fn complete(
-    header: &mut Map<String, Value>,
-    order: &Order<'_>,
-    scene: &Scene,
-    finished: Option<Value>,
-    core_seconds: f64,
-) {
-    let mut put = |key: &str, value: Value| header.insert(key.into(), value);
-    put("arguments", order.arguments.clone());
-    put("warnings", json!(scene.warnings));
-    // That of the finished picture is in `combined`.
-    put("error_of", "Noisy".into());
-    put("combined", finished.unwrap_or(Value::Null));
-    if !order.reproducible
-        && let Some(Value::Object(phases)) = header.get_mut("phases")
-    {
-        phases.insert("layers_and_finish".into(), core_seconds.into());
-        header.insert("peak_memory".into(), peak_memory().into());
-    }
 }

@@ -57,6 +57,6 @@ impl<'a> Saver<'a> {
     fn write(&self, session: &Session<'_>) -> Result<()> {
         let path = &self.saving.path;
         let state = session.state().map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
-        checkpoint::write(path, self.head, &state)
+        checkpoint::write(path, self.head, state)
     }
 }

@@ -37,6 +37,7 @@ pub use sight::{EyeSuffix, LightPrefix};
 
 use super::effect::{Effect, EffectSet, Switches};
 use crate::bsdf::LobeSet;
+use serde::{Deserialize, Serialize};
 use std::ops::BitAnd;
 
 /// What a vertex does to a path.
@@ -174,7 +175,7 @@ impl PathClass {
 }
 
 /// A set of classes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassSet(u16);
 
 impl ClassSet {

@@ -28,9 +28,8 @@ impl Rendered {
     ///
     /// # Errors
     /// None for a render of ours: its pixels are as many as its size says.
-    pub fn layers(&self, survey: &Survey, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let shape = shape(&self.settings, survey);
-        output::layers((self.width, self.height), &self.pixels, &self.bandwidths, &shape, wanted)
+    pub fn layers(&self, shape: &output::Shape, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
+        output::layers((self.width, self.height), &self.pixels, &self.bandwidths, shape, wanted)
     }
 
     /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know:

@@ -107,7 +107,10 @@ impl<'a> Session<'a> {
     pub fn resume(stage: &'a Stage<'a>, state: State) -> Option<Session<'a>> {
         let mut session = Session::new(stage);
         let State { next, done, light_paths, photons, next_record, history, phases, spent, pilot_seconds, .. } = state;
-        let fits = state.pixels.len() == session.pixels.len() && session.passes.restore(&state.passes);
+        let levels = stage.settings.levels.count;
+        let fits = state.pixels.len() == session.pixels.len()
+            && state.pixels.iter().all(|pixel| pixel.levels() == levels)
+            && session.passes.restore(&state.passes);
         fits.then(|| Session {
             pixels: state.pixels,
             phases,
@@ -195,8 +198,7 @@ impl<'a> Session<'a> {
 
     /// Iterations of this shard, when their number is what stops the render.
     fn total(&self) -> Option<u64> {
-        let Settings { iterations, shard, .. } = self.stage.settings;
-        iterations.map(|n| n.saturating_sub(shard.index).div_ceil(shard.count))
+        self.stage.settings.iterations_of_shard()
     }
 
     /// Where its light paths start, if they are guided.

@@ -13,6 +13,7 @@ use crate::photon::kernel;
 use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::transport::{Eye, Indirect, MAX_LEVELS, Surroundings};
+use serde::{Deserialize, Serialize};
 
 /// Iterations when no stop condition is given.
 pub const DEFAULT_ITERATIONS: u64 = 64;
@@ -20,7 +21,7 @@ pub const DEFAULT_ITERATIONS: u64 = 64;
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 
 /// Which iterations to render: those with `i mod count = index`, i from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Index of this shard, below `count`.
     pub index: u64,
@@ -29,7 +30,7 @@ pub struct Shard {
 }
 
 /// Bandwidth levels, each 1/sqrt(2) of the next larger.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Levels {
     /// Number of levels, 1 to [`MAX_LEVELS`].
     pub count: usize,
@@ -57,7 +58,7 @@ impl Levels {
 }
 
 /// Kernel of density estimation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum KernelChoice {
     /// [`kernel::Box`].
     #[default]
@@ -69,7 +70,7 @@ pub enum KernelChoice {
 }
 
 /// What [`Method::Sppm`]'s bandwidths follow.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RadiusRule {
     /// The iteration's number ([`memoryless`]).
     #[default]
@@ -79,7 +80,7 @@ pub enum RadiusRule {
 }
 
 /// Settings of a render.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Settings {
     /// How light is found.
     pub method: Method,
@@ -205,6 +206,16 @@ impl Settings {
     /// What the memoryless rules make of bandwidths at iteration `i` (from 1).
     pub fn schedule(&self, i: u64) -> Schedule {
         Schedule::new(i, self.levels.count, self.alpha, self.volume_alpha)
+    }
+
+    /// Whether other machines render other iterations.
+    pub fn is_shard(&self) -> bool {
+        self.shard.count > 1
+    }
+
+    /// Iterations of this shard, when their number is what stops the render.
+    pub fn iterations_of_shard(&self) -> Option<u64> {
+        self.iterations.map(|n| n.saturating_sub(self.shard.index).div_ceil(self.shard.count))
     }
 
     /// How it looks for light.

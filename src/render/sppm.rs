@@ -19,9 +19,7 @@ use crate::photon::{ByKind, Kernel, Kind, Nearest, PhotonMap, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
-use crate::transport::{
-    EqualFlux, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path,
-};
+use crate::transport::{EqualFlux, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;

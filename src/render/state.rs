@@ -34,6 +34,29 @@ pub struct State<P = Vec<Pixel>> {
     pub(super) passes: Vec<u8>,
 }
 
+impl<P> State<P> {
+    /// The same with other pixels, and its own.
+    pub fn exchange<Q>(self, pixels: Q) -> (State<Q>, P) {
+        let State {
+            next, done, light_paths, photons, next_record, history, phases, spent, pilot_seconds, passes, ..
+        } = self;
+        let state = State {
+            next,
+            done,
+            light_paths,
+            photons,
+            next_record,
+            history,
+            phases,
+            spent,
+            pilot_seconds,
+            pixels,
+            passes,
+        };
+        (state, self.pixels)
+    }
+}
+
 impl State {
     /// Iterations done.
     pub fn iterations(&self) -> u64 {

@@ -5,7 +5,7 @@ use crate::light::SpotEdge;
 use crate::material::{Material, MediumParameters};
 use crate::math::{DAffine3, Rgb};
 use crate::texture::Texture;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Everything a reader found in a scene file. Indices are valid; numbers are finite; transforms can be inverted.
@@ -78,7 +78,7 @@ pub struct CameraDescription {
 }
 
 /// The picture that a scene was made for: what is taken where the user asks for nothing else.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
     /// Width and height in pixels.
     pub resolution: Option<[u32; 2]>,
@@ -93,7 +93,7 @@ pub struct Picture {
 }
 
 /// Tone curves by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ToneCurve {
     /// Blender's default since 4.0.

@@ -10,7 +10,7 @@ pub use job::{Job, Method};
 pub use options::RenderArgs;
 
 use super::finish::tell_missing;
-use super::progress::{Reporter, Waiting, duration, percent};
+use super::progress::{Reporter, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Result};
@@ -18,23 +18,25 @@ use caustique::film::LayerSet;
 use caustique::image::atomic;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::plan::why;
+use caustique::pipeline::shard::Tail;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
 use caustique::render::auto::Choice;
-use caustique::render::{Progress, Rendered, Settings, Told};
+use caustique::render::output::shape;
+use caustique::render::{Progress, Rendered, Settings};
 use caustique::scene::description::Picture;
 use caustique::scene::{Scene, Survey};
 use preview::Preview;
 use serde_json::json;
 use std::path::Path;
-use summary::Summary;
+pub use summary::{Summary, tell_finish, tell_picture};
 
 /// Renders: everything that can be wrong is found before the first light path.
 pub fn run(args: &RenderArgs) -> Result<()> {
     let settings = args.settings()?;
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
-    layers::selection(&args.layers, &settings, &anything, !args.job.no_combine)?;
+    layers::selection(&args.layers, &shape(&settings, &anything), !args.job.no_combine)?;
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
@@ -169,10 +171,10 @@ impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
         let Telling { args, summary, preview, made_for, .. } = self;
-        let Delivery { set, attributes, techniques, finished, finishing, refusal } = delivery;
+        let Delivery { set, attributes, techniques, finished, finishing, refusal, tail } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
-        let written = write(args, &set, &attributes);
+        let written = write(args, &set, &attributes, tail.as_ref());
         let pictured = args.picture.write_png(&set, &made_for);
         let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if let Some(mut preview) = preview {
@@ -181,15 +183,11 @@ impl Telling<'_> {
         if talk {
             summary.tell();
             if let Some((name, account)) = finished {
-                // All quarters have the kernel's bias in common, whatever the levels tell of it.
-                let note = if summary.has_bandwidths { Told::Noise } else { summary.told }.note();
-                let error = account.told.map(|told| percent(told.half));
-                let error = error.map(|error| format!("; its quarters tell an error of {error}{note}"));
-                say(&format!("finished with {name} in {}{}", duration(finishing), error.unwrap_or_default()));
+                tell_finish(&name, &account, finishing, summary.told_of_finished());
             }
         }
         summary.tell_full();
-        summary.tell_rejected(args);
+        summary.tell_rejected(&args.output);
         written?;
         pictured?;
         debugged?;
@@ -224,14 +222,17 @@ pub fn tell_plan(scene: &Path, warnings: &[String]) {
 ///
 /// # Errors
 /// The EXR could not be written where it was asked for; the hint says where it is instead.
-fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Result<()> {
+fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: Option<&Tail>) -> Result<()> {
     let options = args.picture.exr_options(args.exr_naming.into());
-    let Err(error) = exr::write(&args.output, set, attributes, options) else { return Ok(()) };
+    let write = |path: &Path| {
+        exr::write_followed(path, set, attributes, options, |file| tail.map_or(Ok(()), |tail| tail.write(file)))
+    };
+    let Err(error) = write(&args.output) else { return Ok(()) };
     let name = args.output.file_name().unwrap_or("render.exr".as_ref());
     // A folder of its own: a file of that name may be there.
     let Ok(folder) = tempfile::Builder::new().prefix("caustique-").tempdir() else { return Err(error) };
     let rescued = folder.path().join(name);
-    if exr::write(&rescued, set, attributes, options).is_err() {
+    if write(&rescued).is_err() {
         return Err(error);
     }
     let _ = folder.keep();

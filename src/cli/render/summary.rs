@@ -5,7 +5,9 @@ use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
+use caustique::finish::Account;
 use caustique::render::{Rendered, StopReason, Told, peak_memory};
+use std::path::Path;
 
 /// The numbers of a render.
 pub struct Summary {
@@ -15,9 +17,9 @@ pub struct Summary {
     phases: String,
     error: Option<f64>,
     /// What the error before the finish tells of.
-    pub told: Told,
+    told: Told,
     /// Photons are merged or gathered within bandwidths.
-    pub has_bandwidths: bool,
+    has_bandwidths: bool,
     rejected: u64,
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
@@ -61,10 +63,15 @@ impl Summary {
         say(&format!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30)));
     }
 
+    /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, whatever the
+    /// levels tell of it.
+    pub fn told_of_finished(&self) -> Told {
+        if self.has_bandwidths { Told::Noise } else { self.told }
+    }
+
     /// The files that are written.
     pub fn tell_files(args: &RenderArgs, set: &LayerSet, techniques: usize) {
-        let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
-        say(&format!("{}: {} x {}, {channels} channels", args.output.display(), set.width, set.height));
+        tell_picture(&args.output, set);
         if let Some(png) = &args.picture.png {
             say(&png.display().to_string());
         }
@@ -85,9 +92,9 @@ impl Summary {
     }
 
     /// A warning if samples were rejected.
-    pub fn tell_rejected(&self, args: &RenderArgs) {
+    pub fn tell_rejected(&self, output: &Path) {
         if self.rejected > 0 {
-            let (name, n) = (args.output.display(), self.rejected);
+            let (name, n) = (output.display(), self.rejected);
             say(&format!(
                 "warning: {name}: {n} samples were not finite and are left out; the layer Rejected shows where"
             ));
@@ -106,4 +113,17 @@ impl Summary {
             None => error,
         })
     }
+}
+
+/// The file of a picture.
+pub fn tell_picture(output: &Path, set: &LayerSet) {
+    let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
+    say(&format!("{}: {} x {}, {channels} channels", output.display(), set.width, set.height));
+}
+
+/// What has finished a picture, and in how many seconds; what it tells of its error knows of `told`.
+pub fn tell_finish(name: &str, account: &Account, seconds: f64, told: Told) {
+    let error = account.told.map(|error| percent(error.half));
+    let error = error.map(|error| format!("; its quarters tell an error of {error}{}", told.note()));
+    say(&format!("finished with {name} in {}{}", duration(seconds), error.unwrap_or_default()));
 }

@@ -13,7 +13,7 @@ use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, i32x4, u32x4, u64x4};
 
 /// Parameters, with the paper's defaults (section 9.1).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChiSquaredSettings {
     /// Annuli, n_a.
     pub annuli: usize,

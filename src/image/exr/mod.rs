@@ -11,13 +11,14 @@ mod write;
 use std::collections::BTreeMap;
 
 pub use read::read;
-pub use write::{Compression, Options, write};
+pub use write::{Compression, Options, write, write_followed};
 
 /// Name and version of the program, for headers.
 const SOFTWARE: &str = concat!("caustique ", env!("CARGO_PKG_VERSION"));
 
 use crate::error::{Error, Kind, Result};
 use crate::film::ascii_json;
+use serde::{Deserialize, Serialize};
 
 /// Name of the attribute that holds our JSON object.
 pub const ATTRIBUTE: &str = "caustique";
@@ -33,7 +34,7 @@ pub struct Attributes {
 
 /// A picture as a part of a larger one, the display window, and its camera. Matrices are OpenEXR's: row by row, for row
 /// vectors on their left.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Width and height of the display window (pixels).
     pub display: [u32; 2],

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use exr::block::writer::ChunksWriter;
@@ -49,6 +49,20 @@ pub struct Options {
 /// Errors: a picture without pixels or channels, a channel name that other programs cannot read, an attribute that is
 /// not ASCII, the file system.
 pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Options) -> Result<()> {
+    write_followed(path, set, attributes, options, |_| Ok(()))
+}
+
+/// The same, with what `tail` writes behind the picture, where programs that read pictures do not look.
+///
+/// # Errors
+/// See [`write()`].
+pub fn write_followed(
+    path: &Path,
+    set: &LayerSet,
+    attributes: &Attributes,
+    options: Options,
+    tail: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
+) -> Result<()> {
     check(set, options.naming).map_err(|error| error.within(path.display()))?;
     let mut planes: Vec<(String, Source<'_>)> = Vec::new();
     for layer in &set.layers {
@@ -67,7 +81,8 @@ pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Opti
     let planes: Vec<Source<'_>> = planes.into_iter().map(|(_, plane)| plane).collect();
     atomic::write(path, |file| {
         write_chunks(file, set.width, &planes, header).map_err(|error| failure(path, error))?;
-        sort(file).map_err(|error| atomic::failure(path, &error))
+        let ended = sort(file).and_then(|()| file.seek(SeekFrom::End(0))).and_then(|_| tail(file));
+        ended.map_err(|error| atomic::failure(path, &error))
     })
 }
 

@@ -7,6 +7,7 @@ use crate::support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 use caustique::estimator::{InitialBandwidth, Parts};
 use caustique::math::DVec3;
 use caustique::plan::{ClassSet, Effect, EffectSet};
+use caustique::render::output::shape;
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::Scene;
 use caustique::transport::Indirect;
@@ -85,8 +86,7 @@ fn a_class_and_all_others_are_the_whole() {
             let (one, others) = (of(only(effect)), of(without(&[effect])));
             let apart_by = apart(&one, &others, &whole);
             assert!(apart_by < 1e-4, "{method:?} {indirect:?} {effect:?}: {apart_by}");
-            let light =
-                |rendered: &Rendered| rendered.pixels.iter().map(|p| p.mean(0).element_sum()).sum::<f64>();
+            let light = |rendered: &Rendered| rendered.pixels.iter().map(|p| p.mean(0).element_sum()).sum::<f64>();
             // Light paths connected to the camera do not find what is behind glass.
             if method != Method::Light || effect != Effect::Sds {
                 assert!(light(&one) > 0.0 && light(&others) < light(&whole), "{method:?} {effect:?}");
@@ -104,15 +104,17 @@ fn every_method_leaves_out_what_is_switched_off() {
     for method in [Method::Pm, Method::Ppm, Method::Appm, Method::Cppm] {
         let off = settings(method, Indirect::Photons, without(&[Effect::Caustic, Effect::Sds, Effect::Emission]));
         let rendered = picture(&scene, 16, &off);
-        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
+        let sum =
+            |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
         assert_eq!((sum(|p| p.caustic), sum(|p| p.emission)), (0.0, 0.0), "{method:?}");
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
-        let layers = rendered.layers(&scene.survey, |_| true).expect("there are layers");
+        let layers = rendered.layers(&shape(&rendered.settings, &scene.survey), |_| true).expect("there are layers");
         assert!(layers.get("Caustic").is_none() && layers.get("Emission").is_none() && layers.get("Direct").is_some());
         // Nothing is left for photons.
         let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);
         let rendered = picture(&scene, 16, &settings(method, Indirect::Photons, lit));
-        let sum = |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
+        let sum =
+            |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) == 0.0, "{method:?}");
         assert!(rendered.pixels.iter().all(|p| p.iterations > 0), "{method:?}");
     }

@@ -1,0 +1,156 @@
+//! `caustique merge`: the shards of one render to its picture, or renders of other seeds to their mean.
+
+use super::combine::take_plain_names;
+use super::finish::{Denoise, tell_missing};
+use super::output::{self, Naming, PictureArgs};
+use super::progress::Form;
+use super::render::{Summary, tell_finish, tell_picture};
+use super::say;
+use caustique::error::Result;
+use caustique::film::{LayerSet, Selection};
+use caustique::image::exr::{self, Attributes};
+use caustique::pipeline::finish;
+use caustique::pipeline::merge::{self, Shards, Step, is_shard};
+use caustique::pipeline::seeds::Seeds;
+use caustique::scene::description::Picture;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Put the shards of a render together, or renders of other seeds
+///
+/// Shards that --shard I/N made give the picture that one machine would have rendered, to the last bit of every channel
+/// and in whatever order they are named: layers, variances, errors and cryptomattes. The picture is finished as the
+/// render would have been, once. Whole renders that differ in their --seed alone give their mean, weighed by
+/// iterations; the header says so.
+#[derive(clap::Args)]
+pub struct MergeArgs {
+    /// Shards of one render, or renders of other seeds
+    #[arg(required = true, value_name = "EXR")]
+    inputs: Vec<PathBuf>,
+    /// EXR to write
+    #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
+    output: PathBuf,
+    /// Do with the shards that are there: the picture so far
+    #[arg(long)]
+    partial: bool,
+    /// No finish at all [default: as the shards were asked]
+    #[arg(long, conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
+    no_combine: bool,
+    /// What makes the denoised picture: 'auto', 'oidn', 'own' or 'none' [default: as the shards were asked]
+    #[arg(long, value_enum, help_heading = "Finish")]
+    denoise: Option<Denoise>,
+    /// Network that combines five bandwidth levels before that [default: as the shards were asked]
+    #[arg(long, value_name = "compact|FILE.onnx", help_heading = "Expert")]
+    model: Option<String>,
+    /// Layers: 'all', 'comp', 'beauty' or names with commas between them [default: as the shards were asked]
+    #[arg(long, value_name = "LIST", help_heading = "Output")]
+    layers: Option<String>,
+    /// Names of channels [default: as the shards were asked]
+    #[arg(long, value_enum, help_heading = "Output")]
+    exr_naming: Option<Naming>,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads, help_heading = "Running")]
+    threads: usize,
+}
+
+/// Merges.
+pub fn run(args: &MergeArgs) -> Result<()> {
+    output::check(&args.output, "exr")?;
+    args.picture.check()?;
+    let shards = args.inputs.iter().map(|path| is_shard(path)).collect::<Result<Vec<bool>>>()?;
+    super::pool(args.threads)?.install(|| if shards.contains(&true) { join(args) } else { average(args) })
+}
+
+/// What was asked for under this name, where it can still be read so.
+fn asked<T: DeserializeOwned>(arguments: &Value, name: &str) -> Option<T> {
+    arguments.get(name).and_then(|value| serde_json::from_value(value.clone()).ok())
+}
+
+impl MergeArgs {
+    /// The finish that is asked for here, else there.
+    fn finish(&self, arguments: &Value) -> Option<finish::Order> {
+        let denoise = self.denoise.or_else(|| asked(arguments, "denoise")).unwrap_or_default();
+        let model = self.model.clone().or_else(|| asked(arguments, "model"));
+        let here = self.denoise.is_some() || self.model.is_some();
+        let none = self.no_combine || (!here && asked(arguments, "no-combine") == Some(true));
+        (!none).then(|| finish::Order { denoiser: denoise.into(), model })
+    }
+
+    fn naming(&self, arguments: &Value) -> Naming {
+        self.exr_naming.or_else(|| asked(arguments, "exr-naming")).unwrap_or(Naming::Plain)
+    }
+
+    /// Writes the picture.
+    fn write(&self, set: &LayerSet, attributes: &Attributes, naming: Naming, made_for: &Picture) -> Result<()> {
+        exr::write(&self.output, set, attributes, self.picture.exr_options(naming.into()))?;
+        self.picture.write_png(set, made_for)?;
+        tell_picture(&self.output, set);
+        Ok(())
+    }
+}
+
+/// Shards to the picture of their render.
+fn join(args: &MergeArgs) -> Result<()> {
+    let shards = Shards::open(&args.inputs, args.partial)?;
+    let arguments = shards.arguments();
+    let naming = args.naming(&arguments);
+    let order = merge::Order {
+        finish: args.finish(&arguments),
+        layers: args.layers.clone().or_else(|| asked(&arguments, "layers")).unwrap_or_else(|| "all".into()),
+        naming: naming.into(),
+        reproducible: asked(&arguments, "reproducible").unwrap_or(false),
+    };
+    let made_for = shards.facts().map(|facts| facts.made_for).unwrap_or_default();
+    shards.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));
+    let mut summary = None;
+    let delivery = Form::Auto.during("merging", || {
+        shards.merge(&order, |step| {
+            if let Step::Finishes(rendered, missing) = step {
+                tell_missing(missing);
+                summary = Some(Summary::of(rendered));
+            }
+        })
+    })?;
+    if let Some(summary) = summary {
+        summary.tell();
+        if let Some((name, account)) = &delivery.finished {
+            tell_finish(name, account, delivery.finishing, summary.told_of_finished());
+        }
+        summary.tell_rejected(&args.output);
+    }
+    args.write(&delivery.set, &delivery.attributes, naming, &made_for)?;
+    let output = args.output.display();
+    delivery.refusal.map_or(Ok(()), |error| {
+        Err(error.hint(format!("the unfinished picture is in {output}: 'caustique combine' finishes it")))
+    })
+}
+
+/// Renders of other seeds to their mean.
+fn average(args: &MergeArgs) -> Result<()> {
+    let mut seeds = Seeds::default();
+    let mut blender = false;
+    for path in &args.inputs {
+        let (mut set, attributes) = exr::read(path)?;
+        blender |= set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
+        take_plain_names(&mut set);
+        seeds.add(path, set, attributes)?;
+    }
+    let naming = args.exr_naming.unwrap_or(if blender { Naming::Blender } else { Naming::Plain });
+    let (mut set, mut attributes) = seeds.mean()?;
+    let mut header = attributes.object().unwrap_or_default();
+    let arguments = header["arguments"].clone();
+    if let Some(order) = args.finish(&arguments) {
+        let mut ready = finish::open(&order, None)?;
+        tell_missing(ready.missing.as_ref());
+        let account = ready.finish().apply(&mut set, |_| true)?;
+        header["combined"] = ready.facts(&account);
+    }
+    if let Some(layers) = &args.layers {
+        set = Selection::parse(layers)?.apply(set)?;
+    }
+    attributes.insert(exr::ATTRIBUTE, &header)?;
+    args.write(&set, &attributes, naming, &Picture::default())
+}

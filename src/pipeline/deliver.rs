@@ -1,0 +1,99 @@
+//! From pixels to what is written: layers, finished, and the header that tells of all.
+
+use super::Ready;
+use super::facts::Facts;
+use super::layers;
+use crate::error::{Error, Result};
+use crate::estimator::Pixel;
+use crate::film::{LayerSet, Naming, Selection};
+use crate::finish::{Account, reads};
+use crate::image::exr::{self, Attributes};
+use crate::render::{Clock, Rendered, TechniquePicture, cpu_seconds, peak_memory};
+use serde_json::{Map, Value, json};
+
+/// A picture with its layers and its header.
+pub struct Delivery {
+    /// The layers that were asked for, finished; unfinished with what a finish reads, where that failed.
+    pub set: LayerSet,
+    /// The header's attributes.
+    pub attributes: Attributes,
+    /// Pictures per sampling technique, if they were asked for.
+    pub techniques: Vec<TechniquePicture>,
+    /// What finished the picture, and what it did.
+    pub finished: Option<(String, Account)>,
+    /// Seconds from the last iteration to here.
+    pub finishing: f64,
+    /// Why the picture is not finished, though that was asked for.
+    pub refusal: Option<Error>,
+    /// What other shards are joined with, where this is one.
+    pub tail: Option<super::shard::Tail>,
+}
+
+/// How a picture is written, and what is told of it.
+pub(super) struct Writing<'a> {
+    pub facts: &'a Facts,
+    pub selection: &'a Selection,
+    pub naming: Naming,
+    pub plan: &'a Value,
+    pub arguments: &'a Value,
+    /// Leave clocks and the number of threads out of the header.
+    pub reproducible: bool,
+    /// What else the header is to tell.
+    pub more: Map<String, Value>,
+}
+
+/// Makes the layers that were asked for, and finishes them. Returns the pixels, if they are to be kept.
+pub(super) fn deliver(
+    writing: Writing<'_>,
+    mut rendered: Rendered,
+    ready: Option<&mut Ready>,
+    keep: bool,
+) -> Result<(Delivery, Vec<Pixel>)> {
+    let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
+    let mut header = rendered.account((!reproducible).then_some(rayon::current_num_threads()));
+    let (clock, cpu_start) = (Clock::start(), cpu_seconds());
+    let finishes = ready.is_some();
+    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
+    let mut set = rendered.layers(&facts.shape, wanted)?;
+    let mut attributes = layers::cryptomattes(&facts.named, &rendered, selection, naming, &mut set)?;
+    attributes.frame = Some(facts.frame);
+    let techniques = std::mem::take(&mut rendered.techniques);
+    // The pixels are most of the memory, and all that is wanted of them is in the layers.
+    let pixels = if keep { rendered.pixels } else { Vec::new() };
+    let applied = ready.map(|ready| {
+        let account = ready.finish().apply(&mut set, |name| selection.wants(name))?;
+        Ok((ready.name(), ready.facts(&account), account))
+    });
+    let finishing = clock.seconds();
+    let (finished, refusal) = match applied.transpose() {
+        Ok(finished) => (finished, None),
+        Err(error) => (None, Some(error)),
+    };
+    // A render that is still to be finished keeps what that reads, and a shard has what it can have.
+    if keep {
+        set.layers.retain(|layer| selection.wants(&layer.name));
+    } else if refusal.is_none() {
+        set = selection.apply(set)?;
+    }
+    header.insert("plan".into(), plan.clone());
+    header.insert("arguments".into(), arguments.clone());
+    header.insert("warnings".into(), json!(facts.warnings));
+    // That of the finished picture is in `combined`.
+    header.insert("error_of".into(), "Noisy".into());
+    header.insert("combined".into(), finished.as_ref().map_or(Value::Null, |(_, facts, _)| facts.clone()));
+    header.extend(more);
+    if !reproducible {
+        add_costs(&mut header, cpu_seconds() - cpu_start);
+    }
+    attributes.insert(exr::ATTRIBUTE, &header)?;
+    let finished = finished.map(|(name, _, account)| (name, account));
+    Ok((Delivery { set, attributes, techniques, finished, finishing, refusal, tail: None }, pixels))
+}
+
+/// What the layers and their finish have cost.
+fn add_costs(header: &mut Map<String, Value>, core_seconds: f64) {
+    if let Some(Value::Object(phases)) = header.get_mut("phases") {
+        phases.insert("layers_and_finish".into(), core_seconds.into());
+    }
+    header.insert("peak_memory".into(), peak_memory().into());
+}

@@ -1,0 +1,47 @@
+//! What a picture's file tells of its scene: plain data, so that it can be told without the scene.
+
+use super::layers;
+use crate::film::output::Shape;
+use crate::image::exr;
+use crate::render::Settings;
+use crate::render::output::shape;
+use crate::scene::description::Picture;
+use crate::scene::{Scene, View};
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+
+/// What layers, their names and the header need to know.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Facts {
+    /// What layers there are.
+    pub shape: Shape,
+    /// What cryptomattes name.
+    pub(super) named: layers::Named,
+    /// Where the picture is in the whole one, and its camera.
+    pub frame: exr::Frame,
+    /// What reading the scene has warned of.
+    pub warnings: Vec<String>,
+    /// The picture that the scene was made for.
+    pub made_for: Picture,
+}
+
+impl Facts {
+    /// Those of a render of a scene with these settings.
+    ///
+    /// # Errors
+    /// There is no such view.
+    pub(super) fn new(scene: &Scene, view: &View, settings: &Settings) -> Result<Facts> {
+        let whole = scene.whole_camera(view)?;
+        let (width, height) = whole.size();
+        let [x, y, ..] = scene.window(view, (width, height))?.unwrap_or_default();
+        let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
+        Ok(Facts {
+            shape: shape(settings, &scene.survey),
+            named: layers::Named::of(scene),
+            frame: exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc },
+            warnings: scene.warnings.clone(),
+            made_for: scene.picture,
+        })
+    }
+}

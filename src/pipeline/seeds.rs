@@ -1,0 +1,262 @@
+//! Renders that differ in their seed alone, averaged: their mean, weighed by iterations, and what that makes of
+//! variances and errors. The bandwidth that each has shrunk to stays, and so does the bias.
+
+use super::checkpoint::difference;
+use crate::error::{Error, Kind, Result};
+use crate::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
+use crate::film::{Layer, LayerSet};
+use crate::image::exr::{self, Attributes};
+use crate::math::Vec3;
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+/// Options that may be others.
+const FREE: [&str; 9] =
+    ["seed", "iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
+
+/// A file and what its header tells.
+struct Source {
+    path: PathBuf,
+    header: Value,
+    iterations: f64,
+}
+
+/// The sum so far.
+#[derive(Default)]
+pub struct Seeds {
+    sources: Vec<Source>,
+    sum: Option<(LayerSet, Attributes)>,
+    /// Ranks of cryptomattes of every pixel, by the beginning of their layers' names.
+    mattes: Vec<(String, Vec<PixelRanks>)>,
+}
+
+/// How a layer's values are put together, from those of one with its weight.
+#[derive(Clone, Copy, PartialEq)]
+enum Rule {
+    /// The mean.
+    Mean,
+    /// Of variances of the mean: independent ones add by squares of weights.
+    Variance,
+    /// Standard errors: their mean square.
+    Error,
+    /// Counts.
+    Sum,
+    /// What the first render has: distances, which the background has none of, and bandwidths.
+    First,
+    /// Ids and their shares.
+    Matte,
+}
+
+impl Rule {
+    fn of(name: &str) -> Rule {
+        match name.trim_end_matches(|c: char| c.is_ascii_digit()) {
+            "Variance" => Rule::Variance,
+            "Error" => Rule::Error,
+            "Rejected" => Rule::Sum,
+            "depth" | "Z" | "P" | "Radius" | "CausticRadius" | "VolumeRadius" => Rule::First,
+            "CryptoObject" | "CryptoMaterial" => Rule::Matte,
+            _ => Rule::Mean,
+        }
+    }
+
+    /// Adds the value of a render of so many iterations to the sum over others.
+    fn add(self, sum: f32, value: f32, iterations: f64) -> f32 {
+        let (total, value) = (f64::from(sum), f64::from(value));
+        let added = match self {
+            Rule::Mean => total + iterations * value,
+            Rule::Variance => total + iterations * iterations * value,
+            Rule::Error => total + iterations * value * value,
+            Rule::Sum => total + value,
+            Rule::First | Rule::Matte => total,
+        };
+        added as f32
+    }
+
+    /// From the sum over renders of so many iterations in all.
+    fn finish(self, sum: f32, iterations: f64) -> f32 {
+        let total = f64::from(sum);
+        let value = match self {
+            Rule::Mean | Rule::Error => total / iterations,
+            Rule::Variance => total / (iterations * iterations),
+            Rule::Sum | Rule::First | Rule::Matte => total,
+        };
+        value as f32
+    }
+}
+
+impl Seeds {
+    /// Adds a render; only layers that all have stay.
+    ///
+    /// # Errors
+    /// It is no render of ours, of another picture or option than the first, or of a seed that is there.
+    pub fn add(&mut self, path: &Path, mut set: LayerSet, attributes: Attributes) -> Result<()> {
+        let source = self.source(path, &set, &attributes)?;
+        let iterations = source.iterations;
+        self.add_mattes(&set, iterations);
+        for layer in &mut set.layers {
+            let rule = Rule::of(&layer.name);
+            let first = self.sum.as_ref().map(|(sum, _)| sum.get(&layer.name));
+            for plane in &mut layer.planes {
+                let before = match first {
+                    None => None,
+                    Some(layer) => match layer.and_then(|layer| layer.plane(&plane.component)) {
+                        Some(plane) => Some(plane),
+                        None => continue,
+                    },
+                };
+                for (index, value) in plane.values.iter_mut().enumerate() {
+                    *value = match (before, rule) {
+                        (Some(before), _) => rule.add(before.values[index], *value, iterations),
+                        (None, Rule::First | Rule::Matte) => *value,
+                        (None, _) => rule.add(0.0, *value, iterations),
+                    };
+                }
+            }
+        }
+        let attributes = match self.sum.take() {
+            Some((sum, attributes)) => {
+                set.layers.retain(|layer| sum.get(&layer.name).is_some());
+                attributes
+            }
+            None => attributes,
+        };
+        self.sum = Some((set, attributes));
+        self.sources.push(source);
+        Ok(())
+    }
+
+    fn source(&self, path: &Path, set: &LayerSet, attributes: &Attributes) -> Result<Source> {
+        let error = |cause: String| Error::new(Kind::Usage, path.display(), cause);
+        let header = attributes.object().filter(|header| header["iterations"].as_f64().is_some_and(|n| n > 0.0));
+        let Some(header) = header else {
+            return Err(error("is no render of caustique".into()).hint("merge renders of other seeds, or shards"));
+        };
+        if let Some(first) = self.sources.first() {
+            let name = first.path.display();
+            if let Some((key, there, here)) = difference(&first.header["arguments"], &header["arguments"], &FREE) {
+                let cause = format!("was rendered with another --{key} than {name}: {here} here, {there} there");
+                return Err(error(cause).hint("merge renders that differ in their --seed alone"));
+            }
+        }
+        if let Some((sum, _)) = &self.sum
+            && (sum.width, sum.height) != (set.width, set.height)
+        {
+            let cause = format!("is {} x {}, the others {} x {}", set.width, set.height, sum.width, sum.height);
+            return Err(error(cause).hint("merge renders of one picture"));
+        }
+        let same = |other: &&Source| other.header["seed"] == header["seed"] || header["seed"].is_null();
+        if let Some(other) = self.sources.iter().find(same) {
+            let cause =
+                format!("has the seed {} as {} has: the same noise twice", header["seed"], other.path.display());
+            return Err(error(cause).hint("render each with another --seed"));
+        }
+        let iterations = header["iterations"].as_f64().unwrap_or(0.0);
+        Ok(Source { path: path.into(), header, iterations })
+    }
+
+    fn add_mattes(&mut self, set: &LayerSet, iterations: f64) {
+        for kind in ["CryptoObject", "CryptoMaterial"] {
+            let layers: Vec<&Layer> =
+                (0..RANKS / 2).filter_map(|index| set.get(&format!("{kind}{index:02}"))).collect();
+            if layers.len() < RANKS / 2 {
+                continue;
+            }
+            if !self.mattes.iter().any(|(known, _)| known == kind) {
+                self.mattes.push((kind.into(), vec![PixelRanks::default(); set.pixels()]));
+            }
+            let Some((_, ranks)) = self.mattes.iter_mut().find(|(known, _)| known == kind) else { continue };
+            for layer in layers {
+                for pair in [["r", "g"], ["b", "a"]] {
+                    let [Some(ids), Some(shares)] = pair.map(|component| layer.plane(component)) else { continue };
+                    for ((ranks, id), share) in ranks.iter_mut().zip(&ids.values).zip(&shares.values) {
+                        if *share > 0.0 {
+                            ranks.add(Id(id.to_bits()), share * iterations as f32);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The mean, and the header that tells of it. What is told of the finish is that of one of the renders: the mean is
+    /// to be finished anew.
+    ///
+    /// # Errors
+    /// There is none, or its header cannot be written.
+    pub fn mean(self) -> Result<(LayerSet, Attributes)> {
+        let Seeds { sources, sum, mattes } = self;
+        let Some((mut set, mut attributes)) = sum else {
+            return Err(Error::new(Kind::Usage, "command line", "there is no render"));
+        };
+        let total: f64 = sources.iter().map(|source| source.iterations).sum();
+        for layer in &mut set.layers {
+            let rule = Rule::of(&layer.name);
+            let values = layer.planes.iter_mut().flat_map(|plane| plane.values.iter_mut());
+            values.for_each(|value| *value = rule.finish(*value, total));
+            if layer.name == "normal" {
+                normalise(layer);
+            }
+        }
+        let own = sources.first().and_then(|source| source.header["levels"].as_u64()).unwrap_or(1).max(2) - 1;
+        tell_errors(&mut set, &format!("Variance{own}"), sources.len());
+        for (kind, ranks) in mattes {
+            let named = Cryptomatte::new(kind, []);
+            for layer in named.layers(&ranks, total as f32) {
+                if let Some(own) = set.layers.iter_mut().find(|own| own.name == layer.name) {
+                    *own = layer;
+                }
+            }
+        }
+        attributes.insert(exr::ATTRIBUTE, &header(&sources, total))?;
+        Ok((set, attributes))
+    }
+}
+
+/// From mean squares of the errors of so many renders to the error of their mean. Variances fall with their number,
+/// what else there is in the squares is bias, and all have it.
+fn tell_errors(set: &mut LayerSet, variance: &str, renders: usize) {
+    let variance = set.get(variance).cloned();
+    let Some(error) = set.layers.iter_mut().find(|layer| layer.name == "Error") else { return };
+    for plane in &mut error.planes {
+        let variance = variance.as_ref().and_then(|layer| layer.plane(&plane.component));
+        for (index, value) in plane.values.iter_mut().enumerate() {
+            let variance = variance.map_or(*value / renders as f32, |plane| plane.values[index]);
+            *value = (variance + (*value - renders as f32 * variance).max(0.0)).sqrt();
+        }
+    }
+}
+
+/// To unit length, but for zero.
+fn normalise(layer: &mut Layer) {
+    let [x, y, z] = layer.planes.as_mut_slice() else { return };
+    for ((x, y), z) in x.values.iter_mut().zip(&mut y.values).zip(&mut z.values) {
+        let unit = Vec3::new(*x, *y, *z).normalize_or_zero();
+        [*x, *y, *z] = unit.to_array();
+    }
+}
+
+/// The first render's header, with what all have in common done.
+fn header(sources: &[Source], total: f64) -> Value {
+    let mut header: Map<String, Value> =
+        sources.first().and_then(|source| source.header.as_object().cloned()).unwrap_or_default();
+    let sum = |key: &str| sources.iter().map(|source| source.header[key].as_f64().unwrap_or(0.0)).sum::<f64>();
+    // Independent errors of renders, by squares of their weights.
+    let squares = sources.iter().map(|source| Some((source.iterations * source.header["error"].as_f64()?).powi(2)));
+    let error = squares.sum::<Option<f64>>().map(|squares| squares.sqrt() / total);
+    for (key, value) in [
+        ("iterations", json!(total as u64)),
+        ("light_paths", json!(sum("light_paths") as u64)),
+        ("rejected", json!(sum("rejected") as u64)),
+        ("seconds", json!(sum("seconds"))),
+        ("seed", Value::Null),
+        ("error", json!(error)),
+        ("history", json!([])),
+        ("combined", Value::Null),
+    ] {
+        header.insert(key.into(), value);
+    }
+    let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
+    let seeds: Vec<&Value> = sources.iter().map(|source| &source.header["seed"]).collect();
+    header.insert("merged".into(), json!({"renders": names, "seeds": seeds, "weights": "iterations"}));
+    header.into()
+}
