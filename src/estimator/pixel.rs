@@ -63,6 +63,8 @@ pub struct Pixel {
     others: Box<[Moments]>,
     /// Emission, direct, caustic, indirect light, light from media.
     parts: [Sum<DVec3>; PARTS],
+    /// Light of each group of lights, and its caustics.
+    groups: Box<[[Sum<DVec3>; 2]]>,
     /// Sums of G-buffers over all eye paths.
     albedo: DVec3,
     normal: DVec3,
@@ -111,6 +113,18 @@ impl Pixel {
         let others = if levels > 1 { levels } else { 0 };
         let others = vec![Moments::default(); others].into_boxed_slice();
         Pixel { grids: Grids::new(exponent), others, bandwidths, ..Pixel::default() }
+    }
+
+    /// With so many groups of lights.
+    #[must_use]
+    pub fn with_groups(self, groups: usize) -> Pixel {
+        Pixel { groups: vec![[Sum::default(); 2]; groups].into_boxed_slice(), ..self }
+    }
+
+    /// Bytes of a pixel with so many levels and groups.
+    pub fn bytes(levels: usize, groups: usize) -> usize {
+        let others = if levels > 1 { levels } else { 0 };
+        size_of::<Pixel>() + others * size_of::<Moments>() + groups * size_of::<[Sum<DVec3>; 2]>()
     }
 
     /// Number of levels.
@@ -171,6 +185,12 @@ impl Pixel {
         Parts { emission, direct, caustic, indirect, volume }
     }
 
+    /// Mean light of a group of lights, and of its caustics.
+    pub fn group(&self, group: usize) -> [DVec3; 2] {
+        let count = f64::from(self.iterations.max(1));
+        self.groups[group].map(|sum| sum.value() / count)
+    }
+
     /// Mean albedo of all eye paths.
     pub fn albedo(&self) -> DVec3 {
         if self.features == 0 { DVec3::ZERO } else { self.albedo / f64::from(self.features) }
@@ -229,7 +249,19 @@ impl Pixel {
 
     /// Adds iteration `pass` (from 1): level 1 from `independent`, the others from `correlated` (of one level less), or
     /// all from `independent` when they share one eye path.
+    #[inline]
     pub fn add(&mut self, pass: u64, independent: &EyeMeasure, correlated: Option<&EyeMeasure>) {
+        self.add_with_groups(pass, independent, correlated, &[]);
+    }
+
+    /// The same with the light of each group of lights, and its caustics, in the own image.
+    pub fn add_with_groups(
+        &mut self,
+        pass: u64,
+        independent: &EyeMeasure,
+        correlated: Option<&EyeMeasure>,
+        groups: &[[Rgb; 2]],
+    ) {
         let (count, own) = (self.levels(), self.own());
         let mut values = [Rgb::ZERO; MAX_LEVELS];
         for (level, value) in values[..count].iter_mut().enumerate() {
@@ -250,7 +282,8 @@ impl Pixel {
             measure.volume + measure.volume_photons[level],
         ];
         let difference = if count > 1 { self.difference_of(&values, independent, correlated) } else { Rgb::ZERO };
-        let all = || values[..count].iter().chain(&parts).chain(std::iter::once(&difference));
+        let all =
+            || values[..count].iter().chain(&parts).chain(std::iter::once(&difference)).chain(groups.as_flattened());
         if !all().all(|value| value.is_finite()) {
             self.rejected += 1;
             return;
@@ -272,6 +305,9 @@ impl Pixel {
         }
         for (sum, part) in self.parts.iter_mut().zip(parts) {
             sum.add(part.as_dvec3(), rounding[0]);
+        }
+        for (sum, light) in self.groups.as_flattened_mut().iter_mut().zip(groups.as_flattened()) {
+            sum.add(light.as_dvec3(), rounding[0]);
         }
         for measure in std::iter::once(independent).chain(correlated) {
             self.coverage.add(measure.first.map(|first| first.instance));
@@ -315,7 +351,10 @@ impl Pixel {
         }
         from.coarsen_squares(&mut self.own_squares, to);
         let quarters = self.quarters.iter_mut().map(|quarter| &mut quarter.sum);
-        quarters.chain(&mut self.parts).for_each(|sum| from.coarsen_values(sum, to));
+        quarters
+            .chain(&mut self.parts)
+            .chain(self.groups.as_flattened_mut())
+            .for_each(|sum| from.coarsen_values(sum, to));
         self.others.iter_mut().for_each(|moments| moments.coarsen(from, to));
     }
 
@@ -331,6 +370,8 @@ impl Pixel {
         }
         self.others.iter_mut().zip(&other.others).for_each(|(own, other)| own.join(other));
         self.parts.iter_mut().zip(&other.parts).for_each(|(own, other)| own.join(other));
+        let groups = self.groups.as_flattened_mut().iter_mut();
+        groups.zip(other.groups.as_flattened()).for_each(|(own, other)| own.join(other));
         self.albedo += other.albedo;
         self.normal += other.normal;
         self.depth.join(&other.depth);

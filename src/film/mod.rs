@@ -8,4 +8,4 @@ pub mod output;
 
 pub use ascii::ascii_json;
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};
-pub use naming::{Description, Naming, Selection, check, describe};
+pub use naming::{CAUSTIC, COMBINED, Description, LIGHT_GROUP, Naming, Selection, check, describe};

@@ -83,9 +83,23 @@ pub struct Description {
 
 const RADIANCE: &str = "W/(sr m^2)";
 
+/// Beginning of the names of layers of a group of lights.
+pub const LIGHT_GROUP: &str = "LightGroup_";
+/// Beginning of the names of layers of its caustics.
+pub const CAUSTIC: &str = "Caustic_";
+/// Beginning of the names of finished parts.
+pub const COMBINED: &str = "Combined";
+
 /// Components, unit and meaning of a layer of ours by its plain name; `None` for a name that is not ours.
 pub fn describe(name: &str) -> Option<Description> {
     let is = |components, unit, meaning| Some(Description { components, unit, meaning });
+    for (prefix, meaning) in
+        [(LIGHT_GROUP, "light of one group of lights"), (CAUSTIC, "caustics of one group of lights")]
+    {
+        if name.strip_prefix(COMBINED).unwrap_or(name).starts_with(prefix) {
+            return is("RGB", RADIANCE, meaning);
+        }
+    }
     match name.trim_end_matches(|c: char| c.is_ascii_digit()) {
         "" if name.is_empty() => is("RGBA", RADIANCE, "beauty: the finished image, or the estimator's own"),
         "Noisy" => is("RGB", RADIANCE, "the estimator's image without the finish"),
@@ -293,7 +307,9 @@ fn fault(layer: &Layer, component: &str, naming: Naming, length: usize) -> Optio
     if layer.planes.len() > 4 {
         return Some("Nuke holds at most four components a layer");
     }
-    let limit = if naming == Naming::Plain { 31 } else { 63 };
+    // Names of groups are the user's.
+    let group = layer.name.contains(LIGHT_GROUP) || layer.name.contains(CAUSTIC);
+    let limit = if naming == Naming::Plain && !group { 31 } else { 63 };
     (length > limit).then_some("the name is too long for other programs")
 }
 

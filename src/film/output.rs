@@ -13,6 +13,7 @@
 //!   `normal` are zero there.
 
 use super::layers::{Layer, LayerSet, Plane, Sample};
+use super::naming::{CAUSTIC, LIGHT_GROUP};
 use crate::error::Result;
 use crate::estimator::{BandwidthState, FAR, Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
@@ -27,7 +28,7 @@ pub const BACKGROUND: f32 = FAR;
 const BLOCK: usize = 2048;
 
 /// What the layers of a render depend on besides its pixels.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Shape {
     /// Bandwidth levels.
     pub levels: usize,
@@ -45,6 +46,8 @@ pub struct Shape {
     pub volume: bool,
     /// Whether photons are gathered in media.
     pub volume_photons: bool,
+    /// Names of groups of lights whose light is told apart.
+    pub groups: Vec<String>,
 }
 
 /// A pixel as the layers see it.
@@ -110,7 +113,7 @@ pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
 
 /// The layers that the pixels of a render give, cryptomattes excepted.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, kinds, environment, classes, volume, volume_photons } = *shape;
+    let Shape { levels, compared, own, kinds, environment, classes, volume, volume_photons, .. } = *shape;
     let mut columns = vec![
         Column {
             name: String::new(),
@@ -152,6 +155,12 @@ fn columns(shape: &Shape) -> Vec<Column> {
     for (part, name, get) in parts {
         if present(part) {
             columns.push(Column::rgb(name, move |p| mean(get(&p.parts()), p.iterations)));
+        }
+    }
+    for (group, name) in shape.groups.iter().enumerate() {
+        columns.push(Column::rgb(format!("{LIGHT_GROUP}{name}"), move |p| p.group(group)[0]));
+        if present(Part::Caustic) {
+            columns.push(Column::rgb(format!("{CAUSTIC}{name}"), move |p| p.group(group)[1]));
         }
     }
     columns.extend([
@@ -238,16 +247,19 @@ mod tests {
     use crate::math::Rgb;
     use crate::transport::{EyeMeasure, Features, FirstHit};
 
-    const SHAPE: Shape = Shape {
-        levels: 5,
-        compared: 5,
-        own: 3,
-        kinds: [true; 2],
-        environment: false,
-        classes: ClassSet::ALL,
-        volume: true,
-        volume_photons: true,
-    };
+    fn shape() -> Shape {
+        Shape {
+            levels: 5,
+            compared: 5,
+            own: 3,
+            kinds: [true; 2],
+            environment: false,
+            classes: ClassSet::ALL,
+            volume: true,
+            volume_photons: true,
+            groups: vec!["key".into()],
+        }
+    }
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
     fn measure(x: f32, hit: bool) -> EyeMeasure {
@@ -286,7 +298,7 @@ mod tests {
             let x = 0.1 + 0.37 * i as f32;
             pixel.add(i + 1, &measure(x, true), Some(&measure(1.1 * x, i != 0)));
         }
-        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         for c in ["R", "G", "B"] {
             let parts = ["Direct", "Indirect", "Caustic", "Emission", "Volume"];
             let sum: f32 = parts.iter().map(|part| value(&set, part, c)).sum();
@@ -309,16 +321,16 @@ mod tests {
         ] {
             assert!((value(&set, name, "X") - expected).abs() < 1e-6, "{name}");
         }
-        let focused = Shape { kinds: [false, true], ..SHAPE };
+        let focused = Shape { kinds: [false, true], ..shape() };
         let alone = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &focused, |_| true).expect("one pixel");
         assert!((value(&alone, "Radius5", "X") - 4.0 * surface).abs() < 1e-6 && alone.get("CausticRadius5").is_none());
         // One of ten eye paths missed: it counts for alpha and albedo, not for depth.
         assert_eq!(value(&set, "", "A"), 0.9);
         assert!((value(&set, "albedo", "R") - 0.45).abs() < 1e-6);
         assert_eq!((value(&set, "depth", "Z"), value(&set, "normal", "Y")), (4.0, 1.0));
-        let clear = Shape { volume: false, volume_photons: false, ..SHAPE };
-        assert_eq!(names(&clear).len() + 6, names(&SHAPE).len());
-        assert_eq!(names(&SHAPE), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
+        let clear = Shape { volume: false, volume_photons: false, ..shape() };
+        assert_eq!(names(&clear).len() + 6, names(&shape()).len());
+        assert_eq!(names(&shape()), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
     }
 
     /// Squares of what f32 can hold are not always f32.
@@ -330,7 +342,7 @@ mod tests {
             let measure = EyeMeasure { direct: light, ..EyeMeasure::default() };
             pixel.add(pass, &measure, Some(&measure));
         }
-        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         assert_eq!(value(&set, "Variance2", "R"), f32::MAX);
         // (1e20)^2 four times, over 4 and 3, and the root of it.
         assert!((value(&set, "Error", "R") / (1e20 / 3f32.sqrt()) - 1.0).abs() < 1e-3);
@@ -340,13 +352,13 @@ mod tests {
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
         let mut pixel = Pixel::new(5, 0, [1.0; 2]);
         pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)));
-        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &SHAPE, |_| true).expect("one pixel");
+        let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");
         assert!((value(&set, "Variance2", "R") / (mean * mean) - 1.0).abs() < 1e-6);
         assert_eq!(value(&set, "Error", "G"), value(&set, "Noisy", "G"));
         assert_eq!((value(&set, "depth", "Z"), value(&set, "Z", "Z")), (BACKGROUND, BACKGROUND));
         assert_eq!(value(&set, "", "A"), 0.0);
-        let lit = Shape { environment: true, ..SHAPE };
+        let lit = Shape { environment: true, ..shape() };
         let set = layers((1, 1), &[pixel], &bandwidths(), &lit, |name| name.is_empty()).expect("one pixel");
         assert_eq!((value(&set, "", "A"), set.layers.len()), (1.0, 1));
     }

@@ -23,7 +23,7 @@ pub use window::{Size, window};
 use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Kind, Result};
 use crate::estimator::QUARTERS;
-use crate::film::{Layer, LayerSet, Role};
+use crate::film::{CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Role};
 pub use bound::Clamped;
 use parts::Part;
 use rayon::prelude::*;
@@ -45,12 +45,13 @@ pub fn reads_for_error(name: &str) -> bool {
 
 /// Whether finishing reads a layer of ours at all: for the picture, its error, and its parts.
 pub fn reads(name: &str) -> bool {
-    reads_for_error(name) || PARTS.contains(&name)
+    reads_for_error(name) || finished_part(name).is_some()
 }
 
 /// The layer of a finished part; `None` for layers that are no parts.
 pub fn finished_part(name: &str) -> Option<String> {
-    PARTS.contains(&name).then(|| format!("Combined{name}"))
+    let part = PARTS.contains(&name) || name.starts_with(LIGHT_GROUP) || name.starts_with(CAUSTIC);
+    part.then(|| format!("{COMBINED}{name}"))
 }
 
 /// A picture with its noise and what guides a denoiser, row by row from the top.
@@ -253,8 +254,8 @@ impl Finish {
         Ok(Some(Told { half: squared.max(0.0).sqrt() }))
     }
 
-    /// The finished parts that are wanted, with their layers' names: all or none are worked out, for they sum to the
-    /// picture together.
+    /// The finished parts that are wanted, with their layers' names: all or none of those are worked out that sum to
+    /// the picture, or to its caustics, together.
     fn parts(
         &mut self,
         set: &LayerSet,
@@ -262,30 +263,77 @@ impl Finish {
         (picture, spread): (&[[f32; 3]], &[[f32; 3]]),
         wanted: impl Fn(&str) -> bool,
     ) -> Result<Vec<(String, Vec<[f32; 3]>)>> {
-        let there: Vec<(&str, Vec<[f32; 3]>)> =
-            PARTS.iter().filter_map(|name| set.get(name).map(|layer| (*name, layer.triples()))).collect();
-        let name = |part: &str| finished_part(part).unwrap_or_default();
-        if !there.iter().any(|(part, _)| wanted(&name(part))) {
-            return Ok(Vec::new());
+        let there = |names: &mut dyn Iterator<Item = &str>| -> Vec<(String, Vec<[f32; 3]>)> {
+            let layer = |name: &str| Some((finished_part(name)?, set.get(name)?.triples()));
+            names.filter_map(layer).collect()
+        };
+        let of_group =
+            |prefix| there(&mut set.layers.iter().map(|layer| &*layer.name).filter(|name| name.starts_with(prefix)));
+        let any = |parts: &[(String, Vec<[f32; 3]>)]| parts.iter().any(|(name, _)| wanted(name));
+        let (effects, groups, caustics) = (there(&mut PARTS.into_iter()), of_group(LIGHT_GROUP), of_group(CAUSTIC));
+        let mut finished = Vec::new();
+        if any(&effects) || any(&caustics) {
+            finished.extend(self.shared(effects, estimate, (picture, spread))?);
         }
-        // The guides and standard errors of the whole picture serve all parts.
+        if any(&groups) {
+            let groups = with_rest(groups, &estimate.mean);
+            finished.extend(self.shared(groups, estimate, (picture, spread))?);
+        }
+        let whole = finished_part("Caustic").and_then(|name| finished.iter().find(|(part, _)| *part == name)).cloned();
+        if let (true, Some((_, whole)), Some(mean)) = (any(&caustics), whole, set.get("Caustic")) {
+            let caustics = with_rest(caustics, &mean.triples());
+            finished.extend(self.shared(caustics, estimate, (&whole, spread))?);
+        }
+        finished.retain(|(name, _)| !name.is_empty() && wanted(name));
+        Ok(finished)
+    }
+
+    /// Parts finished so that they sum to `whole`, with their names. Guides and standard errors of the whole picture
+    /// serve all.
+    fn shared(
+        &mut self,
+        parts: Vec<(String, Vec<[f32; 3]>)>,
+        estimate: &Estimate,
+        (whole, spread): (&[[f32; 3]], &[[f32; 3]]),
+    ) -> Result<Vec<(String, Vec<[f32; 3]>)>> {
         let mut of_part = estimate.clone();
-        let (mut names, mut parts) = (Vec::with_capacity(there.len()), Vec::with_capacity(there.len()));
-        for (part, mean) in there {
+        let (mut names, mut estimates) = (Vec::with_capacity(parts.len()), Vec::with_capacity(parts.len()));
+        for (name, mean) in parts {
             let dark = mean.iter().flatten().all(|value| *value == 0.0);
             of_part.mean = mean;
             // Lamps that are seen have no noise but at their edges.
-            let denoised = if dark || part == "Emission" {
+            let denoised = if dark || name == "CombinedEmission" {
                 of_part.mean.clone()
             } else {
                 // Parts are looked at less closely than the picture.
                 self.denoiser.run(&of_part, Quality::Fast)?
             };
-            names.push(name(part));
-            parts.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
+            names.push(name);
+            estimates.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
         }
-        let finished = parts::shared(&parts, picture, spread, estimate.size);
-        let named = names.into_iter().zip(finished);
-        Ok(named.filter(|(name, _)| wanted(name)).collect())
+        let finished = parts::shared(&estimates, whole, spread, estimate.size);
+        Ok(names.into_iter().zip(finished).collect())
     }
+}
+
+/// The light of groups, and that of no group if there is any, without a name and first: what rounding leaves goes to the
+/// last.
+fn with_rest(mut groups: Vec<(String, Vec<[f32; 3]>)>, whole: &[[f32; 3]]) -> Vec<(String, Vec<[f32; 3]>)> {
+    /// Of all light, what rounding may leave.
+    const ROUNDING: f64 = 1e-5;
+    let rest: Vec<[f32; 3]> = whole
+        .iter()
+        .enumerate()
+        .map(|(index, whole)| {
+            std::array::from_fn(|c| {
+                let known: f32 = groups.iter().map(|(_, group)| group[index][c]).sum();
+                (whole[c] - known).max(0.0)
+            })
+        })
+        .collect();
+    let sum = |light: &[[f32; 3]]| light.iter().flatten().map(|value| f64::from(*value)).sum::<f64>();
+    if sum(&rest) > ROUNDING * sum(whole) {
+        groups.insert(0, (String::new(), rest));
+    }
+    groups
 }

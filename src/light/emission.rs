@@ -19,6 +19,8 @@ pub struct DirectSample {
     /// this direction, if it is at infinity) arrive, times the probability of choosing the light for emission over that
     /// of choosing it here.
     pub arrival_pdf_a: f32,
+    /// Index of the light.
+    pub light: u32,
 }
 
 /// Densities with which a light path starts, all that multiple importance sampling asks of a light.

@@ -6,6 +6,7 @@ use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
 use super::emitter::{Emitter, Sky, position_error, spot_falloff, spot_point, spot_solid_angle};
+use super::group::{Group, Groups};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::spread::Spread;
@@ -34,6 +35,7 @@ pub struct Lights {
     environment: Option<u32>,
     sky: Sky,
     targets: Targets,
+    groups: Groups,
 }
 
 /// What a triangle that does not look the same all over emits at a point; out of the way of lamps that do.
@@ -117,7 +119,47 @@ impl Lights {
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
         let choice = LightSampler::new(&emitters, &sky, floored);
-        Lights { emitters, choice, first, relative, suns, environment, sky, targets: Targets::new(shapes, materials) }
+        let (targets, groups) = (Targets::new(shapes, materials), Groups::default());
+        Lights { emitters, choice, first, relative, suns, environment, sky, targets, groups }
+    }
+
+    /// The same lights in groups.
+    #[must_use]
+    pub fn grouped(self, groups: Groups) -> Lights {
+        Lights { groups, ..self }
+    }
+
+    /// The groups that they are in.
+    pub fn groups(&self) -> &Groups {
+        &self.groups
+    }
+
+    /// The group of a light.
+    #[inline]
+    pub fn group(&self, light: u32) -> Group {
+        let Groups { names, instances, others, environment } = &self.groups;
+        if names.is_empty() {
+            return Group::NONE;
+        }
+        match &self.emitters[light as usize] {
+            Emitter::Triangle { instance, .. } => instances.get(*instance as usize).copied().unwrap_or_default(),
+            Emitter::Environment => *environment,
+            _ => {
+                // Others stand between the triangles and the environment.
+                let last = self.emitters.len() - usize::from(self.environment.is_some());
+                (light as usize + others.len())
+                    .checked_sub(last)
+                    .and_then(|at| others.get(at))
+                    .copied()
+                    .unwrap_or_default()
+            }
+        }
+    }
+
+    /// The group of a surface that glows.
+    #[inline]
+    pub fn group_of(&self, surface: &Surface) -> Group {
+        self.groups.instances.get(surface.instance as usize).copied().unwrap_or_default()
     }
 
     /// No light gives any light.
@@ -222,6 +264,7 @@ impl Lights {
         (index, probability): (usize, f32),
         u: Vec2,
     ) -> Option<DirectSample> {
+        let light = index as u32;
         match &self.emitters[index] {
             Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
                 // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near
@@ -248,14 +291,22 @@ impl Lights {
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 let arrival_pdf_a = Self::onto(cos.abs(), *two_sided, spread) / distance2;
                 let target = Some(spawn(at, ng, -wi, position_error(corners)));
-                Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a })
+                Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a, light })
             }
             Emitter::Point { p: at, intensity } => {
                 let to = *at - p;
                 let wi = to.try_normalize()?;
                 let radiance = *intensity / to.length_squared();
                 let arrival_pdf_a = 0.5 / TAU / to.length_squared();
-                Some(DirectSample { wi, target: Some(*at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
+                Some(DirectSample {
+                    wi,
+                    target: Some(*at),
+                    radiance,
+                    pdf_w: probability,
+                    delta: true,
+                    arrival_pdf_a,
+                    light,
+                })
             }
             Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge } => {
                 let at = spot_point(*middle, *radius, frame, u);
@@ -267,19 +318,27 @@ impl Lights {
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
                 let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
-                Some(DirectSample { wi, target: Some(at), radiance, pdf_w: probability, delta: true, arrival_pdf_a })
+                Some(DirectSample {
+                    wi,
+                    target: Some(at),
+                    radiance,
+                    pdf_w: probability,
+                    delta: true,
+                    arrival_pdf_a,
+                    light,
+                })
             }
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
                     let arrival_pdf_a = self.entry_pdf_a(p, wi);
-                    return Some(DirectSample { wi, target: None, radiance, pdf_w, delta: true, arrival_pdf_a });
+                    return Some(DirectSample { wi, target: None, radiance, pdf_w, delta: true, arrival_pdf_a, light });
                 }
                 let wi = frame.to_world(warp::cone_uniform(u, *one_minus_cos));
                 let radiance = Emitter::sun_radiance(*irradiance, *one_minus_cos);
                 let pdf_w = probability * warp::cone_uniform_pdf_w(*one_minus_cos);
                 let arrival_pdf_a = self.entry_pdf_a(p, wi);
-                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a })
+                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a, light })
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
@@ -292,6 +351,7 @@ impl Lights {
                     pdf_w,
                     delta: false,
                     arrival_pdf_a: self.entry_pdf_a(p, wi),
+                    light,
                 })
             }
         }
@@ -371,15 +431,15 @@ impl Lights {
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
-    /// Calls `each(radiance, direct, start)` for every light at infinity that a ray leaving the scene from a receiver
+    /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray leaving the scene from a receiver
     /// along `d` meets, with the densities of [`EmissionDensity`]; a camera's own ray does not meet those that are
     /// hidden from cameras.
     #[inline]
-    pub fn escape(&self, from: &Receiver, d: Vec3, camera: bool, mut each: impl FnMut(Rgb, f32, f32)) {
+    pub fn escape(&self, from: &Receiver, d: Vec3, camera: bool, mut each: impl FnMut(Rgb, f32, f32, Group)) {
         let Some(choice) = &self.choice else { return };
         let mut met = |radiance: Rgb, index: u32, pdf: f32| {
             let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
-            each(radiance, direct * pdf, start * pdf);
+            each(radiance, direct * pdf, start * pdf, self.group(index));
         };
         if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment)
             && !(camera && self.sky.hidden_from_camera)

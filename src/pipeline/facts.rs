@@ -37,7 +37,7 @@ impl Facts {
         let [x, y, ..] = scene.window(view, (width, height))?.unwrap_or_default();
         let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
         Ok(Facts {
-            shape: shape(settings, &scene.survey),
+            shape: shape(settings, scene),
             named: layers::Named::of(scene),
             frame: exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc },
             warnings: scene.warnings.clone(),

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use crate::film::output::Shape;
-use crate::film::{Layer, LayerSet, Naming, Selection, describe, output as film};
+use crate::film::{CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Naming, Selection, describe, output as film};
 use crate::finish::finished_part;
 use crate::image::exr::Attributes;
 use crate::render::Rendered;
@@ -44,6 +44,16 @@ pub fn selection(asked: &str, shape: &Shape, finished: bool) -> Result<Selection
     let layers = names(shape, finished).into_iter().map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;
     Ok(selection)
+}
+
+/// Groups of lights that are asked for by the names of their layers.
+pub fn groups_named(asked: &str) -> Vec<String> {
+    let group = |name: &str| {
+        let name = name.trim();
+        let name = name.strip_prefix(COMBINED).unwrap_or(name);
+        [LIGHT_GROUP, CAUSTIC].iter().find_map(|prefix| name.strip_prefix(prefix)).map(String::from)
+    };
+    asked.split(',').filter_map(group).collect()
 }
 
 /// Names of objects and materials, and whose each instance is.

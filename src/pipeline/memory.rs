@@ -20,7 +20,12 @@ const MERGED_BYTES: u64 = 5 * size_of::<MergePhoton>() as u64 + 32;
 const PER_TECHNIQUE: u64 = 24;
 
 /// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
-fn needed((width, height): (u32, u32), channels: usize, settings: &Settings, per_light_path: f64) -> u64 {
+fn needed(
+    (width, height): (u32, u32),
+    (channels, groups): (usize, usize),
+    settings: &Settings,
+    per_light_path: f64,
+) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
     let eye_paths = 1 + u64::from(settings.levels.two_paths);
     let (method, measure) = (settings.method, size_of::<EyeMeasure>() as u64);
@@ -47,7 +52,10 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings, per
     let apart = if method == Method::Cppm && settings.chi_squared.plus { 3 } else { 1 };
     // At most: a scene may have photons of one kind alone.
     let own = (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
-    let per_pixel = own + pictures + (size_of::<Pixel>() + channels * size_of::<f32>()) as u64 + eye_paths * per_path;
+    let per_pixel = own
+        + pictures
+        + (Pixel::bytes(settings.levels.count, groups) + channels * size_of::<f32>()) as u64
+        + eye_paths * per_path;
     pixels * per_pixel + photons
 }
 
@@ -57,7 +65,8 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings, per
 /// They need more memory than there is.
 pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize) -> Result<()> {
     let size = stage.1.size();
-    let needed = needed(size, channels, settings, photons_per_path(stage.0, stage.1, settings));
+    let groups = stage.0.lights.groups().names.len();
+    let needed = needed(size, (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
     let paths = if settings.method.counts_photons() {
         let each = if settings.method == Method::Pm { "" } else { " an iteration" };
         format!(" and {} light paths{each}", settings.photons)
@@ -78,7 +87,7 @@ pub fn check_all<'a>(stage: (&Scene, &Camera), all: impl Iterator<Item = &'a Set
     let (scene, camera) = stage;
     let (width, height) = camera.size();
     let each =
-        |settings| needed((width, height), COMBINED_CHANNELS, settings, photons_per_path(scene, camera, settings));
+        |settings| needed((width, height), (COMBINED_CHANNELS, 0), settings, photons_per_path(scene, camera, settings));
     refuse(all.map(each).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
 }
 
@@ -98,10 +107,10 @@ mod tests {
     fn the_largest_picture_does_not_overflow() {
         let none = Settings { photons: 0, ..Settings::default() };
         let some = Settings { photons: 1000, ..Settings::default() };
-        let one = needed((1, 1), 93, &none, 2.5);
+        let one = needed((1, 1), (93, 0), &none, 2.5);
         assert!(one > 93 * 4);
-        assert_eq!(needed((1 << 16, 1 << 16), 93, &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
+        assert_eq!(needed((1 << 16, 1 << 16), (93, 0), &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
         let merged = Settings { method: Method::Vcm, ..none };
-        assert!(needed((1, 1), 93, &merged, 2.5) > one);
+        assert!(needed((1, 1), (93, 0), &merged, 2.5) > one);
     }
 }

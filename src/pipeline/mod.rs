@@ -170,9 +170,10 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
             (choice, settings, way)
         }
     };
-    memory::check(stage, &settings, layers::channels(&shape(&settings, &scene.survey)))?;
+    memory::check(stage, &settings, layers::channels(&shape(&settings, &scene)))?;
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
     let mut plan = plan::plan(&asked, settings.method, stage, &removed);
+    plan.warnings.extend(ungrouped(&scene, &settings));
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     watch.begins(&plan, &settings);
     // As a plan of its own tells it.
@@ -244,6 +245,14 @@ impl Order<'_> {
     }
 }
 
+/// What is to be said where lights have groups and the method does not tell them apart.
+fn ungrouped(scene: &Scene, settings: &Settings) -> Option<String> {
+    let groups = scene.lights.groups().names.len();
+    let lost = groups > 0 && shape(settings, scene).groups.is_empty();
+    let name = settings.method.name();
+    lost.then(|| format!("its {groups} light groups have no layers: --method {name} does not tell lights apart (auto, path, light, bdpt, bpm and vcm do)"))
+}
+
 /// Settings of a way that auto has chosen before.
 fn of_way(auto: &Option<Auto<'_>>, way: Option<Strategy>, size: (u32, u32)) -> Option<Settings> {
     (auto.as_ref()?.allowed)(way?, size)
@@ -274,9 +283,9 @@ fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Set
     check::media(&order.scene.path, &order.settings, scene)?;
     check::bandwidth(&order.scene.path, &order.settings, scene)?;
     let settings = sized(order.settings.clone(), order.photons, camera.size());
-    let selection = layers::selection(&order.layers, &shape(&settings, &scene.survey), order.finish.is_some())?;
+    let selection = layers::selection(&order.layers, &shape(&settings, scene), order.finish.is_some())?;
     // Before anything is tried, which takes time.
-    memory::check((scene, camera), &settings, layers::channels(&shape(&settings, &scene.survey)))?;
+    memory::check((scene, camera), &settings, layers::channels(&shape(&settings, scene)))?;
     Ok((settings, selection))
 }
 
@@ -296,9 +305,8 @@ fn choose(
     let chosen = match auto {
         None => None,
         Some(mut auto) => {
-            let has_layers = |of: &Settings| {
-                layers::selection(&order.layers, &shape(of, &scene.survey), order.finish.is_some()).is_ok()
-            };
+            let has_layers =
+                |of: &Settings| layers::selection(&order.layers, &shape(of, scene), order.finish.is_some()).is_ok();
             let techniques = settings.techniques;
             let make = |way: Strategy| {
                 let able = !techniques || way.method.has_techniques();
@@ -328,7 +336,7 @@ fn readied(
     let mut ready = finish::open(asked, Some(settings.levels.count))?;
     watch.finishes(ready.missing.as_ref());
     let Some(time) = settings.time else { return Ok((Some(ready), settings)) };
-    let parts = film::names(&shape(&settings, &scene.survey));
+    let parts = film::names(&shape(&settings, scene));
     let wanted = parts.iter().filter_map(|name| finished_part(name)).filter(|part| selection.wants(part)).count();
     let (width, height) = camera.size();
     let left = time - ready.reserve(time, width as usize * height as usize, wanted)?;

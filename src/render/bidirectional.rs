@@ -9,11 +9,12 @@
 //! the other levels of the second. They share nothing but the photons, those of both light paths.
 
 use super::clock::cpu_seconds;
+use super::groups::TileGroups;
 use super::guiding::learnt;
 use super::iterate::{Iterate, Work};
 use super::result::Phases;
 use super::settings::Settings;
-use super::techniques::{TechniquePicture, TilePictures, Watch, collect};
+use super::techniques::{TechniquePicture, Watch, Watches, collect};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
@@ -61,8 +62,8 @@ pub struct Passes<'a> {
     measures: Vec<Vec<EyeMeasure>>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
-    /// Pictures per technique, by tile, if asked for.
-    techniques: Option<Vec<TilePictures>>,
+    /// What is looked at besides the picture, by tile, if anything is.
+    watches: Option<Vec<Watches>>,
     /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it
     /// covers.
     covered: f32,
@@ -97,7 +98,9 @@ impl<'a> Passes<'a> {
         let guide = guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);
         let tiles = Tiles::new(camera);
         let measures = pairs.iter().map(|_| vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS]).collect();
-        let techniques = settings.techniques.then(|| (0..tiles.count()).map(|_| TilePictures::new()).collect());
+        let (techniques, groups) = (settings.techniques, settings.light_groups(scene));
+        let watches = || (0..tiles.count()).map(|_| Watches::new(techniques, groups)).collect();
+        let watches = (techniques || groups > 0).then(watches);
         Passes {
             scene,
             camera,
@@ -109,7 +112,7 @@ impl<'a> Passes<'a> {
             tiles,
             measures,
             photons: None,
-            techniques,
+            watches,
             covered: 0.0,
         }
     }
@@ -153,7 +156,7 @@ impl<'a> Passes<'a> {
     fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Work {
         let Some(shared) = self.shared else {
             self.paths(i, watches);
-            self.add(i, pixels);
+            self.add(i, pixels, watches);
             return Work { light_paths: 0, photons: 0 };
         };
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
@@ -220,7 +223,7 @@ impl<'a> Passes<'a> {
             }
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
-        self.add(i, pixels);
+        self.add(i, pixels, watches);
         if shared.strategies.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons.concat())));
         }
@@ -246,14 +249,15 @@ impl<'a> Passes<'a> {
     }
 
     /// Adds the measures of iteration `i` to the pixels.
-    fn add(&self, i: u64, pixels: &mut [Pixel]) {
+    fn add<W: Watch>(&self, i: u64, pixels: &mut [Pixel], watches: &[W]) {
         let eye = self.eye();
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
             let slot = self.tiles.slot(index as u32);
             let measure = &self.measures[0][slot];
             pixel.see(i, || eye.seen(measure));
             let others = self.measures.get(1).map(|measures| &measures[slot]);
-            pixel.add(i, measure, others);
+            let groups = watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
+            pixel.add_with_groups(i, measure, others, groups);
         });
     }
 }
@@ -293,10 +297,11 @@ impl Iterate for Passes<'_> {
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let start = cpu_seconds();
-        let work = match self.techniques.take() {
-            Some(mut pictures) => {
-                let work = self.pass(i, pixels, &mut pictures);
-                self.techniques = Some(pictures);
+        let work = match self.watches.take() {
+            Some(mut watches) => {
+                watches.iter_mut().filter_map(|watches| watches.groups.as_mut()).for_each(TileGroups::clear);
+                let work = self.pass(i, pixels, &mut watches);
+                self.watches = Some(watches);
                 work
             }
             None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
@@ -309,6 +314,7 @@ impl Iterate for Passes<'_> {
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
         let (width, height) = self.camera.size();
         let pixels = width as usize * height as usize;
-        self.techniques.take().map_or(Vec::new(), |parts| collect(&self.tiles, pixels, parts, iterations))
+        let parts: Vec<_> = self.watches.take().into_iter().flatten().filter_map(|watches| watches.pictures).collect();
+        if parts.is_empty() { Vec::new() } else { collect(&self.tiles, pixels, parts, iterations) }
     }
 }

@@ -11,6 +11,7 @@ mod counting;
 mod drive;
 mod error_estimate;
 mod forecast;
+mod groups;
 mod guiding;
 mod iterate;
 mod joined;

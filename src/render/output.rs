@@ -6,11 +6,16 @@ use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::film::{LayerSet, output};
-use crate::scene::Survey;
+use crate::scene::{Scene, Survey};
 use serde_json::{Map, Value, json};
 
-/// Which layers a render with these settings has.
-pub fn shape(settings: &Settings, survey: &Survey) -> output::Shape {
+/// Which layers a render of a scene with these settings has.
+pub fn shape(settings: &Settings, scene: &Scene) -> output::Shape {
+    shape_of(settings, &scene.survey, &scene.lights.groups().names)
+}
+
+/// The same of any scene with such a survey and groups of lights.
+pub fn shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -> output::Shape {
     output::Shape {
         levels: settings.levels.count,
         compared: settings.compared_levels(),
@@ -20,6 +25,7 @@ pub fn shape(settings: &Settings, survey: &Survey) -> output::Shape {
         classes: settings.classes,
         volume: survey.scattering,
         volume_photons: survey.scattering && settings.method.gathers(),
+        groups: if settings.method.has_techniques() { groups.to_vec() } else { Vec::new() },
     }
 }
 

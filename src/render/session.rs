@@ -17,6 +17,7 @@ use crate::film::{self, LayerSet};
 use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::scene::Scene;
+use crate::stat::sum::MOST_TERMS;
 use crate::transport::Surroundings;
 
 /// What a render reads: scene, camera, settings, and what these say together.
@@ -146,9 +147,9 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Whether all iterations that were asked for are done.
+    /// Whether all iterations that were asked for are done, or as many as can be summed.
     pub fn finished(&self) -> bool {
-        self.stage.settings.iterations.is_some_and(|n| self.next >= n)
+        self.next >= self.stage.settings.iterations.unwrap_or(u64::MAX).min(MOST_TERMS)
     }
 
     /// Adds one iteration.
@@ -263,7 +264,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// None: its pixels are as many as its size says.
     pub fn layers(&self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let shape = output::shape(&self.stage.settings, &self.stage.scene.survey);
+        let shape = output::shape(&self.stage.settings, self.stage.scene);
         film::output::layers(self.stage.camera.size(), &self.pixels, &self.bandwidths(), &shape, wanted)
     }
 

@@ -195,7 +195,13 @@ impl Settings {
     /// What makes its pixels before the first iteration, from their largest initial bandwidths.
     pub(super) fn pixel(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> Pixel + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.exponent());
-        move |bandwidths| Pixel::new(levels, exponent, bandwidths)
+        let groups = self.light_groups(scene);
+        move |bandwidths| Pixel::new(levels, exponent, bandwidths).with_groups(groups)
+    }
+
+    /// Groups of lights whose light is told apart: by methods that know of each light where it comes from.
+    pub(super) fn light_groups(&self, scene: &Scene) -> usize {
+        if self.method.has_techniques() { scene.lights.groups().names.len() } else { 0 }
     }
 
     /// The number (from 1) of the last of so many iterations of this shard.

@@ -4,8 +4,11 @@
 //! Tiles keep their own pictures, so that they need no locks and sums do not depend on threads. Light that is not
 //! finite is left out.
 
+use super::groups::{OfGroup, TileGroups};
 use super::tiles::{TILE_PIXELS, Tiles};
+use crate::light::Group;
 use crate::math::Rgb;
+use crate::plan::PathClass;
 use crate::transport::{MergeLevels, Record, Splat, Technique};
 
 /// From this depth of a walk on, deeper ones share a picture: paths have no longest length.
@@ -68,7 +71,7 @@ fn technique(index: usize) -> Technique {
 }
 
 /// Watches the light that reaches the pixels of a tile. `()` costs nothing.
-pub(super) trait Watch: Record + Send {
+pub(super) trait Watch: Record + Send + Sync {
     /// What the eye path finds from now on belongs to the pixel at `slot`; only `level` of its levels counts, if any.
     #[inline]
     fn begin(&mut self, slot: usize, level: Option<usize>) {
@@ -80,17 +83,77 @@ pub(super) trait Watch: Record + Send {
     fn splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
         let _ = (slot, level, splat, levels);
     }
+
+    /// What the iteration has brought to the pixel at `slot`, by groups of lights.
+    #[inline]
+    fn groups(&self, slot: usize) -> &[OfGroup] {
+        let _ = slot;
+        &[]
+    }
 }
 
 impl Watch for () {}
+
+/// What is looked at besides the picture itself, in a tile.
+pub(super) struct Watches {
+    slot: usize,
+    level: Option<usize>,
+    pub pictures: Option<TilePictures>,
+    pub groups: Option<TileGroups>,
+}
+
+impl Watches {
+    /// A picture per technique, and light by so many groups, where they are wanted.
+    pub fn new(techniques: bool, groups: usize) -> Watches {
+        let groups = (groups > 0).then(|| TileGroups::new(groups));
+        Watches { slot: 0, level: None, pictures: techniques.then(TilePictures::new), groups }
+    }
+
+    fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, weight: f32) {
+        if let Some(pictures) = &mut self.pictures {
+            pictures.add(self.slot, technique, value, weight);
+        }
+        if let Some(groups) = &mut self.groups {
+            groups.add(self.slot, of, value * weight);
+        }
+    }
+}
+
+impl Record for Watches {
+    #[inline]
+    fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
+        if self.level == Some(level) {
+            self.add(technique, of, value, weight);
+        }
+    }
+}
+
+impl Watch for Watches {
+    #[inline]
+    fn begin(&mut self, slot: usize, level: Option<usize>) {
+        (self.slot, self.level) = (slot, level);
+    }
+
+    #[inline]
+    fn splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
+        self.begin(slot, level);
+        if let Some(level) = level {
+            let weight = splat.ratios.weight(levels.eta()[level]);
+            self.add(Technique::Camera { light: splat.light }, (splat.class, splat.group), splat.value, weight);
+        }
+    }
+
+    #[inline]
+    fn groups(&self, slot: usize) -> &[OfGroup] {
+        self.groups.as_ref().map_or(&[], |groups| groups.at(slot))
+    }
+}
 
 /// Weighted and unweighted sums over iterations, pixel by pixel.
 type Sums = [[Rgb; 2]; TILE_PIXELS];
 
 /// The pictures of a tile.
 pub(super) struct TilePictures {
-    slot: usize,
-    level: Option<usize>,
     pictures: Vec<Option<Box<Sums>>>,
 }
 
@@ -98,38 +161,17 @@ impl TilePictures {
     /// All black.
     pub fn new() -> TilePictures {
         let pictures = std::iter::repeat_with(|| None).take(MAX_TECHNIQUES).collect();
-        TilePictures { slot: 0, level: None, pictures }
+        TilePictures { pictures }
     }
 
-    fn add(&mut self, technique: Technique, value: Rgb, weight: f32) {
+    fn add(&mut self, slot: usize, technique: Technique, value: Rgb, weight: f32) {
         if value == Rgb::ZERO || !value.is_finite() || !weight.is_finite() {
             return;
         }
         let sums = self.pictures[index(technique)].get_or_insert_with(|| Box::new([[Rgb::ZERO; 2]; TILE_PIXELS]));
-        let [weighted, unweighted] = &mut sums[self.slot];
+        let [weighted, unweighted] = &mut sums[slot];
         *weighted += value * weight;
         *unweighted += value;
-    }
-}
-
-impl Record for TilePictures {
-    fn arrival(&mut self, technique: Technique, level: usize, value: Rgb, weight: f32) {
-        if self.level == Some(level) {
-            self.add(technique, value, weight);
-        }
-    }
-}
-
-impl Watch for TilePictures {
-    fn begin(&mut self, slot: usize, level: Option<usize>) {
-        (self.slot, self.level) = (slot, level);
-    }
-
-    fn splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
-        self.begin(slot, level);
-        if let Some(level) = level {
-            self.add(Technique::Camera { light: splat.light }, splat.value, splat.ratios.weight(levels.eta()[level]));
-        }
     }
 }
 

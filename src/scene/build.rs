@@ -4,7 +4,7 @@ use super::description::{self, Description, EnvironmentSource, PunctualKind, Pun
 use super::{Contacts, Nestings, Scene, Survey};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
-use crate::light::{Emitter, Environment, ImageEnvironment, Lights, Sky};
+use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUPS, Sky};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::trace::{CAMERA, MeetsTest, Tracer};
@@ -30,6 +30,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     }
     let first_lamp = description.objects.len() as u32;
     add_lamps(&mut description);
+    let groups = light_groups(&description, &mut warnings);
     let (low, high) = bounds(&description);
     let (center, radius) =
         if low.cmple(high).all() { ((low + high) * 0.5, (high - low).length() * 0.5) } else { (DVec3::ZERO, 1.0) };
@@ -47,9 +48,9 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         hidden_from_camera: description.environment_hidden_from_camera || description.picture.film_transparent,
         environment: environment(description.environment),
     };
-    let others = description.lights.iter().filter(|l| l.radius == 0.0 || l.kind != PunctualKind::Point);
+    let others = description.lights.iter().filter(|light| !light.is_sphere());
     let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
-    let lights = Lights::new(&shapes, &materials, others, sky);
+    let lights = Lights::new(&shapes, &materials, others, sky).grouped(groups);
     warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
@@ -85,6 +86,32 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         nestings: Nestings::default(),
         warnings,
     })
+}
+
+/// The groups that lights are in, by names in order of appearance.
+fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups {
+    let mut groups = Groups::default();
+    let mut of = |name: &Option<String>| {
+        let Some(name) = name.as_deref().filter(|name| !name.is_empty()) else { return Group::NONE };
+        groups.named(name).unwrap_or_else(|| {
+            let warning = format!("light group \"{name}\": it is left out: there are {MAX_GROUPS} others");
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+            }
+            Group::NONE
+        })
+    };
+    let glows = |placed: &&description::Placed| description.materials[placed.material as usize].emits();
+    let instances: Vec<Group> = description
+        .instances
+        .iter()
+        .map(|placed| Some(placed).filter(glows).map_or(Group::NONE, |placed| of(&placed.light_group)))
+        .collect();
+    let others: Vec<Group> =
+        description.lights.iter().filter(|light| !light.is_sphere()).map(|light| of(&light.light_group)).collect();
+    let environment =
+        description.environment.as_ref().map_or(Group::NONE, |_| of(&description.environment_light_group));
+    Groups { instances, others, environment, ..groups }
 }
 
 /// Adds what is to be said of lights that give none; `punctual` is the number of lamps that the file has.
@@ -146,7 +173,7 @@ pub(super) fn dress(
     let lamps = scene.lights.emitters().iter();
     let lamps = lamps.filter(|lamp| !matches!(lamp, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
-    let lights = Lights::new(&shapes, &materials, lamps.collect(), sky);
+    let lights = Lights::new(&shapes, &materials, lamps.collect(), sky).grouped(scene.lights.groups().clone());
     Ok(Scene {
         source: scene.source.clone(),
         origin: scene.origin,
@@ -331,7 +358,7 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
 /// Point lights with a radius become glowing spheres: they can be seen, reflected, and cast soft shadows.
 fn add_lamps(description: &mut Description) {
     for light in &description.lights {
-        if light.kind != PunctualKind::Point || light.radius <= 0.0 || light.intensity.max_element() <= 0.0 {
+        if !light.is_sphere() || light.intensity.max_element() <= 0.0 {
             continue;
         }
         let mesh = icosphere(light.radius, 3);
@@ -359,6 +386,7 @@ fn add_lamps(description: &mut Description) {
             material: description.materials.len() as u32,
             object: description.objects.len() as u32,
             hidden_from_camera: light.hidden_from_camera,
+            light_group: light.light_group.clone(),
             to_world: DAffine3::from_translation(light.to_world.translation),
         });
         description.objects.push(light.name.clone());

@@ -33,6 +33,8 @@ pub struct Description {
     pub environment: Option<EnvironmentDescription>,
     /// Cameras do not see it; it lights the scene all the same.
     pub environment_hidden_from_camera: bool,
+    /// Group of its light.
+    pub environment_light_group: Option<String>,
     /// The file's writer leaves light from infinity out, and nothing in the file says that there is none.
     pub world_unsaid: bool,
     /// The medium that fills the space.
@@ -56,6 +58,8 @@ pub struct Placed {
     pub object: u32,
     /// Cameras look through it; all else meets it.
     pub hidden_from_camera: bool,
+    /// Group of its light, if it glows.
+    pub light_group: Option<String>,
     /// Local to world, composed in f64.
     pub to_world: DAffine3,
 }
@@ -138,6 +142,15 @@ pub struct PunctualLight {
     pub radius: f32,
     /// Cameras do not see it.
     pub hidden_from_camera: bool,
+    /// Group of its light.
+    pub light_group: Option<String>,
+}
+
+impl PunctualLight {
+    /// Whether it becomes a glowing sphere.
+    pub fn is_sphere(&self) -> bool {
+        self.kind == PunctualKind::Point && self.radius > 0.0
+    }
 }
 
 /// Units of punctual lights that neither the file nor the user states.

@@ -1,7 +1,7 @@
 //! Sums that do not depend on the order of their terms, so that parts of a render made anywhere join to the bytes of the
 //! whole.
 //!
-//! Grids of multiples of a power of two lie [`STEP`] powers apart. A term is rounded to the coarsest grid that has room
+//! Grids of multiples of a power of two lie 30 powers apart. A term is rounded to the coarsest grid that has room
 //! for the largest one so far, and what is left to the next finer one. Both sums are exact, so that terms commute; what
 //! is cut off, less than 2^-30 of the largest term, is cut off each term alike wherever it stands. When a larger term
 //! calls for a coarser grid, the coarse sum becomes the fine one, which is what it would have been from the beginning
@@ -15,12 +15,12 @@ use std::ops::{Add, AddAssign, Sub};
 const STEP: i16 = 30;
 /// The finest coarse grid: below the squares of all that f32 can hold.
 const LOWEST: i16 = -330;
-/// Terms that can be added before a sum may lose a digit: a term has at most [`STEP`] digits of a grid, an f64 has 53.
+/// Terms that can be added before a sum may lose a digit: a term has at most 30 digits of a grid, an f64 has 53.
 pub const MOST_TERMS: u64 = 1 << (53 - STEP as u64);
 
 /// What can be summed.
 pub trait Term: Copy + Default + Add<Output = Self> + AddAssign + Sub<Output = Self> {
-    /// To the nearest multiple of what `magic` stands for, see [`magic`].
+    /// To the nearest multiple of a grid, which is the distance of neighbours of `magic` in f64.
     #[must_use]
     fn rounded(self, magic: f64) -> Self;
 }

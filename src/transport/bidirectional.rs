@@ -8,7 +8,9 @@
 use super::eye::Eye;
 use super::mis::{Eta, Merges, Ratios, one_merge};
 use super::surroundings::Surroundings;
+use crate::light::Group;
 use crate::math::{Rgb, Vec3};
+use crate::plan::PathClass;
 
 /// Which strategies take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,11 +133,11 @@ pub trait Record {
         let _ = (technique, value, from, ratios);
     }
 
-    /// `technique` brings light to the eye path's own pixel: on a `level`, `value` unweighted, with visibility and
-    /// kernel, and its weight. Depths count from 1, also for light from infinity.
+    /// `technique` brings light to the eye path's own pixel: of a class and of a group of lights, on a `level`, `value`
+    /// unweighted, with visibility and kernel, and its weight. Depths count from 1, also for light from infinity.
     #[inline]
-    fn arrival(&mut self, technique: Technique, level: usize, value: Rgb, weight: f32) {
-        let _ = (technique, level, value, weight);
+    fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
+        let _ = (technique, of, level, value, weight);
     }
 }
 

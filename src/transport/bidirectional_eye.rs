@@ -15,7 +15,7 @@ use super::trail::Trail;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
-use crate::light::{EmissionDensity, Receiver};
+use crate::light::{EmissionDensity, Group, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::photon::PhotonMap;
@@ -85,16 +85,16 @@ pub(super) fn look_in_medium(
 
 impl<R: Record> EyeWalk<'_, R> {
     #[inline]
-    fn add(&mut self, technique: Technique, class: PathClass, value: Rgb, ratios: Ratios) {
+    fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, ratios: Ratios) {
         for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
-            self.record.arrival(technique, level, value, ratios.weight(eta));
+            self.record.arrival(technique, of, level, value, ratios.weight(eta));
         }
-        add(self.measure, self.meets.levels, class, value, ratios);
+        add(self.measure, self.meets.levels, of.0, value, ratios);
     }
 
     /// The path has run into a light that sends it `value`.
     #[inline]
-    fn run_into(&mut self, value: Rgb, depth: u32, at: Vec3, density: &EmissionDensity) {
+    fn run_into(&mut self, (value, group): (Rgb, Group), depth: u32, at: Vec3, density: &EmissionDensity) {
         let class = self.trail.sight.lit(false);
         if !self.shared.eye.classes.has(class) {
             return;
@@ -107,7 +107,7 @@ impl<R: Record> EyeWalk<'_, R> {
             return;
         };
         self.record.contribution(Technique::Hit { eye: depth }, value, at, ratios);
-        self.add(Technique::Hit { eye: self.depth }, class, value, ratios);
+        self.add(Technique::Hit { eye: self.depth }, (class, group), value, ratios);
     }
 
     #[inline]
@@ -139,7 +139,7 @@ impl<R: Record> EyeWalk<'_, R> {
         let (technique, at) = (Technique::NextEvent { eye: vertex.depth() }, light.target.unwrap_or(light.wi));
         self.record.contribution(technique, value, at, ratios);
         for (class, share) in shares(vertex, seen, (light.wi, Transport::Radiance, f), classes).iter() {
-            self.add(technique, class, value * way.left * share, ratios);
+            self.add(technique, (class, scene.lights.group(light.light)), value * way.left * share, ratios);
         }
     }
 
@@ -194,7 +194,7 @@ impl<R: Record> EyeWalk<'_, R> {
         let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
         self.record.contribution(technique, value, light.p(), ratios);
         for (class, share) in shares().iter() {
-            self.add(technique, class, value * way.left * share, ratios);
+            self.add(technique, (class, light.group), value * way.left * share, ratios);
         }
     }
 
@@ -220,7 +220,8 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         if let Some((radiance, density)) =
             eye.scene.lights.emitted(&eye.scene.materials, &self.last, vertex.surface, vertex.wo)
         {
-            self.run_into(vertex.throughput * radiance, vertex.depth, vertex.surface.p, &density);
+            let group = eye.scene.lights.group_of(vertex.surface);
+            self.run_into((vertex.throughput * radiance, group), vertex.depth, vertex.surface.p, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
         if smooth && vertex.depth < eye.max_depth {
@@ -263,7 +264,12 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.depth = glow.depth;
         let cos = glow.wo.dot(glow.surface.ng).abs();
         self.mis = self.mis.arrive(glow.distance * glow.distance, cos).fly(glow.flight);
-        self.run_into(glow.throughput * radiance, glow.depth, glow.surface.p, &density);
+        self.run_into(
+            (glow.throughput * radiance, lights.group_of(&glow.surface)),
+            glow.depth,
+            glow.surface.p,
+            &density,
+        );
         (self.mis, self.trail, self.depth) = before;
     }
 
@@ -305,9 +311,9 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.mis = self.mis.fly(flight);
         let lights = &self.shared.eye.scene.lights;
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
-        lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start| {
+        lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start, group| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
-            self.run_into(throughput * radiance, 0, direction, &density);
+            self.run_into((throughput * radiance, group), 0, direction, &density);
         });
     }
 }

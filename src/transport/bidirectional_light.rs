@@ -12,7 +12,7 @@ use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::walk;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
-use crate::light::Receiver;
+use crate::light::{Group, Receiver};
 use crate::math::{Rgb, is_lit};
 use crate::medium::Flight;
 use crate::plan::{Event, EyeSuffix, LightPrefix, Part, PathClass};
@@ -25,8 +25,10 @@ pub struct Splat {
     pub pixel: u32,
     /// Depth of the light path's vertex.
     pub light: u32,
-    /// What it is.
+    /// What it is, and of what lights.
     pub class: PathClass,
+    /// See `class`.
+    pub group: Group,
     /// Radiance of the pixel, unweighted.
     pub value: Rgb,
     /// What its weight comes from.
@@ -72,8 +74,9 @@ pub struct Deposits {
 struct LightWalk<'a, 's, R> {
     shared: &'a Bidirectional<'a>,
     mis: MisState,
-    /// Where it comes from.
+    /// Where it comes from, and of what group that is.
     light: u32,
+    group: Group,
     infinite: bool,
     beam: LightPrefix,
     /// Lobes of the last vertex; `None` in a medium.
@@ -130,9 +133,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if value.max_element() > 0.0 {
             let Some(((x, y), weight)) = eye.camera.pixel(sample.film, || draws.two(Purpose::Splat)) else { return };
             let value = value * weight;
-            let (pixel, light) = (y * eye.camera.size().0 + x, vertex.depth());
+            let (pixel, light, group) = (y * eye.camera.size().0 + x, vertex.depth(), self.group);
             let shares = shares(vertex, seen, (sample.wi, Transport::Importance, f), eye.classes);
-            let splat = |(class, share)| Splat { pixel, light, class, value: value * share, ratios };
+            let splat = |(class, share)| Splat { pixel, light, class, group, value: value * share, ratios };
             self.left.splats.extend(shares.iter().map(splat));
         }
     }
@@ -155,7 +158,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         // of materials.
         if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
             let flux = vertex.throughput / *merged_paths;
-            self.left.photons.push(MergePhoton::new(vertex, flux, self.beam, &self.mis));
+            self.left.photons.push(MergePhoton::new(vertex, flux, (self.beam, self.group), &self.mis));
         }
         if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
@@ -167,6 +170,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     mis: self.mis,
                     beam: self.beam,
                     dispersed: vertex.wavelength.is_some(),
+                    group: self.group,
                 });
             }
             if strategies.camera && !eye.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera {
@@ -191,6 +195,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     mis: self.mis,
                     beam: self.beam,
                     dispersed: vertex.wavelength.is_some(),
+                    group: self.group,
                 });
             }
             if strategies.camera {
@@ -249,6 +254,7 @@ impl<'s> Bidirectional<'s> {
             shared: self,
             mis: MisState::light(&emitted.density),
             light: emitted.light,
+            group: eye.scene.lights.group(emitted.light),
             infinite: emitted.density.infinite,
             beam: LightPrefix::start(emitted.delta),
             lobes: None,

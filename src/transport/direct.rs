@@ -94,7 +94,7 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
             }
         }
         End::Escaped(left) => {
-            let add = |radiance, pdf, _| light += radiance * left * weight(pdf);
+            let add = |radiance, pdf, _, _| light += radiance * left * weight(pdf);
             scene.lights.escape(&vertex.receiver(), sample.wi, false, add);
         }
         End::Medium(_) | End::Lost => {}

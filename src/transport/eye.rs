@@ -464,7 +464,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let scene = self.scene;
         self.sight = self.arrived(scattered);
         let last = self.last;
-        scene.lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start| {
+        scene.lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start, _| {
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
             let density =
                 || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });

@@ -3,6 +3,7 @@
 use super::mis::MisState;
 use crate::bsdf::{LobeSet, Shading, Transport};
 use crate::geometry::Surface;
+use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::plan::LightPrefix;
@@ -36,6 +37,8 @@ pub struct LightVertex<'s> {
     pub beam: LightPrefix,
     /// The path has taken a wavelength, the one its eye path takes if it does.
     pub dispersed: bool,
+    /// Of its light.
+    pub group: Group,
 }
 
 impl LightVertex<'_> {

@@ -14,7 +14,7 @@ use super::trail::Trail;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
-use crate::light::Receiver;
+use crate::light::{Group, Receiver};
 use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::plan::{ClassSet, LightPrefix, Part, PathClass};
@@ -66,17 +66,18 @@ impl<R: Record> PathTracer<'_, R> {
         let technique = Technique::NextEvent { eye: self.depth };
         let shares = shares(vertex, (self.trail.sight, beam), (light.wi, Transport::Radiance, f), self.classes);
         for (class, share) in shares.iter() {
-            self.add(technique, class, value * share, weight);
+            self.add(technique, (class, scene.lights.group(light.light)), value * share, weight);
         }
     }
 
     /// Adds weighted light.
-    fn add(&mut self, technique: Technique, class: PathClass, light: Rgb, weight: f32) {
+    fn add(&mut self, technique: Technique, of: (PathClass, Group), light: Rgb, weight: f32) {
+        let (class, _) = of;
         if !self.classes.has(class) {
             return;
         }
         if weight > 0.0 {
-            self.record.arrival(technique, 0, light / weight, weight);
+            self.record.arrival(technique, of, 0, light / weight, weight);
         }
         let measure = &mut *self.measure;
         *match class.part() {
@@ -105,9 +106,9 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface) {
-            let class = self.trail.sight.lit(false);
+            let of = (self.trail.sight.lit(false), self.scene.lights.group_of(vertex.surface));
             let weight = Self::weight(scattered, pdf);
-            self.add(Technique::Hit { eye: self.depth }, class, vertex.throughput * radiance * weight, weight);
+            self.add(Technique::Hit { eye: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
         self.last = vertex.receiver();
         self.lit(vertex);
@@ -123,7 +124,8 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, &glow.surface) {
             let weight = Self::weight(scattered, pdf);
             let light = glow.throughput * radiance * weight;
-            self.add(Technique::Hit { eye: glow.depth }, trail.sight.lit(false), light, weight);
+            let of = (trail.sight.lit(false), self.scene.lights.group_of(&glow.surface));
+            self.add(Technique::Hit { eye: glow.depth }, of, light, weight);
         }
     }
 
@@ -143,9 +145,9 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         let class = self.trail.sight.lit(false);
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
         let last = self.last;
-        scene.lights.escape(&last, direction, scattered.is_none(), |light, pdf, _| {
+        scene.lights.escape(&last, direction, scattered.is_none(), |light, pdf, _, group| {
             let weight = Self::weight(scattered, pdf);
-            self.add(technique, class, throughput * light * weight, weight);
+            self.add(technique, (class, group), throughput * light * weight, weight);
         });
     }
 }

@@ -5,6 +5,7 @@ use super::mis::{self, Merges, MisState};
 use super::shares::Merged;
 use super::vertex::Vertex;
 use crate::bsdf::{LobeSet, Transport};
+use crate::light::Group;
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap, same_surface};
 use crate::plan::{ClassSet, EyeSuffix, LightPrefix, PathClass};
@@ -32,6 +33,8 @@ pub struct MergePhoton {
     pub beam: LightPrefix,
     /// Of the light path's wavelength.
     band: Band,
+    /// Of its light.
+    group: Group,
 }
 
 impl Located for MergePhoton {
@@ -54,7 +57,7 @@ impl Located for MergePhoton {
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
-    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, beam: LightPrefix, mis: &MisState) -> MergePhoton {
+    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, (beam, group): (LightPrefix, Group), mis: &MisState) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
@@ -66,6 +69,7 @@ impl MergePhoton {
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             beam,
             band: Band::of(vertex.wavelength.as_ref()),
+            group,
         }
     }
 
@@ -117,7 +121,13 @@ pub(super) fn merge_photons<R: Record>(
             if distance2 < radius2 {
                 let weight = ratios.merge_weight(eta);
                 for (class, share) in shares.iter() {
-                    record.arrival(technique, level, value * share * (FRAC_1_PI / radius2), weight);
+                    record.arrival(
+                        technique,
+                        (class, photon.group),
+                        level,
+                        value * share * (FRAC_1_PI / radius2),
+                        weight,
+                    );
                     add(class, level, value * share * (weight * FRAC_1_PI / radius2));
                 }
             }

@@ -85,7 +85,7 @@ fn combine(scene: &Scene, camera: &Camera) -> f64 {
     let model = Model::open("compact").unwrap_or_else(|e| panic!("{e}"));
     let mut combiner = Combiner::new(&model, &runtime).unwrap_or_else(|e| panic!("{e}"));
     let start = cpu_seconds();
-    let set = rendered.layers(&shape(&settings, &scene.survey), |_| true).unwrap_or_else(|e| panic!("{e}"));
+    let set = rendered.layers(&shape(&settings, scene), |_| true).unwrap_or_else(|e| panic!("{e}"));
     drop(rendered);
     let stack = LevelStack::of(&set).unwrap_or_else(|e| panic!("{e}"));
     let combined = combiner.run(&stack).unwrap_or_else(|e| panic!("{e}"));

@@ -336,7 +336,7 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     assert!(help.stdout.contains("--model <compact|FILE.onnx>"));
     let commands = folder.run("--help").stdout;
     for (command, listed) in
-        [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", true), ("merge", false)]
+        [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", true), ("merge", true)]
     {
         assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
     }

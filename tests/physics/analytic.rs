@@ -77,6 +77,7 @@ fn sun(intensity: f32) -> PunctualLight {
         kind: PunctualKind::Sun { angle: 0.0 },
         radius: 0.0,
         hidden_from_camera: false,
+        light_group: None,
     }
 }
 

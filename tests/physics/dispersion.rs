@@ -326,6 +326,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
             kind: PunctualKind::Sun { angle: 0.0 },
             radius: 0.0,
             hidden_from_camera: false,
+            light_group: None,
         });
         let scene = build(description);
         assert_eq!(scene.survey.dispersion, abbe < 1e6);
@@ -442,6 +443,7 @@ fn sun(direction: DVec3, angle_deg: f32, irradiance: f32) -> PunctualLight {
         kind: PunctualKind::Sun { angle: angle_deg.to_radians() },
         radius: 0.0,
         hidden_from_camera: false,
+        light_group: None,
     }
 }
 

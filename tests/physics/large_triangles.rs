@@ -30,6 +30,7 @@ fn extremes(half: f32, method: Method, turn: DQuat) -> (f64, f64) {
         kind: PunctualKind::Sun { angle: 0.0 },
         radius: 0.0,
         hidden_from_camera: false,
+        light_group: None,
     });
     let at = turn * DVec3::new(0.013, 0.0, -0.007);
     description.cameras.push(look_at(at + normal * 0.4 + turn * DVec3::new(0.1, 0.0, 0.05), at, 50.0));

@@ -16,6 +16,7 @@ mod glints;
 mod guide;
 mod lamps;
 mod large_triangles;
+mod light_groups;
 mod long_paths;
 mod many_lights;
 mod material;

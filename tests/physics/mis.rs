@@ -514,7 +514,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let direction = eye_notes.escaped.expect("an escape");
                     let met = from_eye[from_eye.len() - 1];
                     whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
-                    scene.lights.escape(&met.receiver(), direction, false, |_, direct, start| {
+                    scene.lights.escape(&met.receiver(), direction, false, |_, direct, start, _| {
                         (whole.light.direct, whole.light.start) = (direct, start);
                     });
                     whole.segment(1.0, None);

@@ -43,6 +43,7 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
         material: description.materials.len() as u32,
         object: description.objects.len() as u32,
         hidden_from_camera: false,
+        light_group: None,
         to_world,
     });
     description.objects.push(name.into());
@@ -128,6 +129,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         kind: PunctualKind::Point,
         radius: 0.0,
         hidden_from_camera: false,
+        light_group: None,
     }
 }
 

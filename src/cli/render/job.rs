@@ -16,6 +16,7 @@ use caustique::render::{
     self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
 };
 use caustique::scene::{Crop, MAX_SIZE, View};
+use caustique::stat::sum::MOST_TERMS;
 use caustique::transport::MAX_LEVELS;
 use clap::ValueEnum;
 use serde::Serialize;
@@ -109,7 +110,7 @@ pub struct Job {
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop after so many iterations [default: 64, if nothing else says when to stop]
-    #[arg(long, value_name = "N", value_parser = whole(1_u64..=2_000_000_000), help_heading = "When to stop")]
+    #[arg(long, value_name = "N", value_parser = whole(1_u64..=MOST_TERMS), help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Stop when the estimated relative error (the root of relMSE) is this small; 0.05 is 5 %
     #[arg(long, value_name = "E", value_parser = relative_error, help_heading = "When to stop")]

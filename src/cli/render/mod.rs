@@ -22,7 +22,7 @@ use caustique::pipeline::shard::Tail;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
 use caustique::render::auto::Choice;
-use caustique::render::output::shape;
+use caustique::render::output::shape_of;
 use caustique::render::{Progress, Rendered, Settings};
 use caustique::scene::description::Picture;
 use caustique::scene::{Scene, Survey};
@@ -36,7 +36,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let settings = args.settings()?;
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
-    layers::selection(&args.layers, &shape(&settings, &anything), !args.job.no_combine)?;
+    let groups = layers::groups_named(&args.layers);
+    layers::selection(&args.layers, &shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;

@@ -48,6 +48,7 @@ pub(super) struct EnvironmentExtras {
     pub(super) rotation_deg: f32,
     pub(super) strength: Option<f32>,
     pub(super) visible: Visible,
+    pub(super) light_group: Option<String>,
 }
 
 /// Units of punctual lights.
@@ -96,6 +97,7 @@ pub(super) struct MaterialExtras {
 #[serde(default)]
 pub(super) struct ObjectExtras {
     pub(super) visible: Visible,
+    pub(super) light_group: Option<String>,
 }
 
 /// Extras of a camera, or of its node.
@@ -115,6 +117,7 @@ pub(super) struct LightExtras {
     pub(super) angle_deg: Option<f32>,
     pub(super) blend: Option<f32>,
     pub(super) visible: Option<Visible>,
+    pub(super) light_group: Option<String>,
 }
 
 /// Keys of each kind; those of nested objects follow a dot.
@@ -126,6 +129,7 @@ pub(super) const SCENE: &[&str] = &[
     "environment.strength",
     "environment.visible",
     "environment.visible.camera",
+    "environment.light_group",
     "medium",
     "medium.sigma_a",
     "medium.sigma_s",
@@ -141,9 +145,18 @@ pub(super) const SCENE: &[&str] = &[
 pub(super) const MATERIAL: &[&str] =
     &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "null_bsdf", "spread_deg"];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
-pub(super) const LIGHT: &[&str] = &["radius", "angle_deg", "blend", "visible", "visible.camera"];
-pub(super) const NODE: &[&str] =
-    &["aperture_radius", "focus_distance", "shift", "radius", "angle_deg", "blend", "visible", "visible.camera"];
+pub(super) const LIGHT: &[&str] = &["radius", "angle_deg", "blend", "visible", "visible.camera", "light_group"];
+pub(super) const NODE: &[&str] = &[
+    "aperture_radius",
+    "focus_distance",
+    "shift",
+    "radius",
+    "angle_deg",
+    "blend",
+    "visible",
+    "visible.camera",
+    "light_group",
+];
 
 /// `extras.caustique` of a part of the document; the default if there is none.
 pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> Result<T> {

@@ -131,7 +131,8 @@ pub(super) fn light(
     }
     let hidden_from_camera = on_node.visible.or(on_light.visible).is_some_and(|visible| !visible.camera);
     let radius = if sun { 0.0 } else { radius };
-    Ok(PunctualLight { name, to_world, intensity, kind, radius, hidden_from_camera })
+    let light_group = on_node.light_group.or(on_light.light_group);
+    Ok(PunctualLight { name, to_world, intensity, kind, radius, hidden_from_camera, light_group })
 }
 
 /// `blend`: the share of the cone's 1 - cos that its edge takes, which then is Blender's.

@@ -193,6 +193,7 @@ impl Reader<'_> {
             }
         };
         self.out.environment_hidden_from_camera = !said.visible.camera;
+        self.out.environment_light_group.clone_from(&said.light_group);
         self.out.environment = Some(EnvironmentDescription { source, rotation_deg: said.rotation_deg, strength });
         Ok(())
     }
@@ -257,8 +258,8 @@ impl Reader<'_> {
             let mesh_name = get(&document.meshes, mesh, "mesh").map_err(|e| e.within(place))?.name.clone();
             let known = |name: &String| !name.is_empty();
             let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
-            let hidden_from_camera = !extras::read::<ObjectExtras>(raw, place)?.visible.camera;
-            self.place(mesh, name, self.copies(raw, place)?, to_world, hidden_from_camera, place)?;
+            let said = extras::read::<ObjectExtras>(raw, place)?;
+            self.place(mesh, name, self.copies(raw, place)?, to_world, &said, place)?;
         }
         Ok(())
     }
@@ -270,7 +271,7 @@ impl Reader<'_> {
         name: String,
         copies: Vec<DAffine3>,
         to_world: DAffine3,
-        hidden_from_camera: bool,
+        said: &ObjectExtras,
         place: &str,
     ) -> Result<()> {
         let parts = self.parts(mesh)?;
@@ -289,8 +290,10 @@ impl Reader<'_> {
             }
             for &Part { mesh, material } in &parts {
                 self.check_reach(mesh, &to_world, place)?;
-                let name = name.clone();
-                self.out.instances.push(Placed { name, mesh, material, object, hidden_from_camera, to_world });
+                let (name, light_group) = (name.clone(), said.light_group.clone());
+                let hidden_from_camera = !said.visible.camera;
+                let placed = Placed { name, mesh, material, object, hidden_from_camera, light_group, to_world };
+                self.out.instances.push(placed);
             }
         }
         if flat > 0 {

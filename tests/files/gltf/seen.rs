@@ -122,3 +122,24 @@ fn windows() {
         assert_eq!(window(Crop::Pixels(wrong)), None, "{wrong:?}");
     }
 }
+
+#[test]
+fn groups_of_lights() {
+    let mut file = Glb::new();
+    file.json["scenes"][0]["extras"] = caustique(json!({"environment": {"color": [1, 1, 1], "light_group": "sky"}}));
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point"}, {"type": "directional"}]}});
+    let light = |light: usize, keys: Value| json!({"extensions": {"KHR_lights_punctual": {"light": light}}, "extras": caustique(keys)});
+    file.node(light(0, json!({"light_group": "key light"})));
+    file.node(light(1, json!({"light_groop": "sky"})));
+    let description = read(&file);
+    let groups: Vec<_> = description.lights.iter().map(|light| light.light_group.as_deref()).collect();
+    assert_eq!((groups, description.environment_light_group.as_deref()), (vec![Some("key light"), None], Some("sky")));
+    assert!(
+        description
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("no key \"light_groop\" (did you mean \"light_group\"?)"))
+    );
+    let scene = caustique::scene::Scene::build(description, 1).expect("a scene");
+    assert_eq!(scene.lights.groups().names, ["key_light", "sky"]);
+}

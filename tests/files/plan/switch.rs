@@ -23,7 +23,7 @@ fn picture(description: Description) -> String {
 fn picture_of(scene: &Scene, camera: &Camera) -> String {
     let settings = Settings { iterations: Some(2), photons: 500, ..Settings::default() };
     let rendered = render(scene, camera, &settings, |_, _| Control::Continue);
-    let layers = rendered.layers(&shape(&rendered.settings, &scene.survey), |_| true).expect("there are layers");
+    let layers = rendered.layers(&shape(&rendered.settings, scene), |_| true).expect("there are layers");
     layers
         .layers
         .iter()

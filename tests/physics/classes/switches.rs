@@ -108,7 +108,7 @@ fn every_method_leaves_out_what_is_switched_off() {
             |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
         assert_eq!((sum(|p| p.caustic), sum(|p| p.emission)), (0.0, 0.0), "{method:?}");
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
-        let layers = rendered.layers(&shape(&rendered.settings, &scene.survey), |_| true).expect("there are layers");
+        let layers = rendered.layers(&shape(&rendered.settings, &scene), |_| true).expect("there are layers");
         assert!(layers.get("Caustic").is_none() && layers.get("Emission").is_none() && layers.get("Direct").is_some());
         // Nothing is left for photons.
         let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);
