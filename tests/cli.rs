@@ -10,6 +10,8 @@ mod commands;
 mod converge;
 #[path = "cli/files.rs"]
 mod files;
+#[path = "cli/frames.rs"]
+mod frames;
 #[path = "cli/merge.rs"]
 mod merge;
 #[path = "cli/plan.rs"]

@@ -5,6 +5,7 @@ mod compare;
 mod converge;
 mod doctor;
 mod finish;
+mod frames;
 mod info;
 mod layout;
 mod merge;

@@ -87,7 +87,7 @@ impl From<Tonemap> for ToneMap {
 }
 
 /// How files are written.
-#[derive(clap::Args, Serialize)]
+#[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Output")]
 pub struct PictureArgs {
@@ -139,8 +139,9 @@ impl PictureArgs {
 /// # Errors
 /// Another extension, no such folder, or one that takes no files.
 pub fn check(path: &Path, extension: &str) -> Result<()> {
-    // A name without extension, such as /dev/null, is the user's will.
-    if path.extension().is_some_and(|other| !other.eq_ignore_ascii_case(extension)) {
+    let named = path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+    // A device, such as /dev/null, is called what it is called; of a folder another error tells.
+    if !named && !(path.exists() && !path.is_file()) {
         let error = Error::new(Kind::Usage, path.display(), format!("the name does not end in .{extension}"));
         return Err(match extension {
             "exr" => error.hint("the output is an EXR; --png writes a picture to look at beside it"),

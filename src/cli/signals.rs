@@ -6,16 +6,22 @@ use caustique::error::{Error, Kind, Result};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether an end was asked for.
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
 
+/// The one that listens.
+static LISTENING: OnceLock<Interrupt> = OnceLock::new();
+
 impl Interrupt {
-    /// Listens from now on.
+    /// Listens from now on, once for all frames of a run.
     pub fn listen() -> Result<Interrupt> {
+        if let Some(interrupt) = LISTENING.get() {
+            return Ok(interrupt.clone());
+        }
         let failed = |error| Error::new(Kind::Io, "signals", error);
         let asked = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
@@ -31,7 +37,12 @@ impl Interrupt {
             }
         };
         std::thread::Builder::new().spawn(answer).map_err(failed)?;
-        Ok(Interrupt(asked))
+        Ok(LISTENING.get_or_init(|| Interrupt(asked)).clone())
+    }
+
+    /// Whether a signal has come since somebody listens.
+    pub fn came() -> bool {
+        LISTENING.get().is_some_and(Interrupt::asked)
     }
 
     /// Ends a run that was interrupted while it decided how to render.

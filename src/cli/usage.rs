@@ -6,7 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// Words that people type, the option that is meant, and what to say of it where the command has that option; where it
 /// is "", to every command.
-const WORDS: [(&[&str], &str, &str); 16] = [
+const WORDS: [(&[&str], &str, &str); 15] = [
     (
         &["--samples", "--spp", "-s", "--aa-samples", "--num-samples"],
         "iterations",
@@ -28,12 +28,7 @@ const WORDS: [(&[&str], &str, &str); 16] = [
         "max-depth",
         "--max-depth N is the longest light path in segments, one more than it has bounces",
     ),
-    (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A-A"),
-    (
-        &["--frame", "--frames", "-f"],
-        "camera",
-        "animations are not played: export each frame to a scene file of its own",
-    ),
+    (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A"),
     (&["--quiet", "--silent", "-q"], "progress", "--progress none says nothing but warnings and errors"),
     (&["--denoiser", "--no-denoise"], "denoise", "--denoise auto|oidn|own|none chooses the denoiser"),
     (

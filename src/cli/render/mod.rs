@@ -3,6 +3,7 @@
 mod job;
 mod options;
 mod preview;
+mod sequence;
 mod summary;
 mod techniques;
 
@@ -10,7 +11,7 @@ pub use job::{Job, Method};
 pub use options::RenderArgs;
 
 use super::finish::tell_missing;
-use super::progress::{Reporter, Waiting};
+use super::progress::{Reporter, Turn, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Result};
@@ -31,8 +32,19 @@ use serde_json::json;
 use std::path::Path;
 pub use summary::{Summary, tell_finish, tell_picture};
 
-/// Renders: everything that can be wrong is found before the first light path.
+/// Renders a scene, or frames of it.
 pub fn run(args: &RenderArgs) -> Result<()> {
+    super::pool(args.threads)?.install(|| match args.job.scene.frames {
+        Some(frames) => sequence::run(args, frames),
+        None => {
+            sequence::refuse_patterns(args)?;
+            one(args, None)
+        }
+    })
+}
+
+/// Renders one picture: everything that can be wrong is found before the first light path.
+fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     let settings = args.settings()?;
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
@@ -42,10 +54,10 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
     techniques::prepare(args)?;
-    super::pool(args.threads)?.install(|| render(args, settings))
+    render(args, turn, settings)
 }
 
-fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
+fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<()> {
     let allowed = |way, size| args.job.allowed(way, size);
     let auto = (args.job.method == Method::Auto)
         .then(|| args.job.pilot_finish().map(|finish| Auto { allowed: &allowed, finish }))
@@ -68,6 +80,7 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
     };
     let mut told = Telling {
         args,
+        turn,
         interrupt: None,
         waiting: None,
         reporter: None,
@@ -83,6 +96,7 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
 /// Tells people and programs how a render goes.
 struct Telling<'a> {
     args: &'a RenderArgs,
+    turn: Option<Turn>,
     interrupt: Option<Interrupt>,
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
@@ -128,7 +142,7 @@ impl Watch for Telling<'_> {
         if let Some(why) = self.why.take().filter(|_| self.args.progress.for_people()) {
             say(&format!("method: {why}"));
         }
-        self.reporter = Some(Reporter::new(self.args.progress, settings));
+        self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         self.preview = Preview::of(self.args, self.made_for);
         tell_plan(&self.args.job.scene.path, &plan.warnings);
     }

@@ -108,7 +108,13 @@ impl Summary {
         }
         let cause = format!("interrupted after {} iterations, which are written", self.iterations);
         let error = Error::new(Kind::Interrupted, args.output.display(), cause);
+        let of_frames = args.job.scene.frames.is_some();
         Err(match args.saving().filter(|saving| saving.path.exists()) {
+            Some(_) if of_frames => error.hint("the same command with --skip-existing goes on"),
+            None if of_frames => error.hint(format!(
+                "remove {} before the same command with --skip-existing goes on: it is not finished",
+                args.output.display()
+            )),
             Some(saving) => error.hint(format!("the same command with --resume {} goes on", saving.path.display())),
             None => error,
         })
