@@ -142,7 +142,9 @@ mod tests {
         for plain in ["out.exr", "50%.exr", "%s.exr", "%99d.exr", "%5d.exr", "a##/out.exr"] {
             assert_eq!(name(plain, 5), None, "{plain}");
         }
-        for (path, pattern) in [("out.####.exr", true), ("out.%04d.exr", true), ("take#3.exr", false), ("out.exr", false)] {
+        for (path, pattern) in
+            [("out.####.exr", true), ("out.%04d.exr", true), ("take#3.exr", false), ("out.exr", false)]
+        {
             assert_eq!(is_pattern(Path::new(path)), pattern, "{path}");
         }
     }

@@ -207,7 +207,8 @@ impl Reporter {
             Form::Json => {
                 let Progress { iteration, iterations, seconds, remaining, light_paths, error, told, .. } = *progress;
                 let frame = self.turn.map(|turn| turn.frame);
-                let line = Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of: told };
+                let line =
+                    Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of: told };
                 if let Ok(line) = serde_json::to_string(&line) {
                     say(&line);
                 }

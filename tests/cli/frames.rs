@@ -54,8 +54,12 @@ fn each_frame_has_its_moment_and_its_name() {
     let names = "-o out.###.exr --png look.%02d.png";
     let outcome = folder.run(&format!("render moving.gltf --frames 1-5,2 {names} {SMALL}"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    let frames: Vec<&str> = outcome.stderr.lines().filter(|line| line.starts_with("frame ") && line.contains(" of 3)")).collect();
-    assert_eq!(frames, ["frame 1 (1 of 3): out.001.exr", "frame 3 (2 of 3): out.003.exr", "frame 5 (3 of 3): out.005.exr"]);
+    let frames: Vec<&str> =
+        outcome.stderr.lines().filter(|line| line.starts_with("frame ") && line.contains(" of 3)")).collect();
+    assert_eq!(
+        frames,
+        ["frame 1 (1 of 3): out.001.exr", "frame 3 (2 of 3): out.003.exr", "frame 5 (3 of 3): out.005.exr"]
+    );
     assert!(outcome.stderr.contains("frame 3, iteration 2 of 2, "), "{}", outcome.stderr);
     let pictures = ["look.01.png", "look.03.png", "look.05.png"];
     let outputs = ["out.001.exr", "out.003.exr", "out.005.exr"];
@@ -169,7 +173,8 @@ fn existing_frames_can_be_skipped() {
 #[test]
 fn an_interrupted_run_goes_on() {
     let folder = folder();
-    let render = "render moving.gltf --width 32 --height 32 --method path --iterations 3000 --no-combine --reproducible";
+    let render =
+        "render moving.gltf --width 32 --height 32 --method path --iterations 3000 --no-combine --reproducible";
     let line = format!("{render} --frames 1-2 -o out.#.exr --progress json");
     let mut child = folder.command(&line).stderr(Stdio::piped()).spawn().expect("the program starts");
     let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));

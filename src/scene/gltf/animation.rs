@@ -131,7 +131,8 @@ fn tracks(document: &Document, warnings: &mut Vec<String>) -> Result<Vec<Track>>
 
 /// The curve of a channel.
 fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str) -> Result<Curve> {
-    let curve = Curve::read(document, get(samplers, index, "sampler")?).map_err(|e| e.within(format!("sampler {index}")))?;
+    let curve =
+        Curve::read(document, get(samplers, index, "sampler")?).map_err(|e| e.within(format!("sampler {index}")))?;
     let wanted = match pointer.rsplit_once('/') {
         Some((node, "translation" | "scale")) if node.starts_with("/nodes/") => 3,
         Some((node, "rotation")) if node.starts_with("/nodes/") => 4,

@@ -43,12 +43,7 @@ impl Deformation {
     ///
     /// # Errors
     /// Weights that are no numbers; a skin, or a joint of it, that does not exist or stands nowhere.
-    pub(super) fn of(
-        document: &Document,
-        mesh: usize,
-        node: usize,
-        parents: &[Option<usize>],
-    ) -> Result<Deformation> {
+    pub(super) fn of(document: &Document, mesh: usize, node: usize, parents: &[Option<usize>]) -> Result<Deformation> {
         let raw = document.part("nodes", node);
         let weights = raw.get("weights").or(document.part("meshes", mesh).get("weights"));
         let weights = weights.map_or(Ok(Vec::new()), |list| {
@@ -153,12 +148,13 @@ fn joints(document: &Document, raw: &Value, parents: &[Option<usize>]) -> Result
     }
     let joint = |(i, &node): (usize, &usize)| {
         let bind = binds.as_ref().map_or(Some(DAffine3::IDENTITY), |binds| affine(binds[i].map(f64::from)));
-        let bind = bind.ok_or_else(|| {
-            fault(format!("inverse bind matrix {i}"), "its last row is not 0, 0, 0, 1").hint(EXPORT)
-        })?;
+        let bind = bind
+            .ok_or_else(|| fault(format!("inverse bind matrix {i}"), "its last row is not 0, 0, 0, 1").hint(EXPORT))?;
         let joint = to_world(document, parents, node)? * bind;
         if !finite(&joint) {
-            return Err(fault(format!("joint {i}"), "its transform is not finite").hint("look at its scale and position"));
+            return Err(
+                fault(format!("joint {i}"), "its transform is not finite").hint("look at its scale and position")
+            );
         }
         Ok(joint)
     };
@@ -198,7 +194,8 @@ fn skin(
         for ((blend, which), weights) in blends.iter_mut().zip(which).zip(weights) {
             for (joint, weight) in which.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0) {
                 let Some(matrix) = joints.get(joint as usize).filter(|_| weight.is_finite()) else {
-                    let cause = format!("joint {joint} with weight {weight} is none of the {} of its skin", joints.len());
+                    let cause =
+                        format!("joint {joint} with weight {weight} is none of the {} of its skin", joints.len());
                     return Err(fault(place, cause).hint(EXPORT));
                 };
                 let weight = f64::from(weight);

@@ -1,10 +1,10 @@
 //! The node hierarchy: transforms composed in f64, and what stands on the nodes.
 
+use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, SceneExtras};
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
-use super::deform::Deformation;
 use super::transform::{self, can_be_inverted, compose, finite, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology};
 use crate::error::Result;

@@ -59,7 +59,8 @@ mod tests {
     fn values_keep_their_form() {
         let mut root = json!({"nodes": [{"extensions": {"KHR_node_visibility": {"visible": true}}}],
             "materials": [{}], "images": [{}], "asset": {}});
-        let mut put = |pointer: &str, numbers: &[f64]| put(&mut root, pointer, numbers, |name| name.starts_with("KHR_"));
+        let mut put =
+            |pointer: &str, numbers: &[f64]| put(&mut root, pointer, numbers, |name| name.starts_with("KHR_"));
         assert_eq!(put("/nodes/0/weights", &[0.5]), Ok(()));
         assert_eq!(put("/nodes/0/extensions/KHR_node_visibility/visible", &[0.0]), Ok(()));
         assert_eq!(put("/materials/0/pbrMetallicRoughness/roughnessFactor", &[0.25]), Ok(()));

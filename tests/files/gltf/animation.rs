@@ -27,7 +27,14 @@ fn thing() -> Glb {
 }
 
 /// Adds a channel to the animation of that index.
-fn channel<const N: usize>(file: &mut Glb, animation: usize, target: Value, kind: &str, times: &[f32], values: &[[f32; N]]) {
+fn channel<const N: usize>(
+    file: &mut Glb,
+    animation: usize,
+    target: Value,
+    kind: &str,
+    times: &[f32],
+    values: &[[f32; N]],
+) {
     let times: Vec<[f32; 1]> = times.iter().map(|t| [*t]).collect();
     let (input, output) = (file.floats(&times), file.floats(values));
     let animation = &mut file.json["animations"][animation];
@@ -224,7 +231,14 @@ fn morph_targets() {
     let node = file.node(json!({"mesh": mesh, "weights": [0.25, 0.0]}));
     file.node(json!({"mesh": mesh}));
     file.push("animations", json!({"channels": [], "samplers": []}));
-    channel(&mut file, 0, json!({"node": node, "path": "weights"}), "LINEAR", &[0.0, 1.0], &[[0.0], [0.5], [1.0], [1.5]]);
+    channel(
+        &mut file,
+        0,
+        json!({"node": node, "path": "weights"}),
+        "LINEAR",
+        &[0.0, 1.0],
+        &[[0.0], [0.5], [1.0], [1.5]],
+    );
     let scene = at(&file, 0.5).unwrap();
     assert_eq!(scene.instances.iter().map(|i| i.mesh).collect::<Vec<_>>(), [0, 1, 0]);
     let [own, moving] = &scene.meshes[..] else { panic!("{} meshes", scene.meshes.len()) };

@@ -80,10 +80,13 @@ fn moving(file: &mut Glb, mesh: usize, joint: usize) {
     let samplers = [file.floats(&[[0.0], [1.0]]), file.floats(&[[0.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]])];
     let samplers = samplers.map(|output| json!({"input": times, "output": output, "interpolation": "LINEAR"}));
     let pointer = json!({"pointer": "/extensions/KHR_lights_punctual/lights/0/intensity"});
-    file.push("animations", json!({"name": "act", "samplers": samplers, "channels": [
+    file.push(
+        "animations",
+        json!({"name": "act", "samplers": samplers, "channels": [
         {"sampler": 0, "target": {"node": node, "path": "weights"}},
         {"sampler": 1, "target": {"node": joint, "path": "rotation"}},
-        {"sampler": 0, "target": {"path": "pointer", "extensions": {"KHR_animation_pointer": pointer}}}]}));
+        {"sampler": 0, "target": {"path": "pointer", "extensions": {"KHR_animation_pointer": pointer}}}]}),
+    );
 }
 
 /// A file as Blender exports it.
