@@ -12,6 +12,8 @@ mod converge;
 mod files;
 #[path = "cli/frames.rs"]
 mod frames;
+#[path = "cli/limits.rs"]
+mod limits;
 #[path = "cli/merge.rs"]
 mod merge;
 #[path = "cli/plan.rs"]

@@ -9,6 +9,7 @@ use caustique::image::{atomic, exr};
 use caustique::scene::description::{Picture, ToneCurve};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// From scene-linear light to the PNG's colours.
@@ -149,4 +150,24 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
         });
     }
     atomic::check_writable(path)
+}
+
+/// Whether a name stands for standard output.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Checks that the EXR of a render can be written: to a file, or to standard output where something takes it.
+///
+/// # Errors
+/// See [`check`]; a terminal.
+pub fn check_render(path: &Path) -> Result<()> {
+    if !is_stdout(path) {
+        return check(path, "exr");
+    }
+    if std::io::stdout().is_terminal() {
+        let error = Error::new(Kind::Usage, "command line", "--output -: standard output is a terminal");
+        return Err(error.hint("send it to a program or a file, such as '-o - > out.exr'"));
+    }
+    Ok(())
 }

@@ -3,7 +3,7 @@
 
 use super::say;
 use caustique::error::{Error, Kind, Result};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,4 +61,13 @@ impl Interrupt {
     pub fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
+}
+
+/// Makes a file that grows past `ulimit -f` an error of whoever writes it; by itself that signal ends the program.
+///
+/// # Errors
+/// The system takes no handler.
+pub fn survive_large_files() -> Result<()> {
+    let noted = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(SIGXFSZ, noted).map(drop).map_err(|error| Error::new(Kind::Io, "signals", error))
 }

@@ -6,7 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// Words that people type, the option that is meant, and what to say of it where the command has that option; where it
 /// is "", to every command.
-const WORDS: [(&[&str], &str, &str); 15] = [
+const WORDS: [(&[&str], &str, &str); 16] = [
     (
         &["--samples", "--spp", "-s", "--aa-samples", "--num-samples"],
         "iterations",
@@ -29,6 +29,12 @@ const WORDS: [(&[&str], &str, &str); 15] = [
         "--max-depth N is the longest light path in segments, one more than it has bounces",
     ),
     (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A"),
+    (
+        &["--motion-blur", "--shutter"],
+        "frames",
+        "nothing is blurred by motion: render moments between the frames (--frame-rate 240 has ten of them to a frame of 24) \
+         and take their mean",
+    ),
     (&["--quiet", "--silent", "-q"], "progress", "--progress none says nothing but warnings and errors"),
     (&["--denoiser", "--no-denoise"], "denoise", "--denoise auto|oidn|own|none chooses the denoiser"),
     (

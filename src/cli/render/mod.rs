@@ -1,5 +1,6 @@
 //! `caustique render`: a scene in, an EXR and perhaps a PNG out.
 
+mod files;
 mod job;
 mod options;
 mod preview;
@@ -17,9 +18,9 @@ use super::{output, say, scene};
 use caustique::error::{Error, Result};
 use caustique::film::LayerSet;
 use caustique::image::atomic;
-use caustique::image::exr::{self, Attributes};
+use caustique::image::exr;
+use caustique::pipeline::memory::Cap;
 use caustique::pipeline::plan::why;
-use caustique::pipeline::shard::Tail;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
 use caustique::render::auto::Choice;
@@ -49,7 +50,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
     layers::selection(&args.layers, &shape(&settings, &anything), !args.job.no_combine)?;
-    output::check(&args.output, "exr")?;
+    output::check_render(&args.output)?;
     args.picture.check()?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
@@ -75,6 +76,7 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
         naming: args.exr_naming.into(),
         arguments: json!(args),
         reproducible: args.reproducible,
+        memory: args.memory.map(|mib| Cap { bytes: u64::from(mib) << 20 }),
         saving: args.saving(),
         resume: args.resume.clone(),
     };
@@ -188,7 +190,7 @@ impl Telling<'_> {
         let Delivery { set, attributes, techniques, finished, finishing, refusal, tail } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
-        let written = write(args, &set, &attributes, tail.as_ref());
+        let written = files::write(args, &set, &attributes, tail.as_ref());
         let pictured = args.picture.write_png(&set, &made_for);
         let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if let Some(mut preview) = preview {
@@ -230,25 +232,4 @@ pub fn tell_plan(scene: &Path, warnings: &[String]) {
     for warning in warnings {
         say(&format!("warning: {}: {warning}", scene.display()));
     }
-}
-
-/// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
-///
-/// # Errors
-/// The EXR could not be written where it was asked for; the hint says where it is instead.
-fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: Option<&Tail>) -> Result<()> {
-    let options = args.picture.exr_options(args.exr_naming.into());
-    let write = |path: &Path| {
-        exr::write_followed(path, set, attributes, options, |file| tail.map_or(Ok(()), |tail| tail.write(file)))
-    };
-    let Err(error) = write(&args.output) else { return Ok(()) };
-    let name = args.output.file_name().unwrap_or("render.exr".as_ref());
-    // A folder of its own: a file of that name may be there.
-    let Ok(folder) = tempfile::Builder::new().prefix("caustique-").tempdir() else { return Err(error) };
-    let rescued = folder.path().join(name);
-    if write(&rescued).is_err() {
-        return Err(error);
-    }
-    let _ = folder.keep();
-    Err(error.hint(format!("the render is in {}", rescued.display())))
 }

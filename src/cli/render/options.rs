@@ -4,7 +4,7 @@
 use super::job::{Job, idle};
 use super::preview::Target;
 use crate::cli::frames::numbered;
-use crate::cli::number::{positive, threads};
+use crate::cli::number::{positive, threads, whole};
 use crate::cli::output::{Naming, PictureArgs};
 use crate::cli::progress::Form;
 use caustique::error::{Error, Kind, Result};
@@ -81,6 +81,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "DIR", help_heading = "Expert")]
     #[serde(skip)]
     pub debug_techniques: Option<PathBuf>,
+    /// The most that photons, pixels and layers may take, in MiB, beside the scene itself. Where they need more, the light
+    /// paths of an iteration become fewer (with pm: the room of its map), and a warning says how many; what cannot fit is
+    /// refused [default: what the machine and its limits leave, and nothing becomes fewer]
+    #[arg(long, value_name = "MIB", value_parser = whole(1..=u32::MAX), help_heading = "Running")]
+    pub memory: Option<u32>,
     /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]

@@ -2,6 +2,7 @@
 
 use super::options::RenderArgs;
 use crate::cli::progress::{count, duration, percent};
+use crate::cli::output::is_stdout;
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
@@ -124,7 +125,8 @@ impl Summary {
 /// The file of a picture.
 pub fn tell_picture(output: &Path, set: &LayerSet) {
     let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
-    say(&format!("{}: {} x {}, {channels} channels", output.display(), set.width, set.height));
+    let name = if is_stdout(output) { "standard output".into() } else { output.display().to_string() };
+    say(&format!("{name}: {} x {}, {channels} channels", set.width, set.height));
 }
 
 /// What has finished a picture, and in how many seconds; what it tells of its error knows of `told`.
