@@ -107,7 +107,7 @@ impl Cap {
                 least.div_ceil(1 << 20)
             );
             let fewer =
-                "use a smaller --width and --height, --crop, fewer --levels, --method sppm or path, or more --memory";
+                "use a smaller --width and --height, --crop, fewer --levels, another --method, or more --memory";
             return Err(Error::new(Kind::Usage, "command line", cause).hint(fewer));
         }
         if settings.method == Method::Pm {

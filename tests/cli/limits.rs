@@ -34,13 +34,15 @@ fn no_limit_of_memory_aborts() {
 #[test]
 fn a_cap_on_memory_is_planned() {
     let folder = Folder::new();
+    let pool = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/pool.glb");
+    std::fs::copy(pool, folder.path("pool.glb")).expect("it can be copied");
     let render = |options: &str| {
         let small = "--width 64 --height 48 --iterations 2 --no-combine --reproducible --progress none";
-        folder.run(&format!("render scene.glb -o out.exr {small} {options}"))
+        folder.run(&format!("render pool.glb -o out.exr {small} {options}"))
     };
-    let outcome = render("--method sppm --photons 200000 --memory 12");
+    let outcome = render("--method sppm --photons 200000 --memory 6");
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    let (_, said) = outcome.stderr.split_once("--memory 12: ").expect("it says what is cut");
+    let (_, said) = outcome.stderr.split_once("--memory 6: ").expect("it says what is cut");
     let (photons, rest) = said.split_once(" light paths an iteration instead of 200000\n").expect("it says how much");
     assert_eq!(rest, "");
     let photons: u64 = photons.parse().expect("a number");
@@ -50,9 +52,9 @@ fn a_cap_on_memory_is_planned() {
     // It is the render of so many light paths.
     assert_eq!(render(&format!("--method sppm --photons {photons}")).code, Some(0));
     assert!(values(&folder.read("out.exr").0, "") == values(&set, ""));
-    let outcome = render("--method pm --photons 200000 --memory 8");
+    let outcome = render("--method pm --photons 200000 --memory 6");
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    assert!(outcome.stderr.contains("--memory 8: the photon map has room for "), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("--memory 6: the photon map has room for "), "{}", outcome.stderr);
     assert!(outcome.stderr.contains("the photon map was full at "), "{}", outcome.stderr);
     let outcome = render("--method vcm --memory 2");
     assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
@@ -87,7 +89,7 @@ fn a_full_disk_loses_no_render() {
     let small = "--width 16 --height 12 --iterations 1 --method path --no-combine --progress none";
     let outcome = limited(&folder, "true", &format!("render scene.glb -o /dev/full {small}"));
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
-    assert!(outcome.stderr.starts_with("/dev/full: No space left on device"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("\n/dev/full: No space left on device"), "{}", outcome.stderr);
     let (_, rescued) = outcome.stderr.trim_end().rsplit_once("hint: the render is in ").expect("the hint names a file");
     assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("").is_some()));
 }
@@ -101,13 +103,13 @@ fn a_render_to_standard_output() {
     let line = format!("render scene.glb -o - {small} > piped.exr");
     let outcome = limited(&folder, "true", &line);
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    assert!(outcome.stderr.ends_with("\nstandard output: 16 x 12, 55 channels\n"), "{}", outcome.stderr);
+    assert!(outcome.stderr.ends_with("\nstandard output: 16 x 12, 64 channels\n"), "{}", outcome.stderr);
     let bytes = |name: &str| std::fs::read(folder.path(name)).expect("it is there");
     assert!(bytes("piped.exr") == bytes("file.exr"));
     assert_eq!(folder.files(), ["file.exr", "piped.exr"]);
     let outcome = limited(&folder, "true", &format!("render scene.glb -o - --progress none {small} > /dev/full"));
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
-    assert!(outcome.stderr.starts_with("standard output: No space left on device"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("\nstandard output: No space left on device"), "{}", outcome.stderr);
     assert!(outcome.stderr.contains("\nhint: the render is in "), "{}", outcome.stderr);
     let outcome = folder.run(&format!("render scene.glb --frames 1-2 -o - {small}"));
     let error = "command line: --output -: all frames have the same name\n";
@@ -138,9 +140,10 @@ fn a_signal_at_any_time_leaves_a_whole_file() {
     let arguments = "render scene.glb -o out.exr --width 320 --iterations 1 --method path --progress json";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
     let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
-    line.clear();
-    lines.read_line(&mut line).expect("stderr can be read");
-    assert!(line.contains("\"iteration\":1,"), "{line}");
+    while !line.contains("\"iteration\":1,") {
+        line.clear();
+        assert_ne!(lines.read_line(&mut line).expect("stderr can be read"), 0, "the program has ended");
+    }
     kill(child.id());
     let mut rest = String::new();
     lines.read_to_string(&mut rest).expect("stderr can be read");
