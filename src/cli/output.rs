@@ -142,7 +142,8 @@ impl PictureArgs {
 pub fn check(path: &Path, extension: &str) -> Result<()> {
     let named = path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
     // A device, such as /dev/null, is called what it is called; of a folder another error tells.
-    if !named && !(path.exists() && !path.is_file()) {
+    let is_no_file = path.exists() && !path.is_file();
+    if !named && !is_no_file {
         let error = Error::new(Kind::Usage, path.display(), format!("the name does not end in .{extension}"));
         return Err(match extension {
             "exr" => error.hint("the output is an EXR; --png writes a picture to look at beside it"),

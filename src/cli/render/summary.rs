@@ -1,8 +1,8 @@
 //! What a render says when its pixels are gone.
 
 use super::options::RenderArgs;
-use crate::cli::progress::{count, duration, percent};
 use crate::cli::output::is_stdout;
+use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
