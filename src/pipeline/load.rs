@@ -9,8 +9,8 @@ use crate::scene::description::{Description, EnvironmentDescription, Environment
 use crate::scene::{Scene, environment_file, gltf};
 use std::path::PathBuf;
 
-/// Room for Embree's library, and for each of its threads: it ends the process where they get none. Under `ulimit -v`
-/// less than 270 MiB were too few for two.
+/// Room for Embree's library, and for each of its threads: it ends the process where they get none. A bound found by
+/// lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const START_BYTES: u64 = 256 << 20;
 const THREAD_BYTES: u64 = 16 << 20;
 

@@ -52,7 +52,8 @@ fn needed((width, height): (u32, u32), channels: usize, settings: &Settings, per
 }
 
 /// What a finish takes beside the layers, whose pixels are gone by then: the library of the denoiser, its network, and
-/// what it works in (at 640 x 360 pixels 140 MiB of address space were taken).
+/// what it works in. A bound found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`), for
+/// pictures of 320 to 640 pixels across.
 const FINISH_BYTES: u64 = 192 << 20;
 
 /// Fewer light paths than this make no picture: a cap below is refused.
