@@ -10,6 +10,10 @@ mod commands;
 mod converge;
 #[path = "cli/files.rs"]
 mod files;
+#[path = "cli/frames.rs"]
+mod frames;
+#[path = "cli/limits.rs"]
+mod limits;
 #[path = "cli/merge.rs"]
 mod merge;
 #[path = "cli/plan.rs"]

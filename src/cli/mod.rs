@@ -5,6 +5,7 @@ mod compare;
 mod converge;
 mod doctor;
 mod finish;
+mod frames;
 mod info;
 mod layout;
 mod merge;
@@ -22,8 +23,11 @@ mod usage;
 
 use caustique::error::{Error, Kind, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::fs::File;
 use std::io::Write;
 use std::num::NonZero;
+use std::os::fd::AsFd;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Renders caustics, and caustics seen through glass, water and mirrors, with known error.
@@ -73,7 +77,7 @@ fn named(line: &clap::Command) -> Option<&clap::Command> {
 
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
-    if let Err(error) = processor::check() {
+    if let Err(error) = processor::check().and_then(|()| signals::survive_large_files()) {
         return fail(&error);
     }
     let mut line = command_line();
@@ -149,6 +153,12 @@ fn print(text: &str) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Sends a file to stdout.
+fn print_file(path: &Path) -> std::io::Result<()> {
+    let mut out = File::from(std::io::stdout().as_fd().try_clone_to_owned()?);
+    std::io::copy(&mut File::open(path)?, &mut out).map(drop)
 }
 
 /// Prints a JSON object to stdout, indented.

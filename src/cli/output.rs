@@ -9,6 +9,7 @@ use caustique::image::{atomic, exr};
 use caustique::scene::description::{Picture, ToneCurve};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// From scene-linear light to the PNG's colours.
@@ -87,7 +88,7 @@ impl From<Tonemap> for ToneMap {
 }
 
 /// How files are written.
-#[derive(clap::Args, Serialize)]
+#[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Output")]
 pub struct PictureArgs {
@@ -139,8 +140,10 @@ impl PictureArgs {
 /// # Errors
 /// Another extension, no such folder, or one that takes no files.
 pub fn check(path: &Path, extension: &str) -> Result<()> {
-    // A name without extension, such as /dev/null, is the user's will.
-    if path.extension().is_some_and(|other| !other.eq_ignore_ascii_case(extension)) {
+    let named = path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+    // A device, such as /dev/null, is called what it is called; of a folder another error tells.
+    let is_no_file = path.exists() && !path.is_file();
+    if !named && !is_no_file {
         let error = Error::new(Kind::Usage, path.display(), format!("the name does not end in .{extension}"));
         return Err(match extension {
             "exr" => error.hint("the output is an EXR; --png writes a picture to look at beside it"),
@@ -148,4 +151,24 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
         });
     }
     atomic::check_writable(path)
+}
+
+/// Whether a name stands for standard output.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Checks that the EXR of a render can be written: to a file, or to standard output where something takes it.
+///
+/// # Errors
+/// See [`check`]; a terminal.
+pub fn check_render(path: &Path) -> Result<()> {
+    if !is_stdout(path) {
+        return check(path, "exr");
+    }
+    if std::io::stdout().is_terminal() {
+        let error = Error::new(Kind::Usage, "command line", "--output -: standard output is a terminal");
+        return Err(error.hint("send it to a program or a file, such as '-o - > out.exr'"));
+    }
+    Ok(())
 }

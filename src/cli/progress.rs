@@ -145,9 +145,21 @@ impl Drop for Waiting {
     }
 }
 
+/// A frame among those of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn {
+    /// Its number in the animation.
+    pub frame: u32,
+    /// How many of the run come before it.
+    pub before: usize,
+    /// How many frames the run has.
+    pub count: usize,
+}
+
 /// Reports on one render.
 pub struct Reporter {
     form: Form,
+    turn: Option<Turn>,
     bar: Option<Bar>,
     first: Option<Waiting>,
     time: Option<f64>,
@@ -157,6 +169,8 @@ pub struct Reporter {
 /// `--progress json`: the keys that scripts rely on.
 #[derive(Serialize)]
 struct Line {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frame: Option<u32>,
     iteration: u64,
     iterations: Option<u64>,
     seconds: f64,
@@ -168,10 +182,10 @@ struct Line {
 
 impl Reporter {
     /// A reporter for a render with these settings.
-    pub fn new(form: Form, settings: &Settings) -> Reporter {
+    pub fn new(form: Form, settings: &Settings, turn: Option<Turn>) -> Reporter {
         let first = Some(Waiting::begin(form, "first iteration"));
         let form = form.settled();
-        Reporter { form, bar: None, first, time: settings.time, next_line: 0.0 }
+        Reporter { form, turn, bar: None, first, time: settings.time, next_line: 0.0 }
     }
 
     /// Reports the state after an iteration.
@@ -180,25 +194,28 @@ impl Reporter {
         match self.form {
             Form::Auto => {
                 let fraction = self.fraction(progress);
-                self.bar.get_or_insert_with(Bar::new).set(fraction, sentence(progress));
+                let sentence = self.sentence(progress);
+                self.bar.get_or_insert_with(Bar::new).set(fraction, sentence);
             }
             Form::Plain => {
                 let last = progress.iterations == Some(progress.iteration);
                 if progress.seconds >= self.next_line || last {
                     self.next_line = progress.seconds + PLAIN_EVERY;
-                    say(&sentence(progress));
+                    say(&self.sentence(progress));
                 }
             }
             Form::Json => {
                 let Progress { iteration, iterations, seconds, remaining, light_paths, error, told, .. } = *progress;
-                let line = Line { iteration, iterations, seconds, remaining, light_paths, error, error_of: told };
+                let frame = self.turn.map(|turn| turn.frame);
+                let line =
+                    Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of: told };
                 if let Ok(line) = serde_json::to_string(&line) {
                     say(&line);
                 }
             }
             Form::Openjd => {
                 say(&format!("openjd_progress: {:.1}", 100.0 * self.fraction(progress)));
-                say(&format!("openjd_status: {}", sentence(progress)));
+                say(&format!("openjd_status: {}", self.sentence(progress)));
             }
             Form::None => {}
         }
@@ -209,11 +226,18 @@ impl Reporter {
         (self.first, self.bar) = (None, None);
     }
 
-    /// How much is done, 0 to 1, by whichever limit is nearer.
+    /// What a line says, after the frame if there is one.
+    fn sentence(&self, progress: &Progress) -> String {
+        let frame = self.turn.map(|turn| format!("frame {}, ", turn.frame)).unwrap_or_default();
+        frame + &sentence(progress)
+    }
+
+    /// How much is done of all frames, 0 to 1; of this one by whichever limit is nearer.
     fn fraction(&self, progress: &Progress) -> f64 {
         let by_count = progress.iterations.map_or(0.0, |n| progress.iteration as f64 / n.max(1) as f64);
         let by_time = self.time.map_or(0.0, |t| progress.seconds / t);
-        by_count.max(by_time).clamp(0.0, 1.0)
+        let this = by_count.max(by_time).clamp(0.0, 1.0);
+        self.turn.map_or(this, |turn| (turn.before as f64 + this) / turn.count as f64)
     }
 }
 

@@ -1,6 +1,7 @@
 //! From a scene file and the options about it to a scene, with its warnings told.
 
-use super::number::{finite, not_negative, rgb};
+use super::frames::{Frames, numbered};
+use super::number::{finite, not_negative, positive, rgb};
 use super::progress::{Form, Waiting};
 use super::say;
 use caustique::error::{Error, Kind, Result};
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// A scene file and how it is read.
-#[derive(clap::Args, Serialize)]
+#[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Light and glass")]
 pub struct SceneArgs {
@@ -22,6 +23,17 @@ pub struct SceneArgs {
     #[arg(value_name = "SCENE", help_heading = None::<&str>)]
     #[serde(rename = "scene")]
     pub path: PathBuf,
+    /// Frames of the scene's animation, such as 5, 1-100 or 1-100,2. In the names of files, also in that of the scene,
+    /// '####' stands for the frame's number [default: the moment of the first key]
+    #[arg(long, value_name = "A-B[,STEP]", help_heading = "Picture")]
+    pub frames: Option<Frames>,
+    /// Frames a second, where the scene does not tell: frame N is at N / FPS seconds [default: 24]
+    #[arg(long, value_name = "FPS", value_parser = positive, requires = "frames", help_heading = "Picture")]
+    pub frame_rate: Option<f64>,
+    /// The file is one of a sequence, of which each has a frame to itself
+    #[arg(skip)]
+    #[serde(skip)]
+    of_sequence: bool,
     /// Light from all around: a latitude-longitude image (.exr or .hdr), or one colour R,G,B (radiance)
     #[arg(long, value_name = "FILE|R,G,B")]
     pub env: Option<EnvironmentChoice>,
@@ -99,8 +111,18 @@ impl FromStr for EnvironmentChoice {
 /// Reads and builds the scene as the options ask for it.
 ///
 /// # Errors
-/// See [`load`].
+/// See [`load`]; more than one frame.
 pub fn read(args: &SceneArgs, form: Form, threads: usize) -> Result<Loaded> {
+    let args = match args.frames {
+        None => args,
+        Some(frames) => match frames.single() {
+            Some(frame) => &args.at(frame),
+            None => {
+                let error = Error::new(Kind::Usage, "command line", "--frames: this command looks at one frame");
+                return Err(error.hint(format!("give one, such as --frames {}", frames.iter().next().unwrap_or(1))));
+            }
+        },
+    };
     let _waiting = Waiting::begin(form, &format!("reading {}", args.path.display()));
     load(&args.order(), threads)
 }
@@ -128,6 +150,9 @@ impl SceneArgs {
     pub fn of(path: &Path, allow_outside: bool) -> SceneArgs {
         SceneArgs {
             path: path.into(),
+            frames: None,
+            frame_rate: None,
+            of_sequence: false,
             env: None,
             env_rotation: None,
             env_strength: None,
@@ -137,6 +162,14 @@ impl SceneArgs {
             allow_outside,
             strict: false,
         }
+    }
+
+    /// The same of one frame: a scene whose name is a pattern is a file for each, unless there is a file of that very name.
+    pub fn at(&self, frame: u32) -> SceneArgs {
+        let file = numbered(&self.path, frame).filter(|_| !self.path.exists());
+        let of_sequence = self.of_sequence || file.is_some();
+        let path = file.unwrap_or_else(|| self.path.clone());
+        SceneArgs { path, frames: Some(Frames::one(frame)), of_sequence, ..self.clone() }
     }
 
     /// What is asked of the pipeline.
@@ -173,6 +206,11 @@ impl SceneArgs {
                 Glass::Thin => gltf::Glass::Thin,
             },
             allow_outside: self.allow_outside,
+            frame: self.frames.and_then(Frames::single).map(|number| gltf::Frame {
+                number,
+                rate: self.frame_rate,
+                of_sequence: self.of_sequence,
+            }),
         }
     }
 }

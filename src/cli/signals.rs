@@ -3,19 +3,25 @@
 
 use super::say;
 use caustique::error::{Error, Kind, Result};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Whether an end was asked for.
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
 
+/// The one that listens.
+static LISTENING: OnceLock<Interrupt> = OnceLock::new();
+
 impl Interrupt {
-    /// Listens from now on.
+    /// Listens from now on, once for all frames of a run.
     pub fn listen() -> Result<Interrupt> {
+        if let Some(interrupt) = LISTENING.get() {
+            return Ok(interrupt.clone());
+        }
         let failed = |error| Error::new(Kind::Io, "signals", error);
         let asked = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
@@ -31,7 +37,12 @@ impl Interrupt {
             }
         };
         std::thread::Builder::new().spawn(answer).map_err(failed)?;
-        Ok(Interrupt(asked))
+        Ok(LISTENING.get_or_init(|| Interrupt(asked)).clone())
+    }
+
+    /// Whether a signal has come since somebody listens.
+    pub fn came() -> bool {
+        LISTENING.get().is_some_and(Interrupt::asked)
     }
 
     /// Ends a run that was interrupted while it decided how to render.
@@ -50,4 +61,13 @@ impl Interrupt {
     pub fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
+}
+
+/// Makes a file that grows past `ulimit -f` an error of whoever writes it; by itself that signal ends the program.
+///
+/// # Errors
+/// The system takes no handler.
+pub fn survive_large_files() -> Result<()> {
+    let noted = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(SIGXFSZ, noted).map(drop).map_err(|error| Error::new(Kind::Io, "signals", error))
 }

@@ -28,11 +28,12 @@ const WORDS: [(&[&str], &str, &str); 16] = [
         "max-depth",
         "--max-depth N is the longest light path in segments, one more than it has bounces",
     ),
-    (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A-A"),
+    (&["--frame", "-f"], "frames", "--frames A-B renders frames of the scene's animation, one frame as --frames A"),
     (
-        &["--frame", "--frames", "-f"],
-        "camera",
-        "animations are not played: export each frame to a scene file of its own",
+        &["--motion-blur", "--shutter"],
+        "frames",
+        "nothing is blurred by motion: render moments between the frames (--frame-rate 240 has ten of them to a frame of 24) \
+         and take their mean",
     ),
     (&["--quiet", "--silent", "-q"], "progress", "--progress none says nothing but warnings and errors"),
     (&["--denoiser", "--no-denoise"], "denoise", "--denoise auto|oidn|own|none chooses the denoiser"),

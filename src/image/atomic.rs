@@ -1,5 +1,6 @@
 //! Files that are either whole or not there.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -74,12 +75,58 @@ fn is_device(path: &Path) -> bool {
 }
 
 fn beside(target: &Path) -> io::Result<NamedTempFile> {
+    let prefix = prefix(target);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".caustique-").suffix(".part");
+    builder.prefix(&prefix).suffix(SUFFIX);
     // Temporary files are private by default; ours becomes the user's file, under the user's umask.
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
-    if is_device(target) { builder.tempfile() } else { builder.tempfile_in(folder(target)) }
+    if is_device(target) {
+        return builder.tempfile();
+    }
+    let folder = folder(target);
+    remove_stale(folder, &prefix);
+    loop {
+        let file = builder.tempfile_in(folder)?;
+        // Its lock says that somebody writes it. Who came between its making and its locking may have removed it.
+        let locked = file.as_file().lock().is_ok();
+        if !locked || file.path().exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// What the names of the temporary files of a target begin with, and how they end.
+fn prefix(target: &Path) -> OsString {
+    let mut prefix = OsString::from(".caustique-");
+    // A name has 255 bytes at most.
+    if let Some(name) = target.file_name().filter(|name| name.len() <= 200) {
+        prefix.push(name);
+        prefix.push("-");
+    }
+    prefix
+}
+const SUFFIX: &str = ".part";
+/// Random characters between the two.
+const RANDOM: usize = 6;
+
+/// Removes temporary files that a process has left which was killed: those of the same target that nobody has locked.
+/// Where a file system has no locks nothing is removed.
+fn remove_stale(folder: &Path, prefix: &OsStr) {
+    let ours = |name: &OsStr| {
+        let (name, prefix) = (name.as_encoded_bytes(), prefix.as_encoded_bytes());
+        name.len() == prefix.len() + RANDOM + SUFFIX.len()
+            && name.starts_with(prefix)
+            && name.ends_with(SUFFIX.as_bytes())
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| ours(&entry.file_name())) {
+        // The lock is held while the file goes, so that nobody writes it.
+        let free = File::open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
+        if free.is_some() {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
@@ -98,4 +145,31 @@ fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
         let _ = folder.sync_all();
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a killed process has left of a file goes at the next write; what is still written, or of another file, stays.
+    #[test]
+    fn stale_files_are_removed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        let others = [".caustique-b.exr-aaaaaa.part", ".caustique-a.exr-b.exr-aaaaaa.part", ".caustique-aaaaaa.part"];
+        let (stale, busy) = (".caustique-a.exr-aaaaaa.part", ".caustique-a.exr-bbbbbb.part");
+        for name in others.into_iter().chain([stale, busy]) {
+            fs::write(path(name), "half").expect("it can be written");
+        }
+        let writer = File::open(path(busy)).expect("it is there");
+        writer.lock().expect("it can be locked");
+        write_bytes(&path("a.exr"), b"whole").expect("it can be written");
+        assert_eq!(fs::read(path("a.exr")).expect("it is there"), b"whole");
+        assert!(!path(stale).exists() && path(busy).exists() && others.iter().all(|name| path(name).exists()));
+        assert_eq!(fs::read_dir(folder.path()).expect("it can be read").count(), 5);
+        // Two that write at once do not remove each other's.
+        let first = beside(&path("a.exr")).expect("it can be made");
+        let second = beside(&path("a.exr")).expect("it can be made");
+        assert!(first.path().exists() && second.path().exists() && path(busy).exists());
+    }
 }

@@ -2,11 +2,17 @@
 
 use crate::error::{Error, Kind, Result};
 use crate::math::Rgb;
+use crate::memory;
 use crate::plan::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use crate::scene::{Scene, environment_file, gltf};
 use std::path::PathBuf;
+
+/// Room for Embree's library, and for each of its threads: it ends the process where they get none. A bound found by
+/// lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
+const START_BYTES: u64 = 256 << 20;
+const THREAD_BYTES: u64 = 16 << 20;
 
 /// A scene file and how it is read.
 pub struct Order {
@@ -45,6 +51,8 @@ pub struct Loaded {
 /// # Errors
 /// The file or what it names, by place; an environment that is changed and is not there.
 pub fn load(order: &Order, threads: usize) -> Result<Loaded> {
+    memory::check(START_BYTES + threads as u64 * THREAD_BYTES, "Embree and its threads")
+        .map_err(|e| e.within(order.path.display()).hint("give the program more memory, or fewer --threads"))?;
     let mut description = gltf::read(&order.path, &order.options)?;
     environment(&mut description, order)?;
     let removed = switch::off(&mut description, order.off);

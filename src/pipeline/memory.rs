@@ -59,14 +59,90 @@ fn needed(
     pixels * per_pixel + photons
 }
 
-/// Checks that the picture and its photons fit.
+/// What a finish takes beside the layers, whose pixels are gone by then: the library of the denoiser, its network, and
+/// what it works in. A bound found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`), for
+/// pictures of 320 to 640 pixels across.
+const FINISH_BYTES: u64 = 192 << 20;
+
+/// Fewer light paths than this make no picture: a cap below is refused.
+const LEAST_PHOTONS: u32 = 1000;
+
+/// A limit that is asked for, on what photons and pixels take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cap {
+    /// Bytes.
+    pub bytes: u64,
+}
+
+impl Cap {
+    /// Settings that keep to it, and what they do without, if anything. Only photons can be fewer: those of an iteration
+    /// where they are counted, and the room of the one map of `pm`; pixels and layers take what they take.
+    ///
+    /// # Errors
+    /// Not even the least fits.
+    pub fn plan(
+        self,
+        (scene, camera): (&Scene, &Camera),
+        settings: Settings,
+        channels: usize,
+    ) -> Result<(Settings, Option<String>)> {
+        let planes = (channels, scene.lights.groups().names.len());
+        let per_light_path = photons_per_path(scene, camera, &settings);
+        self.keep(camera.size(), settings, planes, per_light_path)
+    }
+
+    fn keep(
+        self,
+        size: (u32, u32),
+        settings: Settings,
+        planes: (usize, usize),
+        per_light_path: f64,
+    ) -> Result<(Settings, Option<String>)> {
+        let needs = |settings: &Settings| needed(size, planes, settings, per_light_path);
+        let whole = needs(&settings);
+        if whole <= self.bytes {
+            return Ok((settings, None));
+        }
+        let mib = self.bytes >> 20;
+        let pixels = needs(&Settings { photons: 0, ..settings.clone() });
+        let left = self.bytes.saturating_sub(pixels);
+        let least = (f64::from(LEAST_PHOTONS) * per_light_path * PHOTON_BYTES as f64) as u64;
+        if !settings.method.counts_photons() || left < least {
+            let least = if settings.method.counts_photons() { pixels + least } else { whole };
+            let cause = format!(
+                "{} x {} pixels with --method {} need {} MiB at least, and --memory allows {mib}",
+                size.0,
+                size.1,
+                settings.method.name(),
+                least.div_ceil(1 << 20)
+            );
+            let fewer =
+                "use a smaller --width and --height, --crop, fewer --levels, another --method, or more --memory";
+            return Err(Error::new(Kind::Usage, "command line", cause).hint(fewer));
+        }
+        if settings.method == Method::Pm {
+            let told = format!(
+                "--memory {mib}: the photon map has room for {} MiB instead of {}",
+                left >> 20,
+                settings.photon_memory >> 20
+            );
+            return Ok((Settings { photon_memory: left, ..settings }, Some(told)));
+        }
+        let photons = (left as f64 / (per_light_path * PHOTON_BYTES as f64)) as u32;
+        let told = format!("--memory {mib}: {photons} light paths an iteration instead of {}", settings.photons);
+        Ok((Settings { photons, ..settings }, Some(told)))
+    }
+}
+
+/// Checks that the picture and its photons fit into what the machine leaves, and the finish, if there is to be one.
 ///
 /// # Errors
 /// They need more memory than there is.
-pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize) -> Result<()> {
+pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize, finishes: bool) -> Result<()> {
     let size = stage.1.size();
     let groups = stage.0.lights.groups().names.len();
     let needed = needed(size, (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
+    let needed = needed + if finishes { FINISH_BYTES } else { 0 };
     let paths = if settings.method.counts_photons() {
         let each = if settings.method == Method::Pm { "" } else { " an iteration" };
         format!(" and {} light paths{each}", settings.photons)
@@ -93,10 +169,7 @@ pub fn check_all<'a>(stage: (&Scene, &Camera), all: impl Iterator<Item = &'a Set
 
 /// The error where `what` need more memory than there is.
 fn refuse(needed: u64, what: impl Display, fewer: &str) -> Result<()> {
-    memory::check(needed, what).map_err(|error| {
-        Error::new(Kind::Usage, "command line", error.cause)
-            .hint(format!("use a smaller --width and --height, or {fewer}"))
-    })
+    memory::check(needed, what).map_err(|error| error.hint(format!("use a smaller --width and --height, or {fewer}")))
 }
 
 #[cfg(test)]
@@ -112,5 +185,31 @@ mod tests {
         assert_eq!(needed((1 << 16, 1 << 16), (93, 0), &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
         let merged = Settings { method: Method::Vcm, ..none };
         assert!(needed((1, 1), (93, 0), &merged, 2.5) > one);
+    }
+
+    /// What is planned under a cap needs no more than it, and little less; what cannot be is refused with what it takes.
+    #[test]
+    fn plans_keep_to_their_cap() {
+        let size = (64, 64);
+        let plan = |bytes, settings: &Settings| Cap { bytes }.keep(size, settings.clone(), (93, 0), 2.5);
+        for method in [Method::Sppm, Method::Cppm, Method::Pm, Method::Vcm] {
+            let photon_memory = u64::MAX;
+            let asked = Settings { method, photons: 5_000_000, photon_memory, ..Settings::default() };
+            let needs = |settings: &Settings| needed(size, (93, 0), settings, 2.5);
+            let whole = needs(&asked);
+            let (kept, told) = plan(whole, &asked).expect("it fits");
+            assert_eq!((kept.photons, kept.photon_memory, told), (asked.photons, photon_memory, None));
+            let none = plan(1 << 20, &asked).expect_err("nothing fits");
+            assert!(none.cause.ends_with(" MiB at least, and --memory allows 1"), "{none}");
+            assert_eq!(none.exit_code(), 2);
+            let half = plan(whole / 2, &asked);
+            if method == Method::Vcm {
+                assert!(half.is_err(), "no photon of it can be left out");
+                continue;
+            }
+            let (kept, told) = half.expect("some fit");
+            assert!(needs(&kept) <= whole / 2 && needs(&kept) > whole / 2 - 1000, "{}", method.name());
+            assert!(told.is_some_and(|told| told.contains(" instead of ")));
+        }
     }
 }

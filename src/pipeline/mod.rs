@@ -79,6 +79,8 @@ pub struct Order<'a> {
     pub arguments: Value,
     /// Leave clocks and the number of threads out of the header.
     pub reproducible: bool,
+    /// The most that photons and pixels may take.
+    pub memory: Option<memory::Cap>,
     /// Where the state is saved while it renders, if at all.
     pub saving: Option<Saving>,
     /// A checkpoint from which it goes on.
@@ -170,9 +172,10 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
             (choice, settings, way)
         }
     };
-    memory::check(stage, &settings, layers::channels(&shape(&settings, &scene)))?;
+    let (settings, less) = fitted(&order, stage, settings)?;
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
     let mut plan = plan::plan(&asked, settings.method, stage, &removed);
+    plan.warnings.extend(less);
     plan.warnings.extend(ungrouped(&scene, &settings));
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     watch.begins(&plan, &settings);
@@ -285,8 +288,19 @@ fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Set
     let settings = sized(order.settings.clone(), order.photons, camera.size());
     let selection = layers::selection(&order.layers, &shape(&settings, scene), order.finish.is_some())?;
     // Before anything is tried, which takes time.
-    memory::check((scene, camera), &settings, layers::channels(&shape(&settings, scene)))?;
+    fitted(order, (scene, camera), settings.clone())?;
     Ok((settings, selection))
+}
+
+/// Settings that fit into memory, and what the cap that was asked for takes from them.
+fn fitted(order: &Order<'_>, stage: (&Scene, &Camera), settings: Settings) -> Result<(Settings, Option<String>)> {
+    let channels = layers::channels(&shape(&settings, stage.0));
+    let (settings, less) = match order.memory {
+        Some(cap) => cap.plan(stage, settings, channels)?,
+        None => (settings, None),
+    };
+    memory::check(stage, &settings, channels, order.finish.is_some())?;
+    Ok((settings, less))
 }
 
 /// Settings for a picture of that size: what the number of light paths follows from where none is asked for.

@@ -2,6 +2,7 @@
 
 mod glb;
 
+mod animation;
 mod bad_input;
 mod fuzz;
 mod geometry;

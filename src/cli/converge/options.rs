@@ -8,6 +8,7 @@ use crate::cli::scene::SceneArgs;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::MAX_SIZE;
+use caustique::stat::sum::MOST_TERMS;
 use clap::ValueEnum;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;
@@ -41,7 +42,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop each run after so many iterations
-    #[arg(long, value_name = "N", value_parser = whole(1_u64..=2_000_000_000), help_heading = "When to stop")]
+    #[arg(long, value_name = "N", value_parser = whole(1_u64..=MOST_TERMS), help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Measure at iterations that grow by this factor, in (1, 10]
     #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, value_parser = between(Excluded(1.0), Included(10.0)), help_heading = "Runs")]
@@ -76,7 +77,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
     pub reference_time: Option<f64>,
     /// Iterations of each of the two halves of a reference made here [default: 16 times --iterations, without --time]
-    #[arg(long, value_name = "N", value_parser = whole(2_u64..=2_000_000_000), conflicts_with = "reference", help_heading = "Error")]
+    #[arg(long, value_name = "N", value_parser = whole(2_u64..=MOST_TERMS), conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
     /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]

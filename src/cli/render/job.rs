@@ -1,6 +1,7 @@
 //! What is rendered and how: the options that `caustique render` and `caustique plan` have in common.
 
 use crate::cli::finish::FinishArgs;
+use crate::cli::frames::Frames;
 use crate::cli::number::{between, positive, relative_error, whole};
 use crate::cli::scene::SceneArgs;
 use caustique::camera::{Filter, WIDEST};
@@ -24,7 +25,7 @@ use std::ops::Bound::{Excluded, Included};
 use std::str::FromStr;
 
 /// A picture of a scene, the method, and when to stop.
-#[derive(clap::Args, Serialize)]
+#[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct Job {
     /// How light is found
@@ -105,6 +106,10 @@ pub struct Job {
     /// Seed: another number, other noise; the same number and options, the same picture to the last bit
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole(0..=u64::MAX), help_heading = "Method")]
     pub seed: u64,
+    /// Noise of the frames: 'vary' gives frame N the seed S + N, so that what noise is left moves; 'same' gives all of them
+    /// the seed S, so that it stays in place
+    #[arg(long, value_enum, default_value_t = FrameSeed::Vary, help_heading = "Method")]
+    pub frame_seed: FrameSeed,
 
     /// Stop after so many seconds of rendering; the running iteration is finished
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
@@ -223,6 +228,16 @@ pub enum Switch {
     On,
     /// Off
     Off,
+}
+
+/// Seeds of frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FrameSeed {
+    /// Another for each
+    Vary,
+    /// The same for all
+    Same,
 }
 
 /// Rules by which bandwidths shrink.
@@ -492,6 +507,15 @@ impl Job {
         allowed.map(|settings| sized(settings, self.photons, size))
     }
 
+    /// The seed of the frame that is rendered.
+    fn seed_of_frame(&self) -> u64 {
+        let frame = self.scene.frames.and_then(Frames::single);
+        match (self.frame_seed, frame) {
+            (FrameSeed::Vary, Some(frame)) => self.seed.wrapping_add(frame.into()),
+            _ => self.seed,
+        }
+    }
+
     /// Parameters of the chi-squared rule.
     fn chi_squared(&self) -> ChiSquaredSettings {
         let usual = ChiSquaredSettings::default();
@@ -548,7 +572,7 @@ impl Job {
         }
         let settings = render::Settings {
             method,
-            seed: self.seed,
+            seed: self.seed_of_frame(),
             photons: self.photons.unwrap_or(method.photons()),
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,

@@ -1,8 +1,10 @@
 //! `caustique render`: a scene in, an EXR and perhaps a PNG out.
 
+mod files;
 mod job;
 mod options;
 mod preview;
+mod sequence;
 mod summary;
 mod techniques;
 
@@ -10,15 +12,15 @@ pub use job::{Job, Method};
 pub use options::RenderArgs;
 
 use super::finish::tell_missing;
-use super::progress::{Reporter, Waiting};
+use super::progress::{Reporter, Turn, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Result};
 use caustique::film::LayerSet;
 use caustique::image::atomic;
-use caustique::image::exr::{self, Attributes};
+use caustique::image::exr;
+use caustique::pipeline::memory::Cap;
 use caustique::pipeline::plan::why;
-use caustique::pipeline::shard::Tail;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
 use caustique::render::auto::Choice;
@@ -31,22 +33,33 @@ use serde_json::json;
 use std::path::Path;
 pub use summary::{Summary, tell_finish, tell_picture};
 
-/// Renders: everything that can be wrong is found before the first light path.
+/// Renders a scene, or frames of it.
 pub fn run(args: &RenderArgs) -> Result<()> {
+    super::pool(args.threads)?.install(|| match args.job.scene.frames {
+        Some(frames) => sequence::run(args, frames),
+        None => {
+            sequence::refuse_patterns(args)?;
+            one(args, None)
+        }
+    })
+}
+
+/// Renders one picture: everything that can be wrong is found before the first light path.
+fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     let settings = args.settings()?;
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
     let groups = layers::groups_named(&args.layers);
     layers::selection(&args.layers, &shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
-    output::check(&args.output, "exr")?;
+    output::check_render(&args.output)?;
     args.picture.check()?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
     techniques::prepare(args)?;
-    super::pool(args.threads)?.install(|| render(args, settings))
+    render(args, turn, settings)
 }
 
-fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
+fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<()> {
     let allowed = |way, size| args.job.allowed(way, size);
     let auto = (args.job.method == Method::Auto)
         .then(|| args.job.pilot_finish().map(|finish| Auto { allowed: &allowed, finish }))
@@ -64,11 +77,13 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
         naming: args.exr_naming.into(),
         arguments: json!(args),
         reproducible: args.reproducible,
+        memory: args.memory.map(|mib| Cap { bytes: u64::from(mib) << 20 }),
         saving: args.saving(),
         resume: args.resume.clone(),
     };
     let mut told = Telling {
         args,
+        turn,
         interrupt: None,
         waiting: None,
         reporter: None,
@@ -84,6 +99,7 @@ fn render(args: &RenderArgs, settings: Settings) -> Result<()> {
 /// Tells people and programs how a render goes.
 struct Telling<'a> {
     args: &'a RenderArgs,
+    turn: Option<Turn>,
     interrupt: Option<Interrupt>,
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
@@ -129,7 +145,7 @@ impl Watch for Telling<'_> {
         if let Some(why) = self.why.take().filter(|_| self.args.progress.for_people()) {
             say(&format!("method: {why}"));
         }
-        self.reporter = Some(Reporter::new(self.args.progress, settings));
+        self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         self.preview = Preview::of(self.args, self.made_for);
         tell_plan(&self.args.job.scene.path, &plan.warnings);
     }
@@ -175,7 +191,7 @@ impl Telling<'_> {
         let Delivery { set, attributes, techniques, finished, finishing, refusal, tail } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
-        let written = write(args, &set, &attributes, tail.as_ref());
+        let written = files::write(args, &set, &attributes, tail.as_ref());
         let pictured = args.picture.write_png(&set, &made_for);
         let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if let Some(mut preview) = preview {
@@ -217,25 +233,4 @@ pub fn tell_plan(scene: &Path, warnings: &[String]) {
     for warning in warnings {
         say(&format!("warning: {}: {warning}", scene.display()));
     }
-}
-
-/// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
-///
-/// # Errors
-/// The EXR could not be written where it was asked for; the hint says where it is instead.
-fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: Option<&Tail>) -> Result<()> {
-    let options = args.picture.exr_options(args.exr_naming.into());
-    let write = |path: &Path| {
-        exr::write_followed(path, set, attributes, options, |file| tail.map_or(Ok(()), |tail| tail.write(file)))
-    };
-    let Err(error) = write(&args.output) else { return Ok(()) };
-    let name = args.output.file_name().unwrap_or("render.exr".as_ref());
-    // A folder of its own: a file of that name may be there.
-    let Ok(folder) = tempfile::Builder::new().prefix("caustique-").tempdir() else { return Err(error) };
-    let rescued = folder.path().join(name);
-    if write(&rescued).is_err() {
-        return Err(error);
-    }
-    let _ = folder.keep();
-    Err(error.hint(format!("the render is in {}", rescued.display())))
 }

@@ -3,7 +3,8 @@
 
 use super::job::{Job, idle};
 use super::preview::Target;
-use crate::cli::number::{positive, threads};
+use crate::cli::frames::numbered;
+use crate::cli::number::{positive, threads, whole};
 use crate::cli::output::{Naming, PictureArgs};
 use crate::cli::progress::Form;
 use caustique::error::{Error, Kind, Result};
@@ -19,11 +20,12 @@ use std::path::PathBuf;
 /// there is; a second one ends at once.
 ///
 /// An option given twice: the last one holds. -h shows what a person needs first, --help everything.
-#[derive(clap::Args, Serialize)]
+#[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_line_help = true)]
 pub struct RenderArgs {
-    /// EXR to write: the picture and every layer that made it
+    /// EXR to write: the picture and every layer that made it; '-' writes to standard output. With --frames '####' in its
+    /// name stands for the frame's number
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     #[serde(skip)]
     pub output: PathBuf,
@@ -31,6 +33,11 @@ pub struct RenderArgs {
     #[command(flatten)]
     #[serde(flatten)]
     pub job: Job,
+
+    /// Pass over frames whose output is there already, so that a run can go on and several machines share one
+    #[arg(long, help_heading = "Running")]
+    #[serde(skip)]
+    pub skip_existing: bool,
 
     /// Layers of the EXR: 'all', 'comp' (the picture, its parts, albedo, normal, depth, cryptomattes; half floats where
     /// they serve), 'beauty', or names separated by commas
@@ -74,6 +81,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "DIR", help_heading = "Expert")]
     #[serde(skip)]
     pub debug_techniques: Option<PathBuf>,
+    /// The most that photons, pixels and layers may take, in MiB, beside the scene itself. Where they need more, the light
+    /// paths of an iteration become fewer (with pm: the room of its map), and a warning says how many; what cannot fit is
+    /// refused [default: what the machine and its limits leave, and nothing becomes fewer]
+    #[arg(long, value_name = "MIB", value_parser = whole(1..=u32::MAX), help_heading = "Running")]
+    pub memory: Option<u32>,
     /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
@@ -99,6 +111,32 @@ impl RenderArgs {
             return Err(Error::new(Kind::Usage, "command line", cause).hint("leave --debug-techniques out"));
         }
         Ok(Settings { techniques: self.debug_techniques.is_some(), ..settings })
+    }
+
+    /// The same for one frame alone, its number in the names of files.
+    pub fn at(&self, frame: u32) -> RenderArgs {
+        let named = |path: &PathBuf| numbered(path, frame).unwrap_or_else(|| path.clone());
+        RenderArgs {
+            output: named(&self.output),
+            job: Job { scene: self.job.scene.at(frame), ..self.job.clone() },
+            picture: PictureArgs { png: self.picture.png.as_ref().map(named), ..self.picture.clone() },
+            checkpoint: self.checkpoint.as_ref().map(named),
+            resume: self.resume.as_ref().map(named),
+            debug_techniques: self.debug_techniques.as_ref().map(named),
+            ..self.clone()
+        }
+    }
+
+    /// Files that are written or read for each frame, with their options.
+    pub fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
+        let files = [
+            ("--output", Some(&self.output)),
+            ("--png", self.picture.png.as_ref()),
+            ("--checkpoint", self.checkpoint.as_ref()),
+            ("--resume", self.resume.as_ref()),
+            ("--debug-techniques", self.debug_techniques.as_ref()),
+        ];
+        files.into_iter().filter_map(|(option, path)| Some((option, path?)))
     }
 
     /// Where the state is saved, if at all.

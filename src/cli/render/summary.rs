@@ -1,6 +1,7 @@
 //! What a render says when its pixels are gone.
 
 use super::options::RenderArgs;
+use crate::cli::output::is_stdout;
 use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
@@ -108,7 +109,13 @@ impl Summary {
         }
         let cause = format!("interrupted after {} iterations, which are written", self.iterations);
         let error = Error::new(Kind::Interrupted, args.output.display(), cause);
+        let of_frames = args.job.scene.frames.is_some();
         Err(match args.saving().filter(|saving| saving.path.exists()) {
+            Some(_) if of_frames => error.hint("the same command with --skip-existing goes on"),
+            None if of_frames => error.hint(format!(
+                "remove {} before the same command with --skip-existing goes on: it is not finished",
+                args.output.display()
+            )),
             Some(saving) => error.hint(format!("the same command with --resume {} goes on", saving.path.display())),
             None => error,
         })
@@ -118,7 +125,8 @@ impl Summary {
 /// The file of a picture.
 pub fn tell_picture(output: &Path, set: &LayerSet) {
     let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
-    say(&format!("{}: {} x {}, {channels} channels", output.display(), set.width, set.height));
+    let name = if is_stdout(output) { "standard output".into() } else { output.display().to_string() };
+    say(&format!("{name}: {} x {}, {channels} channels", set.width, set.height));
 }
 
 /// What has finished a picture, and in how many seconds; what it tells of its error knows of `told`.

@@ -10,7 +10,7 @@ use gltf::json::validation::Checked;
 
 /// More elements than this a file does not get out of nothing, as accessors without a buffer view ask for, whose
 /// purpose is that a few of them are replaced.
-const MOST_ZEROS: u64 = 1 << 20;
+pub(super) const MOST_ZEROS: u64 = 1 << 20;
 
 const DAMAGED: &str = "the file is damaged: export it again";
 
@@ -95,6 +95,19 @@ impl Document<'_> {
         )
     }
 
+    /// Displacements of so many vertices. That many elements the file may leave out: it has shown as many.
+    pub(super) fn deltas(&self, index: usize, vertices: usize) -> Result<Vec<[f32; 3]>> {
+        let count = get(&self.accessors, index, "accessor")?.count.0;
+        if count != vertices as u64 {
+            return Err(fault(at("accessor", index), format!("{count} displacements are for {vertices} vertices"))
+                .hint(DAMAGED));
+        }
+        let left = self.zeros_left.replace(count);
+        let deltas = self.floats::<3>(index);
+        self.zeros_left.set(left);
+        deltas
+    }
+
     /// Vertex indices.
     pub(super) fn indices(&self, index: usize) -> Result<Vec<u32>> {
         self.elements(index, 1, 0, &unsigned, true)
@@ -152,12 +165,11 @@ impl Document<'_> {
                 values
             }
             None => {
-                let zeros = self.zeros.get().saturating_add(count);
-                if zeros > MOST_ZEROS {
+                let Some(left) = self.zeros_left.get().checked_sub(count) else {
                     let cause = format!("{count} elements are promised without any data");
                     return Err(fault(place(), cause).hint(DAMAGED));
-                }
-                self.zeros.set(zeros);
+                };
+                self.zeros_left.set(left);
                 let mut values = room(count as usize).map_err(|e| e.within(place()))?;
                 values.resize(count as usize, zero);
                 values

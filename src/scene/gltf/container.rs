@@ -8,9 +8,10 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Extensions that are read.
-const SUPPORTED: [&str; 18] = [
+const SUPPORTED: [&str; 19] = [
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -28,6 +29,11 @@ const SUPPORTED: [&str; 18] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
+
+/// Whether an extension is read.
+pub(super) fn is_read(extension: &str) -> bool {
+    SUPPORTED.contains(&extension)
+}
 
 /// Splits a `.glb` into its JSON and binary chunks; a `.gltf` is all JSON.
 pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
@@ -103,7 +109,7 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
         names.filter_map(|name| name.as_str().map(str::to_owned)).collect()
     };
     let required = listed("extensionsRequired");
-    let unknown: Vec<&String> = required.iter().filter(|name| !SUPPORTED.contains(&name.as_str())).collect();
+    let unknown: Vec<&String> = required.iter().filter(|name| !is_read(name)).collect();
     if let Some(first) = unknown.first() {
         let names: Vec<String> = unknown.iter().map(|name| format!("\"{name}\"")).collect();
         let (word, are) = if unknown.len() == 1 { ("extension", "is") } else { ("extensions", "are") };
@@ -115,7 +121,7 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
     }
     let mut used = listed("extensionsUsed");
     collect(document, &mut used);
-    for name in used.iter().filter(|name| !SUPPORTED.contains(&name.as_str())) {
+    for name in used.iter().filter(|name| !is_read(name)) {
         warnings.push(format!("extension \"{name}\" is not supported: what it says is ignored"));
     }
     Ok(())
@@ -142,7 +148,7 @@ fn collect(value: &Value, names: &mut BTreeSet<String>) {
                     ("extensions", Value::Object(extensions)) => {
                         for (name, extension) in extensions {
                             names.insert(name.clone());
-                            if SUPPORTED.contains(&name.as_str()) {
+                            if is_read(name) {
                                 collect(extension, names);
                             }
                         }

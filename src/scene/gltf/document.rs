@@ -1,5 +1,6 @@
 //! A glTF document in parts with types, its raw JSON beside them for extensions and extras.
 
+use super::accessor::MOST_ZEROS;
 use super::container::{self, malformed};
 use super::{fault, uri};
 use crate::error::Result;
@@ -24,8 +25,8 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
-    /// Elements made out of nothing so far.
-    pub(super) zeros: Cell<u64>,
+    /// Elements that may still be made out of nothing.
+    pub(super) zeros_left: Cell<u64>,
     /// Bytes of elements that were taken since memory was last asked for.
     pub(super) unasked: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
@@ -61,10 +62,25 @@ impl<'a> Document<'a> {
             samplers: parts(&raw, "samplers")?,
             raw,
             folder,
-            zeros: Cell::new(0),
+            zeros_left: Cell::new(MOST_ZEROS),
             unasked: Cell::new(0),
             buffers,
         })
+    }
+
+    /// Index of the scene that is shown.
+    pub(super) fn default_scene(&self) -> Result<usize> {
+        let Some(value) = self.raw.get("scene") else { return Ok(0) };
+        let index = value.as_u64().and_then(|i| usize::try_from(i).ok());
+        let index = index.ok_or_else(|| fault("scene", "the default scene is not an index"))?;
+        get(&self.scenes, index, "scene").map(|_| index)
+    }
+
+    /// Reads what may have been moved in the raw JSON.
+    pub(super) fn read_again(&mut self) -> Result<()> {
+        self.nodes = parts(&self.raw, "nodes")?;
+        self.cameras = parts(&self.raw, "cameras")?;
+        Ok(())
     }
 
     /// The raw JSON of part `index` of a list of the document; `null` if there is none.

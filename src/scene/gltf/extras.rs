@@ -24,6 +24,24 @@ pub(super) struct SceneExtras {
     pub(super) tonemap: Option<ToneCurve>,
     pub(super) crop: Option<[f64; 4]>,
     pub(super) film_transparent: bool,
+    pub(super) frame_rate: Option<FrameRate>,
+}
+
+/// Frames a second, or frames and in how many seconds they are shown, as Blender and film count (24000 in 1001).
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged)]
+pub(super) enum FrameRate {
+    Number(f64),
+    Ratio([f64; 2]),
+}
+
+impl FrameRate {
+    pub(super) fn frames_a_second(self) -> f64 {
+        match self {
+            FrameRate::Number(rate) => rate,
+            FrameRate::Ratio([frames, seconds]) => frames / seconds,
+        }
+    }
 }
 
 /// To whom something is visible; light meets it either way.
@@ -141,6 +159,7 @@ pub(super) const SCENE: &[&str] = &[
     "tonemap",
     "crop",
     "film_transparent",
+    "frame_rate",
 ];
 pub(super) const MATERIAL: &[&str] =
     &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "null_bsdf", "spread_deg"];

@@ -1,5 +1,6 @@
 //! Primitives to triangle meshes.
 
+use super::deform::Deformation;
 use super::document::{Document, get, named};
 use super::{counted, fault, shading_frame};
 use crate::error::Result;
@@ -11,18 +12,20 @@ use gltf::json::validation::Checked;
 /// Larger coordinates (m) leave no room for the square of an area in f32.
 pub(super) const FARTHEST: f64 = 1e9;
 
-/// Reads primitive `primitive` of mesh `mesh`. `None`: it has nothing to render, and a warning says why.
+/// Reads primitive `primitive` of mesh `index`, in the shape that a node gives it. `None`: it has nothing to render, and a
+/// warning says why.
 ///
 /// # Errors
 /// Anything it names is missing, out of range or not finite.
 pub(super) fn read(
     document: &Document,
-    mesh: usize,
+    index: usize,
     primitive: usize,
+    deformation: &Deformation,
     warnings: &mut Vec<String>,
 ) -> Result<Option<Mesh>> {
-    let parent = get(&document.meshes, mesh, "mesh")?;
-    let name = named("mesh", parent.name.as_deref(), mesh);
+    let parent = get(&document.meshes, index, "mesh")?;
+    let name = named("mesh", parent.name.as_deref(), index);
     let place = format!("{name}, primitive {primitive}");
     let plain = parent.name.clone().filter(|n| !n.is_empty()).unwrap_or(name);
     let source = get(&parent.primitives, primitive, "primitive")?;
@@ -54,6 +57,9 @@ pub(super) fn read(
         warnings.push(format!("{place}: the last {} of its indices make no triangle", order.len() % 3));
     }
     reader.attributes(&mut mesh, warnings)?;
+    let raw = &document.part("meshes", index)["primitives"][primitive];
+    deformation.apply(document, source, raw, &mut mesh, &place, warnings)?;
+    reader.check_positions(&mesh.positions)?;
     Ok(Some(mesh))
 }
 
@@ -186,13 +192,6 @@ impl Reader<'_> {
                     .push(format!("{}: some tangents have no direction: all are made from the texture", self.place));
                 mesh.tangents = Vec::new();
             }
-        }
-        let extra = |s: &Checked<Semantic>| matches!(s, Checked::Valid(Semantic::Joints(_)));
-        if self.source.attributes.keys().any(extra) {
-            warnings.push(format!("{}: its skin is ignored: it is rendered as it was modelled", self.place));
-        }
-        if self.source.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-            warnings.push(format!("{}: its morph targets are ignored: the base shape is rendered", self.place));
         }
         Ok(())
     }

@@ -4,11 +4,14 @@
 //! a document; what they say about indices, ranges and bytes is checked here, because files come from anywhere: a fault
 //! is an error that names its place, and whatever is ignored or approximated is a warning.
 //!
-//! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `nodes` (the hierarchy),
-//! which calls for meshes, materials and textures as it meets them, so that what no node uses is not even decoded.
+//! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `animation` (which puts a
+//! moment of its curves into the document) -> `nodes` (the hierarchy), which calls for meshes, materials and textures as it meets them, so that what no node uses is not even decoded.
 
 mod accessor;
+mod animation;
 mod container;
+mod curve;
+mod deform;
 mod document;
 mod extras;
 mod lights;
@@ -16,9 +19,11 @@ mod material;
 mod materials;
 mod mesh;
 mod nodes;
+mod pointer;
 mod shading_frame;
 mod texture;
 mod topology;
+mod transform;
 mod uri;
 
 use super::Description;
@@ -52,8 +57,19 @@ pub enum Glass {
     Thin,
 }
 
+/// A frame of the animations in a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Its number: frame N is N / rate seconds after the start.
+    pub number: u32,
+    /// Frames a second of files that do not tell theirs; 24 if this does not either.
+    pub rate: Option<f64>,
+    /// The file is that of this frame alone, and may well be still.
+    pub of_sequence: bool,
+}
+
 /// How to read what a file leaves open.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ReadOptions {
     /// Units of punctual lights.
     pub light_units: LightUnits,
@@ -61,6 +77,8 @@ pub struct ReadOptions {
     pub glass: Glass,
     /// Files that the scene names may lie outside its own folder.
     pub allow_outside: bool,
+    /// The frame that is shown; otherwise that at the first key of all animations.
+    pub frame: Option<Frame>,
 }
 
 /// Reads the scene file at `path`; buffers, textures and the environment that it names are looked for beside it, and

@@ -1,13 +1,15 @@
 //! The node hierarchy: transforms composed in f64, and what stands on the nodes.
 
+use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, SceneExtras};
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
-use super::{ReadOptions, counted, fault, lights, mesh, shading_frame, topology};
+use super::transform::{self, can_be_inverted, compose, finite, local};
+use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology};
 use crate::error::Result;
 use crate::geometry::Mesh;
-use crate::math::{DAffine3, DMat3, DVec3, Rgb};
+use crate::math::{DAffine3, DVec3, Rgb};
 use crate::memory;
 use crate::scene::Description;
 use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Picture, Placed};
@@ -26,11 +28,13 @@ const PLACED_BYTES: u64 = 1000;
 pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
     let mut warnings = Vec::new();
     let folder = Folder::of(path, options.allow_outside);
-    let document = Document::parse(bytes, folder, &mut warnings)?;
+    let mut document = Document::parse(bytes, folder, &mut warnings)?;
+    animation::pose(&mut document, options.frame, &mut warnings)?;
     let mut reader = Reader {
         document: &document,
         library: Library::new(options.glass),
         meshes: HashMap::new(),
+        parents: transform::parents(&document),
         bounds: Vec::new(),
         divisor: None,
         options: *options,
@@ -84,8 +88,10 @@ struct Part {
 struct Reader<'r> {
     document: &'r Document<'r>,
     library: Library,
-    /// By mesh of the file.
-    meshes: HashMap<usize, Vec<Part>>,
+    /// By mesh of the file, and the node that gives it a shape of its own.
+    meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
+    /// Of each node.
+    parents: Vec<Option<usize>>,
     /// Local bounds of the meshes read.
     bounds: Vec<(DVec3, DVec3)>,
     /// What divides intensities, once it is known.
@@ -98,14 +104,7 @@ struct Reader<'r> {
 impl Reader<'_> {
     fn scene(&mut self) -> Result<()> {
         let document = self.document;
-        let index = match document.raw.get("scene") {
-            None => 0,
-            Some(value) => {
-                let index = value.as_u64().and_then(|i| usize::try_from(i).ok());
-                let index = index.ok_or_else(|| fault("scene", "the default scene is not an index"))?;
-                get(&document.scenes, index, "scene").map(|_| index)?
-            }
-        };
+        let index = document.default_scene()?;
         let roots = match document.scenes.get(index) {
             Some(scene) => scene.nodes.iter().map(|n| n.value()).collect(),
             None => self.orphans(),
@@ -120,12 +119,7 @@ impl Reader<'_> {
         self.out.warnings.append(&mut self.scene.losses);
         self.picture(&place)?;
         self.environment(&place).map_err(|e| e.within(&place))?;
-        self.walk(roots)?;
-        if let Some(animations) = document.raw["animations"].as_array().filter(|a| !a.is_empty()) {
-            let n = counted(animations.len(), "animation", "animations");
-            self.out.warnings.push(format!("{n} ignored: the nodes are rendered where they stand"));
-        }
-        Ok(())
+        self.walk(roots)
     }
 
     /// The picture that the file was made for.
@@ -259,22 +253,25 @@ impl Reader<'_> {
             let known = |name: &String| !name.is_empty();
             let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
             let said = extras::read::<ObjectExtras>(raw, place)?;
-            self.place(mesh, name, self.copies(raw, place)?, to_world, &said, place)?;
+            let shape = Deformation::of(document, mesh, index, &self.parents).map_err(|e| e.within(place))?;
+            // Where the node of a skinned mesh stands says nothing: its joints do.
+            let to_world = shape.center.unwrap_or(to_world);
+            let parts = self.parts(mesh, deform::is_own(raw).then_some(index), &shape)?;
+            self.place(&parts, name, self.copies(raw, place)?, to_world, &said, place)?;
         }
         Ok(())
     }
 
-    /// Places a mesh, once for each of `copies`.
+    /// Places the parts of a mesh, once for each of `copies`.
     fn place(
         &mut self,
-        mesh: usize,
+        parts: &[Part],
         name: String,
         copies: Vec<DAffine3>,
         to_world: DAffine3,
         said: &ObjectExtras,
         place: &str,
     ) -> Result<()> {
-        let parts = self.parts(mesh)?;
         if parts.is_empty() {
             return Ok(());
         }
@@ -288,7 +285,7 @@ impl Reader<'_> {
                 flat += 1;
                 continue;
             }
-            for &Part { mesh, material } in &parts {
+            for &Part { mesh, material } in parts {
                 self.check_reach(mesh, &to_world, place)?;
                 let (name, light_group) = (name.clone(), said.light_group.clone());
                 let hidden_from_camera = !said.visible.camera;
@@ -315,16 +312,17 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The primitives of a mesh with their materials, read at the first call.
-    fn parts(&mut self, index: usize) -> Result<Vec<Part>> {
-        if let Some(parts) = self.meshes.get(&index) {
+    /// The primitives of a mesh with their materials, read at the first call; `owner`: the node whose shape of it is none
+    /// other's.
+    fn parts(&mut self, index: usize, owner: Option<usize>, shape: &Deformation) -> Result<Vec<Part>> {
+        if let Some(parts) = self.meshes.get(&(index, owner)) {
             return Ok(parts.clone());
         }
         let document = self.document;
         let source = get(&document.meshes, index, "mesh")?;
         let mut read: Vec<(usize, Mesh)> = Vec::new();
         for i in 0..source.primitives.len() {
-            if let Some(mesh) = mesh::read(document, index, i, &mut self.out.warnings)? {
+            if let Some(mesh) = mesh::read(document, index, i, shape, &mut self.out.warnings)? {
                 read.push((i, mesh));
             }
         }
@@ -370,7 +368,7 @@ impl Reader<'_> {
             self.bounds.push((low, points().fold(DVec3::NEG_INFINITY, DVec3::max)));
             self.out.meshes.push(mesh);
         }
-        self.meshes.insert(index, parts.clone());
+        self.meshes.insert((index, owner), parts.clone());
         Ok(parts)
     }
 
@@ -412,45 +410,4 @@ impl Reader<'_> {
         memory::check(bytes, format_args!("{placed} placed meshes"))
             .map_err(|e| e.hint("place fewer copies, join them into one mesh, or render with more memory"))
     }
-}
-
-/// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3),
-/// with all the digits of the file.
-fn local(raw: &Value, place: &str) -> Result<DAffine3> {
-    fn numbers<const N: usize>(raw: &Value, key: &str, place: &str) -> Result<Option<[f64; N]>> {
-        let Some(value) = raw.get(key) else { return Ok(None) };
-        let list = value.as_array().map_or(&[][..], Vec::as_slice);
-        let numbers: Option<Vec<f64>> = list.iter().map(Value::as_f64).collect();
-        let numbers = numbers.and_then(|n| <[f64; N]>::try_from(n).ok());
-        numbers.map(Some).ok_or_else(|| fault(place, format!("its {key} is not {N} numbers")))
-    }
-    if let Some(m) = numbers::<16>(raw, "matrix", place)? {
-        if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(fault(place, "the last row of its matrix is not 0, 0, 0, 1"));
-        }
-        let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
-        return Ok(DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) });
-    }
-    let (t, r, s) =
-        (numbers(raw, "translation", place)?, numbers(raw, "rotation", place)?, numbers(raw, "scale", place)?);
-    compose(t, r, s).ok_or_else(|| fault(place, "its rotation is not a quaternion"))
-}
-
-/// Scale, then rotation (a quaternion, made unit), then translation. `None`: the rotation has no direction.
-fn compose(t: Option<[f64; 3]>, r: Option<[f64; 4]>, s: Option<[f64; 3]>) -> Option<DAffine3> {
-    let rotation = glam::DVec4::from_array(r.unwrap_or([0.0, 0.0, 0.0, 1.0])).try_normalize()?;
-    let (t, s) = (DVec3::from_array(t.unwrap_or([0.0; 3])), DVec3::from_array(s.unwrap_or([1.0; 3])));
-    Some(DAffine3::from_scale_rotation_translation(s, glam::DQuat::from_vec4(rotation), t))
-}
-
-fn finite(transform: &DAffine3) -> bool {
-    transform.matrix3.is_finite() && transform.translation.is_finite()
-}
-
-/// Whether f32 can hold the inverse of a transform.
-fn can_be_inverted(transform: &DAffine3) -> bool {
-    let inverse = transform.matrix3.inverse();
-    transform.matrix3.determinant() != 0.0
-        && inverse.is_finite()
-        && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
 }

@@ -56,8 +56,37 @@ fn everything() -> Glb {
     file.node(json!({"name": "Cube", "mesh": mesh, "children": [child], "rotation": [0, 0, 0, 1], "scale": [1, 2, 3]}));
     file.node(json!({"name": "Lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}, "camera": 0,
         "extras": {"caustique": {"radius": 0.1}}}));
-    file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0.1, 0.2, 0.3], "strength": 2}}});
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0.1, 0.2, 0.3], "strength": 2},
+        "frame_rate": [24000, 1001]}});
+    moving(&mut file, mesh, child);
     file
+}
+
+/// Adds a skinned and morphed twin of a mesh, whose joint, weights and light move.
+fn moving(file: &mut Glb, mesh: usize, joint: usize) {
+    let (joints, weights) = (file.floats(&[[0.0; 4]; 8]), file.floats(&[[0.5, 0.5, 0.0, 0.0]; 8]));
+    let mut primitive = file.json["meshes"][mesh]["primitives"][0].clone();
+    primitive["attributes"]["JOINTS_0"] = json!(joints);
+    primitive["attributes"]["WEIGHTS_0"] = json!(weights);
+    let bent = file.floats(&[[0.1, 0.2, 0.3]; 8]);
+    primitive["targets"] = json!([{"POSITION": bent, "NORMAL": bent}]);
+    let twin = file.push("meshes", json!({"name": "twin", "primitives": [primitive], "weights": [0.5]}));
+    let binds = file.floats(&[[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]);
+    file.json["accessors"][binds]["type"] = json!("MAT4");
+    file.json["accessors"][binds]["count"] = json!(1);
+    file.push("skins", json!({"joints": [joint], "inverseBindMatrices": binds}));
+    let node = file.node(json!({"name": "Twin", "mesh": twin, "skin": 0}));
+    let times = file.floats(&[[0.5], [1.0]]);
+    let samplers = [file.floats(&[[0.0], [1.0]]), file.floats(&[[0.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]])];
+    let samplers = samplers.map(|output| json!({"input": times, "output": output, "interpolation": "LINEAR"}));
+    let pointer = json!({"pointer": "/extensions/KHR_lights_punctual/lights/0/intensity"});
+    file.push(
+        "animations",
+        json!({"name": "act", "samplers": samplers, "channels": [
+        {"sampler": 0, "target": {"node": node, "path": "weights"}},
+        {"sampler": 1, "target": {"node": joint, "path": "rotation"}},
+        {"sampler": 0, "target": {"path": "pointer", "extensions": {"KHR_animation_pointer": pointer}}}]}),
+    );
 }
 
 /// A file as Blender exports it.

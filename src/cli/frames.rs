@@ -1,0 +1,151 @@
+//! Frames of an animation, and their numbers in the names of files.
+
+use super::number::whole;
+use serde::{Serialize, Serializer};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// `--frames A-B[,STEP]`: every STEPth frame from A to B.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    first: u32,
+    last: u32,
+    step: u32,
+}
+
+/// The last number that a frame may have.
+const LAST: u32 = 10_000_000;
+
+impl Frames {
+    /// One frame.
+    pub fn one(frame: u32) -> Frames {
+        Frames { first: frame, last: frame, step: 1 }
+    }
+
+    /// The numbers.
+    pub fn iter(self) -> impl ExactSizeIterator<Item = u32> {
+        let count = (self.last - self.first) / self.step + 1;
+        (0..count).map(move |i| self.first + i * self.step)
+    }
+
+    /// The frame, if it is one alone.
+    pub fn single(self) -> Option<u32> {
+        (self.iter().len() == 1).then_some(self.first)
+    }
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Frames, String> {
+        let shape = || "it must be A-B, A-B,STEP or a single frame, such as 1-100 or 1-100,2".to_string();
+        let number = |text: &str| whole(0..=LAST)(text.trim()).map_err(|_| shape());
+        let (range, step) = text.split_once(',').map_or((text, Ok(1)), |(range, step)| (range, number(step)));
+        let (first, last) = range.split_once('-').unwrap_or((range, range));
+        let frames = Frames { first: number(first)?, last: number(last)?, step: step? };
+        match frames {
+            Frames { step: 0, .. } => Err("the step must be 1 or more".into()),
+            Frames { first, last, .. } if last < first => Err("the last frame comes before the first".into()),
+            frames => Ok(frames),
+        }
+    }
+}
+
+impl fmt::Display for Frames {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Frames { first, last, .. } if first == last => write!(f, "{first}"),
+            Frames { first, last, step: 1 } => write!(f, "{first}-{last}"),
+            Frames { first, last, step } => write!(f, "{first}-{last},{step}"),
+        }
+    }
+}
+
+impl Serialize for Frames {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A file whose name has a frame's number in place of each run of `#` (so many digits at least), of `%d` or of `%04d`;
+/// `None`: its name has none of these.
+pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
+    let name = path.file_name()?.to_str()?;
+    let (mut made, mut rest, mut found) = (String::new(), name, false);
+    while let Some((before, digits, after)) = place(rest) {
+        made += before;
+        made += &format!("{frame:0digits$}");
+        (rest, found) = (after, true);
+    }
+    found.then(|| path.with_file_name(made + rest))
+}
+
+/// Whether a name looks as if a number ought to stand in it: a single `#` may be part of it.
+pub fn is_pattern(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    name.contains("##") || name.contains('%') && numbered(path, 0).is_some_and(|_| !name.contains('#'))
+}
+
+/// The first place for a number: what stands before it, its least digits, and what stands behind.
+fn place(name: &str) -> Option<(&str, usize, &str)> {
+    name.char_indices().find_map(|(at, sign)| {
+        let rest = &name[at + sign.len_utf8()..];
+        match sign {
+            '#' => {
+                let behind = rest.trim_start_matches('#');
+                Some((&name[..at], 1 + rest.len() - behind.len(), behind))
+            }
+            '%' => {
+                let (digits, behind) = rest.split_once('d')?;
+                let width = if digits.is_empty() { 1 } else { digits.strip_prefix('0')?.parse().ok()? };
+                (width <= 20).then_some((&name[..at], width, behind))
+            }
+            _ => None,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges() {
+        let list = |text: &str| text.parse::<Frames>().map(|frames| frames.iter().collect::<Vec<u32>>());
+        assert_eq!(list("5"), Ok(vec![5]));
+        assert_eq!(list("0-3"), Ok(vec![0, 1, 2, 3]));
+        assert_eq!(list("1-10,4"), Ok(vec![1, 5, 9]));
+        assert_eq!(list("7-7,3"), Ok(vec![7]));
+        for (text, fault) in [
+            ("3-1", "the last frame comes before the first"),
+            ("1-9,0", "the step must be 1 or more"),
+            ("1-", "it must be A-B, A-B,STEP or a single frame, such as 1-100 or 1-100,2"),
+            ("-3", "it must be A-B, A-B,STEP or a single frame, such as 1-100 or 1-100,2"),
+            ("1-99999999999", "it must be A-B, A-B,STEP or a single frame, such as 1-100 or 1-100,2"),
+        ] {
+            assert_eq!(list(text), Err(fault.to_string()), "{text}");
+        }
+        for text in ["5", "1-100", "1-100,2"] {
+            assert_eq!(text.parse::<Frames>().map(|frames| frames.to_string()).as_deref(), Ok(text));
+        }
+        assert_eq!((Frames::one(3).single(), Frames { first: 1, last: 2, step: 1 }.single()), (Some(3), None));
+    }
+
+    #[test]
+    fn names() {
+        let name = |pattern: &str, frame| numbered(Path::new(pattern), frame).map(|path| path.display().to_string());
+        assert_eq!(name("a##/out.####.exr", 7).as_deref(), Some("a##/out.0007.exr"));
+        assert_eq!(name("#.exr", 12345).as_deref(), Some("12345.exr"));
+        assert_eq!(name("é_##_%03d.exr", 5).as_deref(), Some("é_05_005.exr"));
+        assert_eq!(name("out%d.exr", 5).as_deref(), Some("out5.exr"));
+        for plain in ["out.exr", "50%.exr", "%s.exr", "%99d.exr", "%5d.exr", "a##/out.exr"] {
+            assert_eq!(name(plain, 5), None, "{plain}");
+        }
+        for (path, pattern) in
+            [("out.####.exr", true), ("out.%04d.exr", true), ("take#3.exr", false), ("out.exr", false)]
+        {
+            assert_eq!(is_pattern(Path::new(path)), pattern, "{path}");
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! The EXR of a render: to its file, or to standard output, and if neither takes it among the temporary files.
+
+use super::options::RenderArgs;
+use crate::cli::{output, print_file};
+use caustique::error::{Error, Kind, Result};
+use caustique::film::LayerSet;
+use caustique::image::exr::{self, Attributes};
+use caustique::pipeline::shard::Tail;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
+///
+/// # Errors
+/// The EXR could not be written where it was asked for; the hint says where it is instead.
+pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: Option<&Tail>) -> Result<()> {
+    let options = args.picture.exr_options(args.exr_naming.into());
+    let into = |path: &Path| {
+        exr::write_followed(path, set, attributes, options, |file| tail.map_or(Ok(()), |tail| tail.write(file)))
+    };
+    if output::is_stdout(&args.output) {
+        // The header of a file is written last.
+        let kept = Kept::write("render.exr".as_ref(), into)?;
+        let failed = |cause| Error::new(Kind::Io, "standard output", cause);
+        return print_file(&kept.path).map_err(|cause| kept.told(failed(cause)));
+    }
+    let Err(error) = into(&args.output) else { return Ok(()) };
+    let name = args.output.file_name().unwrap_or("render.exr".as_ref());
+    Err(match Kept::write(name, into) {
+        Ok(kept) => kept.told(error),
+        Err(_) => error,
+    })
+}
+
+/// The EXR among the temporary files, in a folder of its own: a file of that name may be there.
+struct Kept {
+    folder: TempDir,
+    path: PathBuf,
+}
+
+impl Kept {
+    fn write(name: &OsStr, into: impl Fn(&Path) -> Result<()>) -> Result<Kept> {
+        let folder = tempfile::Builder::new().prefix("caustique-").tempdir();
+        let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))?;
+        let path = folder.path().join(name);
+        into(&path)?;
+        Ok(Kept { folder, path })
+    }
+
+    /// The error with what has become of the render, which stays there.
+    fn told(self, error: Error) -> Error {
+        let _ = self.folder.keep();
+        error.hint(format!("the render is in {}", self.path.display()))
+    }
+}

@@ -1,0 +1,82 @@
+//! `--frames`: one frame after the other, each a render of its own.
+
+use super::options::RenderArgs;
+use crate::cli::frames::{Frames, is_pattern, numbered};
+use crate::cli::progress::Turn;
+use crate::cli::say;
+use crate::cli::signals::Interrupt;
+use caustique::error::{Error, Kind, Result};
+
+/// Renders the frames in order, and ends at the first that fails, as Blender does; those before are written.
+pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
+    // What is wrong for all frames is no frame's fault.
+    args.settings()?;
+    check(args, frames)?;
+    let count = frames.iter().len();
+    for (before, frame) in frames.iter().enumerate() {
+        let mut one = args.at(frame);
+        // What a run that was stopped has left of it.
+        let left = one.saving().map(|saving| saving.path).filter(|path| args.skip_existing && path.is_file());
+        if args.skip_existing && left.is_none() && is_there(&one) {
+            if args.progress.for_people() {
+                say(&format!("frame {frame}: {} is there", one.output.display()));
+            }
+            continue;
+        }
+        if Interrupt::came() {
+            let cause = format!("interrupted before frame {frame}; the frames before it are written");
+            return Err(Error::new(Kind::Interrupted, args.output.display(), cause)
+                .hint("the same command with --skip-existing goes on"));
+        }
+        if args.progress.for_people() {
+            say(&format!("frame {frame} ({} of {count}): {}", before + 1, one.output.display()));
+        }
+        // Of several frames some may not have been begun.
+        one.resume = left.clone().or(one.resume.filter(|path| count == 1 || path.exists()));
+        super::one(&one, Some(Turn { frame, before, count })).map_err(|error| {
+            let of_left = left.filter(|left| error.place == left.display().to_string());
+            let error = match of_left {
+                Some(left) => error.hint(format!("give the same options, or remove {}", left.display())),
+                None => error,
+            };
+            error.within(format!("frame {frame}"))
+        })?;
+    }
+    Ok(())
+}
+
+/// Whether the output of a frame is there: it is whole if it is, and an empty one holds a place.
+fn is_there(args: &RenderArgs) -> bool {
+    std::fs::metadata(&args.output).is_ok_and(|data| data.is_file() && data.len() > 0)
+}
+
+/// Checks that no frame writes over another.
+fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
+    if frames.single().is_some() {
+        return Ok(());
+    }
+    for (option, path) in args.files() {
+        if numbered(path, 0).is_none() {
+            let cause = format!("{option} {}: all frames have the same name", path.display());
+            let error = Error::new(Kind::Usage, "command line", cause);
+            return Err(error.hint("put '####' where the frame's number belongs, such as out.####.exr"));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that no name waits for a number where there are no frames.
+///
+/// # Errors
+/// One does.
+pub fn refuse_patterns(args: &RenderArgs) -> Result<()> {
+    let scene = Some(("the scene", &args.job.scene.path)).filter(|(_, path)| !path.exists());
+    match args.files().chain(scene).find(|(_, path)| is_pattern(path)) {
+        None => Ok(()),
+        Some((option, path)) => {
+            let cause = format!("{option} {}: its name has a place for a frame's number", path.display());
+            let error = Error::new(Kind::Usage, "command line", cause);
+            Err(error.hint("give --frames, such as --frames 1-100, or another name"))
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! The moment of an animation: what its curves say at a time is put into the document, as if it stood there, before
+//! anything is read (specification, section 3.11; KHR_animation_pointer).
+//!
+//! All animations of a file play together, for exporters write one for each action or track. Frame N is at N / rate
+//! seconds, as in Blender's exporter.
+
+use super::container::{self, malformed};
+use super::curve::{Curve, Sampler};
+use super::document::{Document, get, named};
+use super::extras::{self, SceneExtras};
+use super::pointer::{self, Nowhere};
+use super::{Frame, fault};
+use crate::error::Result;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::HashMap;
+
+/// Frames a second where neither the scene nor anyone else says how many: those of Blender's and film's default.
+const USUAL_RATE: f64 = 24.0;
+
+#[derive(Deserialize)]
+struct Animation {
+    #[serde(default)]
+    name: Option<String>,
+    #[serde(default)]
+    channels: Vec<Channel>,
+    #[serde(default)]
+    samplers: Vec<Sampler>,
+}
+
+#[derive(Deserialize)]
+struct Channel {
+    sampler: usize,
+    target: Value,
+}
+
+/// Something that moves.
+struct Track {
+    /// JSON pointer to it.
+    pointer: String,
+    /// Which animation, and which channel of it.
+    place: String,
+    curve: Curve,
+}
+
+/// Puts a frame, or the beginning of its animations, into a document.
+///
+/// # Errors
+/// Keys that cannot be, or what moves does not exist.
+pub(super) fn pose(document: &mut Document, frame: Option<Frame>, warnings: &mut Vec<String>) -> Result<()> {
+    let tracks = tracks(document, warnings)?;
+    let Some(start) = tracks.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
+        if frame.is_some_and(|frame| !frame.of_sequence) {
+            warnings.push("nothing in the scene is animated: its frames are all the same".into());
+        }
+        return Ok(());
+    };
+    let time = match frame {
+        Some(frame) => f64::from(frame.number) / rate(document, frame, warnings)?,
+        None => {
+            warnings.push(format!("its animations begin at {start:.3} s, which is rendered (--frames chooses)"));
+            start
+        }
+    };
+    for Track { pointer, place, curve } in &tracks {
+        let turns = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
+        match pointer::put(&mut document.raw, pointer, &curve.at(time, turns), container::is_read) {
+            Ok(()) => {}
+            Err(Nowhere::Missing) => {
+                let cause = format!("it moves {pointer}, which does not exist");
+                return Err(fault(place, cause).hint("the file is damaged: export it again"));
+            }
+            Err(Nowhere::Unread) => {
+                warnings.push(format!("{place}: it moves {pointer}, which is not read: it stays as it is"));
+            }
+        }
+    }
+    document.read_again()
+}
+
+/// Frames a second.
+fn rate(document: &Document, frame: Frame, warnings: &mut Vec<String>) -> Result<f64> {
+    let index = document.default_scene()?;
+    let said: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
+    let said = said.frame_rate.map(|rate| rate.frames_a_second());
+    let good = |rate: &f64| rate.is_finite() && *rate > 0.0;
+    if said.is_some_and(|rate| !good(&rate)) {
+        let cause = "extras.caustique.frame_rate must be a number above zero, or two: frames, and in how many seconds";
+        return Err(fault(format!("scene {index}"), cause));
+    }
+    Ok(said.or(frame.rate.filter(good)).unwrap_or_else(|| {
+        warnings.push(format!(
+            "the file does not tell its frame rate: {USUAL_RATE} frames a second are assumed (--frame-rate decides)"
+        ));
+        USUAL_RATE
+    }))
+}
+
+/// All that moves, each once.
+fn tracks(document: &Document, warnings: &mut Vec<String>) -> Result<Vec<Track>> {
+    let list = document.raw["animations"].as_array().map_or(&[][..], Vec::as_slice);
+    // By what it moves: the animation.
+    let mut movers: HashMap<String, String> = HashMap::new();
+    let mut tracks = Vec::new();
+    for (i, raw) in list.iter().enumerate() {
+        let animation = Animation::deserialize(raw).map_err(|e| malformed(format!("animation {i}"), &e))?;
+        let name = named("animation", animation.name.as_deref(), i);
+        for (k, channel) in animation.channels.iter().enumerate() {
+            let place = format!("{name}, channel {k}");
+            let Some(pointer) = target(document, &channel.target).map_err(|e| e.within(&place))? else {
+                warnings.push(format!("{place}: it names nothing that moves, and is ignored"));
+                continue;
+            };
+            match movers.get(&pointer) {
+                Some(first) if *first == name => {
+                    return Err(fault(place, format!("it moves {pointer}, as another of its channels does")));
+                }
+                Some(first) => {
+                    let both = format!("{first} and {name} move the same: {first} is played there");
+                    warnings.push(format!("{both} (export without the other)"));
+                    continue;
+                }
+                None => movers.insert(pointer.clone(), name.clone()),
+            };
+            let curve = curve(document, &animation.samplers, channel.sampler, &pointer);
+            tracks.push(Track { curve: curve.map_err(|e| e.within(&place))?, pointer, place });
+        }
+    }
+    Ok(tracks)
+}
+
+/// The curve of a channel.
+fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str) -> Result<Curve> {
+    let curve =
+        Curve::read(document, get(samplers, index, "sampler")?).map_err(|e| e.within(format!("sampler {index}")))?;
+    let wanted = match pointer.rsplit_once('/') {
+        Some((node, "translation" | "scale")) if node.starts_with("/nodes/") => 3,
+        Some((node, "rotation")) if node.starts_with("/nodes/") => 4,
+        _ => curve.width,
+    };
+    if curve.width != wanted {
+        let cause = format!("its values have {} numbers instead of {wanted}", curve.width);
+        return Err(fault(format!("sampler {index}"), cause).hint("the file is damaged: export it again"));
+    }
+    Ok(curve)
+}
+
+/// JSON pointer to what a channel moves, if it names anything.
+fn target(document: &Document, target: &Value) -> Result<Option<String>> {
+    let path = target["path"].as_str().unwrap_or_default();
+    if path == "pointer" {
+        return Ok(target["extensions"]["KHR_animation_pointer"]["pointer"].as_str().map(str::to_owned));
+    }
+    let Some(node) = target["node"].as_u64() else { return Ok(None) };
+    let node = usize::try_from(node).unwrap_or(usize::MAX);
+    let name = get(&document.nodes, node, "node")?.name.as_deref();
+    if document.part("nodes", node).get("matrix").is_some() && path != "weights" {
+        return Err(fault(named("node", name, node), format!("its {path} moves, but it has a matrix"))
+            .hint("export its translation, rotation and scale instead"));
+    }
+    let known = ["translation", "rotation", "scale", "weights"].contains(&path);
+    Ok(known.then(|| format!("/nodes/{node}/{path}")))
+}

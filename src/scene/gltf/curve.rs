@@ -1,0 +1,145 @@
+//! Curves of an animation: keys over time, and what lies between them (specification, section 3.11 and appendix C).
+
+use super::document::{Document, get};
+use super::fault;
+use crate::error::Result;
+use serde::Deserialize;
+
+const DAMAGED: &str = "the file is damaged: export the animation again";
+
+/// A sampler as it stands in the file.
+#[derive(Deserialize)]
+pub(super) struct Sampler {
+    input: usize,
+    output: usize,
+    #[serde(default)]
+    interpolation: Interpolation,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+enum Interpolation {
+    Step,
+    #[default]
+    Linear,
+    CubicSpline,
+}
+
+/// Keys at growing times.
+pub(super) struct Curve {
+    /// Seconds.
+    times: Vec<f32>,
+    /// `width` numbers a key; of splines its tangent in, its value and its tangent out.
+    values: Vec<f32>,
+    /// Numbers of a value.
+    pub(super) width: usize,
+    interpolation: Interpolation,
+}
+
+impl Curve {
+    /// Reads the keys of a sampler.
+    ///
+    /// # Errors
+    /// Times that do not grow, a number that is not finite, or values that are not as many as the keys want.
+    pub(super) fn read(document: &Document, sampler: &Sampler) -> Result<Curve> {
+        let input = |e: crate::error::Error| e.within("input");
+        let times: Vec<f32> = document.floats::<1>(sampler.input).map_err(input)?.into_iter().flatten().collect();
+        let values = flat(document, sampler.output).map_err(|e| e.within("output"))?;
+        if times.is_empty() {
+            return Err(fault("input", "it has no key").hint(DAMAGED));
+        }
+        if let Some(i) = times.iter().position(|t| !(t.is_finite() && *t >= 0.0)) {
+            return Err(fault("input", format!("the time of key {i} is {} s", times[i])).hint(DAMAGED));
+        }
+        if let Some(i) = times.windows(2).position(|w| w[0] >= w[1]) {
+            let cause = format!("keys {i} and {} are at {} s and {} s: times must grow", i + 1, times[i], times[i + 1]);
+            return Err(fault("input", cause).hint(DAMAGED));
+        }
+        let slots = times.len() * sampler.interpolation.slots();
+        if values.is_empty() || !values.len().is_multiple_of(slots) {
+            let cause = format!("{} numbers cannot be shared out among {slots} values", values.len());
+            return Err(fault("output", cause).hint(DAMAGED));
+        }
+        if let Some(i) = values.iter().position(|x| !x.is_finite()) {
+            let width = values.len() / times.len();
+            return Err(fault("output", format!("key {} has a value that is not finite", i / width)).hint(DAMAGED));
+        }
+        Ok(Curve { width: values.len() / slots, times, values, interpolation: sampler.interpolation })
+    }
+
+    /// When its first key is (seconds).
+    pub(super) fn start(&self) -> f64 {
+        f64::from(self.times[0])
+    }
+
+    /// The value at a time (seconds); before the first key and after the last one it is theirs. `turns`: values are unit
+    /// quaternions.
+    pub(super) fn at(&self, time: f64, turns: bool) -> Vec<f64> {
+        // Files hold times in f32: what is a key's time but for rounding is that key's.
+        let after = self.times.partition_point(|key| f64::from(*key) <= time + 1e-6 * time.max(1.0));
+        let Some(k) = after.checked_sub(1) else { return self.value(0) };
+        if after == self.times.len() || self.interpolation == Interpolation::Step {
+            return self.value(k);
+        }
+        let [start, end] = [k, after].map(|key| f64::from(self.times[key]));
+        let (step, s) = (end - start, ((time - start) / (end - start)).max(0.0));
+        match self.interpolation {
+            Interpolation::CubicSpline => {
+                let value = self.spline(k, step, s);
+                if turns { quaternion(&value).map_or(value, |unit| unit.to_array().to_vec()) } else { value }
+            }
+            _ => {
+                let (from, to) = (self.value(k), self.value(after));
+                match (turns, quaternion(&from), quaternion(&to)) {
+                    (true, Some(from), Some(to)) => from.slerp(to, s).to_array().to_vec(),
+                    _ => from.iter().zip(&to).map(|(a, b)| a + (b - a) * s).collect(),
+                }
+            }
+        }
+    }
+
+    /// The value of a key.
+    fn value(&self, key: usize) -> Vec<f64> {
+        self.slot(key, self.interpolation.slots() / 2)
+    }
+
+    fn slot(&self, key: usize, slot: usize) -> Vec<f64> {
+        let start = (key * self.interpolation.slots() + slot) * self.width;
+        self.values[start..start + self.width].iter().map(|x| f64::from(*x)).collect()
+    }
+
+    /// Hermite's cubic from key `k` to the next, which is `step` seconds later, at share `s` of the way (appendix C.5).
+    fn spline(&self, k: usize, step: f64, s: f64) -> Vec<f64> {
+        let (s2, s3) = (s * s, s * s * s);
+        let parts = [
+            (self.value(k), 2.0 * s3 - 3.0 * s2 + 1.0),
+            (self.slot(k, 2), step * (s3 - 2.0 * s2 + s)),
+            (self.value(k + 1), 3.0 * s2 - 2.0 * s3),
+            (self.slot(k + 1, 0), step * (s3 - s2)),
+        ];
+        (0..self.width).map(|i| parts.iter().map(|(value, weight)| value[i] * weight).sum()).collect()
+    }
+}
+
+impl Interpolation {
+    /// Values that a key holds.
+    fn slots(self) -> usize {
+        if self == Interpolation::CubicSpline { 3 } else { 1 }
+    }
+}
+
+fn quaternion(value: &[f64]) -> Option<glam::DQuat> {
+    let four = <[f64; 4]>::try_from(value).ok()?;
+    glam::DVec4::from_array(four).try_normalize().map(glam::DQuat::from_vec4)
+}
+
+/// All numbers of an accessor, whatever its elements are.
+fn flat(document: &Document, index: usize) -> Result<Vec<f32>> {
+    get(&document.accessors, index, "accessor")?;
+    Ok(match document.width(index)? {
+        1 => document.floats::<1>(index)?.into_flattened(),
+        2 => document.floats::<2>(index)?.into_flattened(),
+        3 => document.floats::<3>(index)?.into_flattened(),
+        _ => document.floats::<4>(index)?.into_flattened(),
+    })
+}

@@ -1,0 +1,80 @@
+//! Transforms of nodes, in f64.
+
+use super::document::{Document, get, named};
+use super::fault;
+use crate::error::Result;
+use crate::math::{DAffine3, DMat3, DVec3};
+use serde_json::Value;
+
+/// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3),
+/// with all the digits of the file.
+pub(super) fn local(raw: &Value, place: &str) -> Result<DAffine3> {
+    fn numbers<const N: usize>(raw: &Value, key: &str, place: &str) -> Result<Option<[f64; N]>> {
+        let Some(value) = raw.get(key) else { return Ok(None) };
+        let list = value.as_array().map_or(&[][..], Vec::as_slice);
+        let numbers: Option<Vec<f64>> = list.iter().map(Value::as_f64).collect();
+        let numbers = numbers.and_then(|n| <[f64; N]>::try_from(n).ok());
+        numbers.map(Some).ok_or_else(|| fault(place, format!("its {key} is not {N} numbers")))
+    }
+    if let Some(m) = numbers::<16>(raw, "matrix", place)? {
+        return affine(m).ok_or_else(|| fault(place, "the last row of its matrix is not 0, 0, 0, 1"));
+    }
+    let (t, r, s) =
+        (numbers(raw, "translation", place)?, numbers(raw, "rotation", place)?, numbers(raw, "scale", place)?);
+    compose(t, r, s).ok_or_else(|| fault(place, "its rotation is not a quaternion"))
+}
+
+/// A matrix of 16 numbers, column by column. `None`: its last row is not 0, 0, 0, 1.
+pub(super) fn affine(m: [f64; 16]) -> Option<DAffine3> {
+    let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
+    let transform = DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) };
+    ([m[3], m[7], m[11], m[15]] == [0.0, 0.0, 0.0, 1.0]).then_some(transform)
+}
+
+/// Scale, then rotation (a quaternion, made unit), then translation. `None`: the rotation has no direction.
+pub(super) fn compose(t: Option<[f64; 3]>, r: Option<[f64; 4]>, s: Option<[f64; 3]>) -> Option<DAffine3> {
+    let rotation = glam::DVec4::from_array(r.unwrap_or([0.0, 0.0, 0.0, 1.0])).try_normalize()?;
+    let (t, s) = (DVec3::from_array(t.unwrap_or([0.0; 3])), DVec3::from_array(s.unwrap_or([1.0; 3])));
+    Some(DAffine3::from_scale_rotation_translation(s, glam::DQuat::from_vec4(rotation), t))
+}
+
+pub(super) fn finite(transform: &DAffine3) -> bool {
+    transform.matrix3.is_finite() && transform.translation.is_finite()
+}
+
+/// Whether f32 can hold the inverse of a transform.
+pub(super) fn can_be_inverted(transform: &DAffine3) -> bool {
+    let inverse = transform.matrix3.inverse();
+    transform.matrix3.determinant() != 0.0
+        && inverse.is_finite()
+        && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
+}
+
+/// The parent of each node of a document.
+pub(super) fn parents(document: &Document) -> Vec<Option<usize>> {
+    let mut parents = vec![None; document.nodes.len()];
+    for (parent, node) in document.nodes.iter().enumerate() {
+        for child in node.children.iter().flatten() {
+            if let Some(slot) = parents.get_mut(child.value()) {
+                *slot = Some(parent);
+            }
+        }
+    }
+    parents
+}
+
+/// Transform of a node against the world.
+///
+/// # Errors
+/// There is no such node, it is its own ancestor, or a transform on the way is malformed.
+pub(super) fn to_world(document: &Document, parents: &[Option<usize>], node: usize) -> Result<DAffine3> {
+    let (mut whole, mut at) = (DAffine3::IDENTITY, Some(node));
+    // A node has fewer ancestors than there are nodes.
+    for _ in 0..=parents.len() {
+        let Some(index) = at else { return Ok(whole) };
+        let name = get(&document.nodes, index, "node")?.name.as_deref();
+        whole = local(document.part("nodes", index), &named("node", name, index))? * whole;
+        at = parents[index];
+    }
+    Err(fault(format!("node {node}"), "it is its own ancestor").hint("the file is damaged: export it again"))
+}

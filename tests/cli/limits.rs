@@ -1,0 +1,154 @@
+//! Limits of memory, disk and time: what they take away is said, and what is finished is kept.
+
+use crate::{Folder, Outcome, values};
+use caustique::image::exr;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Command, Stdio};
+
+/// The program under limits of the shell.
+fn limited(folder: &Folder, limits: &str, arguments: &str) -> Outcome {
+    let mut command = Command::new("sh");
+    let line = format!("ulimit -c 0; {limits}; exec {} {arguments}", env!("CARGO_BIN_EXE_caustique"));
+    command.current_dir(folder.path("")).args(["-c", &line]).env("TMPDIR", folder.path(""));
+    Outcome::of(command)
+}
+
+/// Whatever the limit of memory, a render ends well, or with an error and a remedy.
+#[test]
+fn no_limit_of_memory_aborts() {
+    let folder = Folder::new();
+    let render = "render scene.glb -o out.exr --width 320 --iterations 2 --method sppm --threads 2 --progress none";
+    let mut codes = Vec::new();
+    for mib in [200, 300, 400, 440, 500, 600, 700, 800, 1000, 1500] {
+        let outcome = limited(&folder, &format!("ulimit -v {}", mib * 1024), render);
+        assert!(matches!(outcome.code, Some(0 | 1)), "{mib} MiB: {:?} {}", outcome.code, outcome.stderr);
+        if outcome.code == Some(1) {
+            assert!(outcome.stderr.contains("\nhint: "), "{mib} MiB: {}", outcome.stderr);
+        }
+        codes.push(outcome.code);
+    }
+    assert!(codes[0] == Some(1) && codes[codes.len() - 1] == Some(0), "{codes:?}");
+}
+
+/// A cap on memory has its price told: fewer light paths, less of a map; and what cannot be is refused.
+#[test]
+fn a_cap_on_memory_is_planned() {
+    let folder = Folder::new();
+    let pool = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/pool.glb");
+    std::fs::copy(pool, folder.path("pool.glb")).expect("it can be copied");
+    let render = |options: &str| {
+        let small = "--width 64 --height 48 --iterations 2 --no-combine --reproducible --progress none";
+        folder.run(&format!("render pool.glb -o out.exr {small} {options}"))
+    };
+    let outcome = render("--method sppm --photons 200000 --memory 6");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let (_, said) = outcome.stderr.split_once("--memory 6: ").expect("it says what is cut");
+    let (photons, rest) = said.split_once(" light paths an iteration instead of 200000\n").expect("it says how much");
+    assert_eq!(rest, "");
+    let photons: u64 = photons.parse().expect("a number");
+    let (set, header) = folder.read("out.exr");
+    assert_eq!(header["light_paths"], 2 * photons);
+    assert!(header["plan"]["warnings"].to_string().contains("light paths an iteration instead of 200000"));
+    // It is the render of so many light paths.
+    assert_eq!(render(&format!("--method sppm --photons {photons}")).code, Some(0));
+    assert!(values(&folder.read("out.exr").0, "") == values(&set, ""));
+    let outcome = render("--method pm --photons 200000 --memory 6");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("--memory 6: the photon map has room for "), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("the photon map was full at "), "{}", outcome.stderr);
+    let outcome = render("--method vcm --memory 2");
+    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+    let start = "command line: 64 x 48 pixels with --method vcm need ";
+    assert!(outcome.stderr.starts_with(start), "{}", outcome.stderr);
+    assert!(
+        outcome.stderr.contains(" MiB at least, and --memory allows 2\nhint: use a smaller "),
+        "{}",
+        outcome.stderr
+    );
+}
+
+/// A file that may not grow as large as it must: the older one stays whole, and nothing else is left.
+#[test]
+fn a_limit_on_files_keeps_the_older_one() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("out.exr"), "older").expect("it can be written");
+    let render =
+        "render scene.glb -o out.exr --width 64 --height 48 --photons 500 --method sppm --iterations 2 --progress none";
+    let outcome = limited(&folder, "ulimit -f 40", render);
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    let error = "out.exr: File too large (os error 27)\nhint: make room there, or write to another disk\n";
+    assert_eq!(outcome.stderr, error);
+    assert_eq!(std::fs::read(folder.path("out.exr")).expect("it is there"), b"older");
+    assert_eq!(folder.files(), ["out.exr"]);
+}
+
+/// A full device is an error, and the render is kept elsewhere.
+#[test]
+fn a_full_disk_loses_no_render() {
+    let folder = Folder::new();
+    let small = "--width 16 --height 12 --iterations 1 --method path --no-combine --progress none";
+    let outcome = limited(&folder, "true", &format!("render scene.glb -o /dev/full {small}"));
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("\n/dev/full: No space left on device"), "{}", outcome.stderr);
+    let (_, rescued) = outcome.stderr.trim_end().rsplit_once("hint: the render is in ").expect("the hint names a file");
+    assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("").is_some()));
+}
+
+/// The EXR goes to standard output, and all talk elsewhere; a reader that goes loses no render.
+#[test]
+fn a_render_to_standard_output() {
+    let folder = Folder::new();
+    let small = "--width 16 --height 12 --iterations 1 --method path --no-combine --reproducible";
+    assert_eq!(folder.run(&format!("render scene.glb -o file.exr {small}")).code, Some(0));
+    let line = format!("render scene.glb -o - {small} > piped.exr");
+    let outcome = limited(&folder, "true", &line);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(outcome.stderr.ends_with("\nstandard output: 16 x 12, 64 channels\n"), "{}", outcome.stderr);
+    let bytes = |name: &str| std::fs::read(folder.path(name)).expect("it is there");
+    assert!(bytes("piped.exr") == bytes("file.exr"));
+    assert_eq!(folder.files(), ["file.exr", "piped.exr"]);
+    let outcome = limited(&folder, "true", &format!("render scene.glb -o - --progress none {small} > /dev/full"));
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("\nstandard output: No space left on device"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("\nhint: the render is in "), "{}", outcome.stderr);
+    let outcome = folder.run(&format!("render scene.glb --frames 1-2 -o - {small}"));
+    let error = "command line: --output -: all frames have the same name\n";
+    assert!(outcome.code == Some(2) && outcome.stderr.starts_with(error), "{}", outcome.stderr);
+}
+
+/// A signal while the picture is finished or the scene is read leaves either the new file whole, or the older one.
+#[test]
+fn a_signal_at_any_time_leaves_a_whole_file() {
+    let folder = Folder::new();
+    assert!(Command::new("mkfifo").arg(folder.path("pipe.glb")).status().expect("mkfifo runs").success());
+    std::fs::write(folder.path("out.exr"), "older").expect("it can be written");
+    let kill = |id: u32| {
+        let status = Command::new("sh").args(["-c", &format!("kill -TERM {id}")]).status().expect("sh runs");
+        assert!(status.success());
+    };
+    let mut command = folder.command("render pipe.glb -o out.exr --width 16 --progress plain");
+    let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
+    let mut line = String::new();
+    lines.read_line(&mut line).expect("stderr can be read");
+    assert_eq!(line, "reading pipe.glb\n");
+    kill(child.id());
+    assert_eq!(child.wait().expect("it ends").code(), None);
+    assert_eq!(std::fs::read(folder.path("out.exr")).expect("it is there"), b"older");
+
+    // The last iteration is told before the picture is finished.
+    let arguments = "render scene.glb -o out.exr --width 320 --iterations 1 --method path --progress json";
+    let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
+    while !line.contains("\"iteration\":1,") {
+        line.clear();
+        assert_ne!(lines.read_line(&mut line).expect("stderr can be read"), 0, "the program has ended");
+    }
+    kill(child.id());
+    let mut rest = String::new();
+    lines.read_to_string(&mut rest).expect("stderr can be read");
+    let code = child.wait().expect("it ends").code();
+    // Between the iteration and the look at the signals it may be either; the picture is whole in both cases.
+    assert!(matches!(code, Some(0 | 130)), "{code:?} {rest}");
+    assert_eq!(folder.read("out.exr").1["iterations"], 1);
+}
