@@ -24,6 +24,26 @@ pub(super) struct SceneExtras {
     pub(super) tonemap: Option<ToneCurve>,
     pub(super) crop: Option<[f64; 4]>,
     pub(super) film_transparent: bool,
+    pub(super) frame: Option<i32>,
+    pub(super) frame_rate: Option<Rate>,
+}
+
+/// Frames in a second: a whole number, or a fraction.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "a whole number, or two for a fraction as in [24000, 1001]")]
+pub(super) enum Rate {
+    Whole(u32),
+    Fraction([u32; 2]),
+}
+
+impl Rate {
+    /// Numerator and denominator.
+    pub(super) fn fraction(self) -> [u32; 2] {
+        match self {
+            Rate::Whole(rate) => [rate, 1],
+            Rate::Fraction(fraction) => fraction,
+        }
+    }
 }
 
 /// To whom something is visible; light meets it either way.
@@ -137,6 +157,8 @@ pub(super) const SCENE: &[&str] = &[
     "tonemap",
     "crop",
     "film_transparent",
+    "frame",
+    "frame_rate",
 ];
 pub(super) const MATERIAL: &[&str] =
     &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "null_bsdf", "spread_deg"];
