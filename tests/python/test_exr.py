@@ -67,8 +67,8 @@ class Written(support.Scratch):
         support.run(["render", scene, "-o", path, *size, "--progress", "none"], check=0)
         told = header(path)
         rate, code = told["framesPerSecond"], told["timeCode"]
-        self.assertEqual((rate.n, rate.d), (24000, 1001))
-        self.assertEqual((code.hours(), code.minutes(), code.seconds(), code.frame()), (0, 0, 2, 1))
+        self.assertEqual((rate.numerator, rate.denominator), (24000, 1001))
+        self.assertEqual((code.hours, code.minutes, code.seconds, code.frame), (0, 0, 2, 1))
         self.assertEqual(told["imageCounter"], 49)
         self.assertEqual(json.loads(told["caustique"])["frame"], 49)
 
