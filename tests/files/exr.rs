@@ -208,7 +208,7 @@ fn frames_of_films_are_in_the_header() {
     assert_eq!(found.own_attributes.frames_per_second, Some((24000, 1001)));
     let counter = |found: &::exr::meta::header::Header| {
         let other = &found.own_attributes.other;
-        other.iter().find(|(name, _)| name.to_string() == "imageCounter").map(|(_, value)| value.to_i32().unwrap())
+        other.iter().find(|(name, _)| *name == "imageCounter").map(|(_, value)| value.to_i32().unwrap())
     };
     assert_eq!((counter(&found), found.shared_attributes.time_code), (Some(-7), None));
     // 1 h 2 min 3 s and 4 frames: 23.976 frames in a second are counted as 24.
