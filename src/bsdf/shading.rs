@@ -6,7 +6,7 @@
 //! direction: so there is no black, and since the directions that light is scattered to which are on the wrong side of
 //! the surface are just the opposites of those that it is not, each carries what its opposite would have, and all that
 //! is scattered leaves. Every algorithm sees the same function. Light carried the other way takes the adjoint of Veach
-//! \[1997, 5.3\]. Normal maps have a relief besides, see [`super::relief`]: there the directions that shine would be
+//! \[1997, 5.3\]. Normal maps have a relief besides (`relief.rs`): there the directions that shine would be
 //! lost to, seen from the front, are mirrored out of the surface.
 
 use super::layered::Seen;
