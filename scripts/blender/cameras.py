@@ -1,5 +1,6 @@
 """Cameras, and the picture that a scene was made for, in terms of `extras.caustique`."""
 
+import fractions
 import itertools
 import math
 
@@ -57,7 +58,7 @@ def warn_of_clipping(thing, flat, warn):
 
 def picture(scene, warn):
     """Keys of the scene: `resolution` (pixels), `crop` (x, y from the top left, width, height; shares of the picture),
-    `exposure` (stops), `tonemap` and `film_transparent`."""
+    `exposure` (stops), `tonemap`, `film_transparent`, `frame` and `frame_rate` (numerator, denominator)."""
     render, view, where = scene.render, scene.view_settings, f'scene "{scene.name}"'
     share = render.resolution_percentage / 100
     said = {"resolution": [max(round(n * share), 1) for n in (render.resolution_x, render.resolution_y)]}
@@ -80,6 +81,11 @@ def picture(scene, warn):
         warn(where, f'its view transform "{view.view_transform}" is not carried: the PNG is made with agx')
     if view.look not in {"None", ""} or view.gamma != 1 or view.use_curve_mapping:
         warn(where, "look, gamma and curves of its colour management are not carried: they concern the PNG alone")
+    # As decimals, for Blender keeps 1.001 in single precision.
+    rate = fractions.Fraction(f"{render.fps:.6g}") / fractions.Fraction(f"{render.fps_base:.6g}")
+    if rate > 0:
+        said["frame_rate"] = [rate.numerator, rate.denominator]
+    said["frame"] = scene.frame_current
     if render.use_motion_blur:
         warn(where, "motion blur is not carried: everything stands still")
     return said

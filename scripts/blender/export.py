@@ -27,7 +27,9 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-import bpy  # noqa: E402
+import bpy  # noqa: E402, first: it brings numpy
+
+import numpy  # noqa: E402
 
 import bake  # noqa: E402
 import cameras  # noqa: E402
@@ -70,9 +72,9 @@ def write(path, scene=None, bake_size=bake.SIZE):
             cameras.warn_of_clipping(flat.scene.camera, flat, warn)
         worn = surfaces.Surfaces(flat.things, _worn(flat.things), undo, warn, bake_size)
         lighting.warn_of_soft_falloff(flat, warn)
-        lighting.hang(flat, undo, warn)
+        lighting.hang(flat, warn)
         if sun is not None:
-            sky.hang(sun, flat, undo, ["camera"] if "visible" in said["environment"] else [])
+            sky.hang(sun, flat, ["camera"] if "visible" in said["environment"] else [])
         bodies = _bodies(flat.things)
         bpy.context.view_layer.update()
         _run_exporter(path)
@@ -162,16 +164,22 @@ def _closed(mesh):
     """Whether every edge has two faces once vertices in the same place count as one."""
     if mesh is None or not mesh.polygons:
         return False
-    places, merged = {}, []
-    for vertex in mesh.vertices:
-        merged.append(places.setdefault(tuple(round(c, 6) for c in vertex.co), len(places)))
-    uses = {}
-    for polygon in mesh.polygons:
-        ring = [merged[v] for v in polygon.vertices]
-        for a, b in zip(ring, ring[1:] + ring[:1]):
-            if a != b:
-                uses[min(a, b), max(a, b)] = uses.get((min(a, b), max(a, b)), 0) + 1
-    return all(count % 2 == 0 for count in uses.values())
+    places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
+    mesh.vertices.foreach_get("co", places)
+    corners = numpy.empty(len(mesh.loops), numpy.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts, totals = (numpy.empty(len(mesh.polygons), numpy.int32) for _ in range(2))
+    mesh.polygons.foreach_get("loop_start", starts)
+    mesh.polygons.foreach_get("loop_total", totals)
+    micrometres = numpy.rint(places.reshape(-1, 3).astype(float) * 1e6).astype(numpy.int64)
+    _, merged = numpy.unique(micrometres, axis=0, return_inverse=True)
+    following = numpy.arange(len(corners)) + 1
+    following[starts + totals - 1] = starts
+    ends = merged.reshape(-1)[corners].astype(numpy.int64)
+    ends = numpy.sort(numpy.stack([ends, ends[following]]), axis=0)
+    ends = ends[:, ends[0] != ends[1]]
+    _, uses = numpy.unique(ends[0] * len(mesh.vertices) + ends[1], return_counts=True)
+    return bool(numpy.all(uses % 2 == 0))
 
 
 def _finish_names(document, names):

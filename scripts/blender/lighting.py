@@ -71,8 +71,8 @@ def _size(light):
     return light.size, light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
 
 
-def hang(flat, undo, warn):
-    """Until `undo` closes, make the lamps of a flat scene ready for the glTF exporter: area lamps become meshes."""
+def hang(flat, warn):
+    """Make the lamps of a flat scene ready for the glTF exporter: area lamps become meshes."""
     for thing in [t for t in flat.things if t.type == "LIGHT"]:
         light, where = thing.data, flat.where(thing)
         if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
@@ -81,7 +81,7 @@ def hang(flat, undo, warn):
             continue
         _warn_of(thing, where, warn)
         if light.type == "AREA":
-            _area_mesh(thing, flat, undo)
+            _area_mesh(thing, flat)
             flat.remove(thing)
         elif light.type == "SUN":
             flat.say(thing, angle_deg=math.degrees(light.angle))
@@ -91,7 +91,7 @@ def hang(flat, undo, warn):
                 flat.say(thing, blend=light.spot_blend)
 
 
-def _area_mesh(thing, flat, undo):
+def _area_mesh(thing, flat):
     """A glowing mesh that is seen from its front alone, where an area lamp shines from."""
     light = thing.data
     place, turn, scale = thing.matrix_world.decompose()
@@ -102,13 +102,11 @@ def _area_mesh(thing, flat, undo):
     else:
         corners = [(x * size_x / 2, y * size_y / 2, 0) for x, y in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
     name = flat.names[thing.name] + " (area light)"
-    mesh = bpy.data.meshes.new(name)
-    undo.callback(bpy.data.meshes.remove, mesh)
+    mesh = flat.own(bpy.data.meshes.new(name))
     mesh.from_pydata(corners, [], [range(len(corners))])  # clockwise: the face looks down -Z, as the light does
     radiance = area_radiance(light, [abs(s) for s in scale[:2]])
     strength = max(max(radiance), 1e-30)
-    material = bpy.data.materials.new(name)
-    undo.callback(bpy.data.materials.remove, material)
+    material = flat.own(bpy.data.materials.new(name))
     if bpy.app.version < (5, 0, 0):
         material.use_nodes = True
     material.use_backface_culling = True

@@ -32,9 +32,13 @@ class Flat:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden = [], {}, {}
-        self._undo, self._warn, self._meshes, self._shapes = undo, warn, {}, []
+        self._warn, self._meshes, self._shapes, self._made = warn, {}, [], []
         self._indirect = visibility.indirect_only(layer)
-        self.scene = self._make(bpy.data.scenes, scene.name)
+        self.scene = bpy.data.scenes.new(scene.name)
+        self.names[self.scene.name] = scene.name
+        undo.callback(bpy.data.scenes.remove, self.scene)
+        # At once, for Blender looks through all there is for every removal.
+        undo.callback(lambda: bpy.data.batch_remove(self._made))
         for name in ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"):
             setattr(self.scene.render, name, getattr(scene.render, name))
         self.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
@@ -69,10 +73,9 @@ class Flat:
         kind = {"LIGHT": "light", "CAMERA": "camera"}.get(thing.type, "object")
         return f'{kind} "{self.names[thing.name]}"'
 
-    def _make(self, kind, name, *content):
-        block = kind.new(name, *content)
-        self._undo.callback(kind.remove, block)
-        self.names[block.name] = name
+    def own(self, block):
+        """Removes a block of Blender's data with the flat scene; the block."""
+        self._made.append(block)
         return block
 
     def _take(self, instance, depsgraph):
@@ -109,8 +112,7 @@ class Flat:
         else:
             mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
             self._shapes.append((mesh, thing.original))
-        self._undo.callback(bpy.data.meshes.remove, mesh)
-        self.names[mesh.name] = name
+        self.names[self.own(mesh).name] = name
         for index, slot in enumerate(thing.material_slots):
             if slot.link == "OBJECT" and index < len(mesh.materials):
                 mesh.materials[index] = slot.material and slot.material.original
@@ -121,8 +123,7 @@ class Flat:
         if isinstance(data, bpy.types.Mesh) and not _is_plain(matrix):
             # A sheared object has no place that location, rotation and scale could tell: its mesh gets it instead.
             sheared = data.copy()
-            self._undo.callback(bpy.data.meshes.remove, sheared)
-            self.names[sheared.name] = self.names[data.name]
+            self.names[self.own(sheared).name] = self.names[data.name]
             sheared.transform(matrix)
             if matrix.determinant() < 0:
                 sheared.flip_normals()
@@ -139,7 +140,8 @@ class Flat:
 
     def add(self, name, data, matrix, hidden=()):
         """A thing of this name, data, place (world matrix), and kinds of rays that do not see it."""
-        body = self._make(bpy.data.objects, name, data)
+        body = self.own(bpy.data.objects.new(name, data))
+        self.names[body.name] = name
         self.scene.collection.objects.link(body)
         body.matrix_world = matrix
         self.things.append(body)

@@ -32,8 +32,8 @@ _WITHOUT = {  # what stands where nothing may be baked
     "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None,
 }
 _STEEP = 0.75  # cosine
-_IS_STEEP = ("its normals lean by more than 40 degrees from the surface: there it is brighter or darker than in "
-             "Cycles; use a Displace modifier for relief that steep")
+_IS_STEEP = ("its normals lean by more than 40 degrees from the surface: its shine is brighter there than in Cycles, "
+             "which loses part of it; use a Displace modifier for relief that steep")
 
 
 def matt(colour):

@@ -42,13 +42,12 @@ def sun(scene, undo, where, warn):
     return Sun(toward, [max(float(x), 0.0) for x in irradiance], node.sun_size)
 
 
-def hang(found, flat, undo, hidden):
+def hang(found, flat, hidden):
     """Puts a `Sun` into the flat scene as a lamp, `hidden` from kinds of rays."""
     strongest = max(found.irradiance)
     if strongest <= 0:
         return
-    light = bpy.data.lights.new("sky's sun", "SUN")
-    undo.callback(bpy.data.lights.remove, light)
+    light = flat.own(bpy.data.lights.new("sky's sun", "SUN"))
     light.energy, light.color = strongest, [x / strongest for x in found.irradiance]
     light.angle = found.angle
     body = flat.add(light.name, light, found.toward.to_track_quat("Z", "Y").to_matrix().to_4x4(), hidden)

@@ -11,6 +11,7 @@ they depend on, so that a run that was stopped goes on where it was.
 import argparse
 import hashlib
 import inspect
+import json
 import os
 import subprocess
 import sys
@@ -27,6 +28,7 @@ import numpy  # noqa: E402
 import export  # noqa: E402
 import torture_coats  # noqa: E402, F401, registers features
 import torture_mixes  # noqa: E402, F401
+import torture_relief  # noqa: E402, F401
 import torture_textures  # noqa: E402, F401
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
@@ -42,12 +44,15 @@ RANK = [AGREES, BAKED, SAID, REFUSED, WRONG]
 @dataclass
 class Result:
     """What became of a feature. `mean`: ours over Cycles', the channel that is farthest off; `tile`: the worst relative
-    difference of a tile; `noise`: three standard errors of the mean, relative."""
+    difference of a tile; `noise`: three standard errors of the mean, relative; `flip`: ours against Cycles'; `floor`:
+    FLIP of Cycles' two renders, which differ by noise alone."""
     name: str
     verdict: str
     mean: float
     tile: float
     noise: float
+    flip: float
+    floor: float
     words: str
 
 
@@ -85,6 +90,21 @@ def pixels(path):
     channels = image.channels
     bpy.data.images.remove(image)
     return values.reshape(height, width, channels)[..., :3].astype(float)
+
+
+def flip(picture, truth):
+    """FLIP of a picture (height, width, 3) against another, by the program."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [os.path.join(folder, name) for name in ("picture.exr", "truth.exr")]
+        for path, values in zip(paths, (picture, truth)):
+            height, width, _ = values.shape
+            image = bpy.data.images.new("judged", width, height, float_buffer=True, is_data=True)
+            image.pixels.foreach_set(numpy.dstack([values, numpy.ones((height, width))]).astype(numpy.float32).ravel())
+            image.file_format = "OPEN_EXR"
+            image.save(filepath=path)
+            bpy.data.images.remove(image)
+        done = subprocess.run([program(), "compare", *paths, "--json"], capture_output=True, text=True, check=True)
+        return json.loads(done.stdout)["flip"]
 
 
 def by_cycles(seed):
@@ -173,7 +193,7 @@ def run(name, look=None):
         try:
             ours = _kept(_key("ours", settings, *beside, _bytes(program())), lambda seed: by_caustique(path, seed))
         except RuntimeError as error:
-            return Result(name, REFUSED, 0.0, 0.0, 0.0, str(error))
+            return Result(name, REFUSED, 0.0, 0.0, 0.0, 0.0, 0.0, str(error))
     said = said + ours[2]
     if look:
         _show(os.path.join(look, name + ".png"), stage, theirs, ours)
@@ -181,7 +201,8 @@ def run(name, look=None):
     baked = [line for line in said if "baked to" in line]
     losses = [line for line in said if line not in baked]
     verdict = (BAKED if baked else AGREES) if agrees else SAID if losses else WRONG
-    return Result(name, verdict, mean, tile, noise, "; ".join(losses))
+    judged = flip((ours[0] + ours[1]) / 2, (theirs[0] + theirs[1]) / 2), flip(theirs[0], theirs[1])
+    return Result(name, verdict, mean, tile, noise, *judged, "; ".join(losses))
 
 
 def _show(path, stage, theirs, ours):
@@ -202,6 +223,16 @@ def rows():
     return {row[0].strip("`"): row[1] for row in cells}
 
 
+def _summary(what, results):
+    """A sentence on the ratios of the means and on FLIP over some results."""
+    ratios = numpy.array([r.mean for r in results])
+    low, high = numpy.percentile(ratios, [5, 95])
+    flips = numpy.array([r.flip for r in results])
+    worst = results[int(flips.argmax())]
+    return (f"- {what} ({len(results)}): mean {numpy.exp(numpy.log(ratios).mean()):.3f} ({low:.3f} to {high:.3f}); "
+            f"FLIP {flips.mean():.3f},\n  median {numpy.median(flips):.3f}, worst {worst.flip:.3f} (`{worst.name}`).")
+
+
 def table(results):
     """The generated page."""
     counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in RANK}
@@ -215,11 +246,20 @@ def table(results):
         f"baked at",
         f"{BAKE_SIZE} x {BAKE_SIZE} texels.", "",
         f"{len(results)} features: " + ", ".join(f"{n} {v}" for v, n in counts.items()) + ".", "",
-        "| feature | verdict | mean, ours / Cycles | its noise | worst tile | what the export and the render say |",
-        "| --- | --- | --- | --- | --- | --- |"]
+        "The mean is that of the channel that is farthest off; below it is the geometric mean of the features, with",
+        "the 5th to the 95th percentile. FLIP is the mean over the pixels of the difference that an eye sees, from 0 to",
+        f"1, noise included: two renders by Cycles of {SAMPLES} samples each differ by "
+        f"{numpy.mean([r.floor for r in results]):.3f} in the mean.", ""]
+    rendered = [r for r in results if r.verdict != REFUSED]
+    lines += [_summary("all that is rendered", rendered),
+              _summary("what agrees", [r for r in rendered if r.verdict in (AGREES, BAKED)]), ""]
+    lines += [
+        "| feature | verdict | mean, ours / Cycles | its noise | worst tile | FLIP | what the export and the render say |",
+        "| --- | --- | --- | --- | --- | --- | --- |"]
     for r in results:
         words = r.words.replace('material "tested": ', "").replace("|", "/")
-        lines.append(f"| `{r.name}` | {r.verdict} | {r.mean:.3f} | {r.noise:.3f} | {r.tile:.1%} | {words} |")
+        lines.append(f"| `{r.name}` | {r.verdict} | {r.mean:.3f} | {r.noise:.3f} | {r.tile:.1%} | {r.flip:.3f} | "
+                     f"{words} |")
     return "\n".join(lines) + "\n"
 
 
@@ -236,7 +276,7 @@ def main(arguments):
         result = run(name, given.look)
         results.append(result)
         print(f"{result.verdict:22} {name:34} mean {result.mean:.3f} +- {result.noise:.3f}  tile {result.tile:6.1%}  "
-              f"{result.words[:150]}", flush=True)
+              f"flip {result.flip:.3f}  {result.words[:150]}", flush=True)
     if not given.only:
         with open(TABLE, "w", encoding="utf-8") as file:
             file.write(table(results))

@@ -3,6 +3,7 @@
 import bpy
 import numpy
 
+from torture_relief import waves
 from torture_stage import feature, put
 
 
@@ -390,35 +391,27 @@ def bump_mirror(stage):
     stage.principled(Base_Color=(0.9, 0.9, 0.9), Metallic=1.0, Roughness=0.1, Normal=node)
 
 
-def _waves(stage, steep):
-    """A tangent-space normal map of ridges of this slope."""
-    v, u = numpy.mgrid[0:64, 0:64] / 64
-    normal = numpy.stack([steep * numpy.sin(8 * numpy.pi * u), steep * numpy.cos(8 * numpy.pi * v), 0 * u + 1], 2)
-    normal /= numpy.linalg.norm(normal, axis=2)[..., None]
-    return stage.image("waves", normal * 0.5 + 0.5, True)
-
-
 @feature
 def normal_map(stage):
-    node = stage.node("NormalMap", Color=stage.node("TexImage", image=_waves(stage, 0.4)))
+    node = stage.node("NormalMap", Color=stage.node("TexImage", image=waves(stage, 0.4)))
     stage.principled(Base_Color=(0.6, 0.5, 0.4), Roughness=0.4, Normal=node)
 
 
 @feature
 def normal_map_weak(stage):
-    node = stage.node("NormalMap", Strength=0.4, Color=stage.node("TexImage", image=_waves(stage, 1.0)))
+    node = stage.node("NormalMap", Strength=0.4, Color=stage.node("TexImage", image=waves(stage, 1.0)))
     stage.principled(Base_Color=(0.6, 0.5, 0.4), Roughness=0.4, Normal=node)
 
 
 @feature
 def normal_map_steep(stage):
-    node = stage.node("NormalMap", Color=stage.node("TexImage", image=_waves(stage, 3.0)))
+    node = stage.node("NormalMap", Color=stage.node("TexImage", image=waves(stage, 3.0)))
     stage.principled(Base_Color=(0.7, 0.7, 0.7), Roughness=0.5, Normal=node)
 
 
 @feature
 def normal_map_steep_metal(stage):
-    node = stage.node("NormalMap", Color=stage.node("TexImage", image=_waves(stage, 3.0)))
+    node = stage.node("NormalMap", Color=stage.node("TexImage", image=waves(stage, 3.0)))
     stage.principled(Base_Color=(0.9, 0.9, 0.9), Metallic=1.0, Roughness=0.3, Normal=node)
 
 

@@ -3,9 +3,9 @@
 A function takes `Figures` and returns Markdown. What it asks `Figures` for stands above its table as the source.
 """
 
-from . import comparisons, finished, rules, speed
+from . import blender, comparisons, finished, rules, sizes, speed
 from .figures import Figures
 
-KINDS = {**speed.KINDS, **rules.KINDS, **comparisons.KINDS, **finished.KINDS}
+KINDS = {**blender.KINDS, **sizes.KINDS, **speed.KINDS, **rules.KINDS, **comparisons.KINDS, **finished.KINDS}
 
 __all__ = ["KINDS", "Figures"]

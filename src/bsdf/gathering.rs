@@ -32,6 +32,8 @@ impl<'a> Shading<'a> {
     pub fn gathering(&'a self, set: LobeSet) -> Gathering<'a> {
         let kind = if self.cos_og == 0.0 {
             Kind::Nothing
+        } else if self.smooth.is_some() {
+            Kind::Any
         } else if let Some((factor, through)) = self.bsdf.diffuse_only(&self.seen, set) {
             Kind::Diffuse { factor, through }
         } else {

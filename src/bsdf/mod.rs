@@ -9,6 +9,7 @@ mod layered;
 mod microfacet;
 mod parameters;
 mod profile;
+mod relief;
 mod scatter;
 mod shading;
 mod sheen;
@@ -186,6 +187,22 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::Matte(color) => lambert(*color, seen.o.z, if seen.side == 1 { -wi.z } else { wi.z }, set),
             Bsdf::Layered(layered) => layered.evaluate(seen, wi, transport, set),
+        }
+    }
+
+    /// [`Bsdf::evaluate_seen`] with a share of the diffuse reflection, the density being that of the whole.
+    #[inline]
+    fn evaluate_dimmed(&self, share: f32, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        match self {
+            Bsdf::Matte(_) => {
+                let (f, pdf) = self.evaluate_seen(seen, wi, transport, set);
+                (f * share, pdf)
+            }
+            Bsdf::Layered(layered) => {
+                let mut layered = *layered;
+                layered.diffuse *= share;
+                layered.evaluate(seen, wi, transport, set)
+            }
         }
     }
 

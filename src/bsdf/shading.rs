@@ -6,9 +6,11 @@
 //! direction: so there is no black, and since the directions that light is scattered to which are on the wrong side of
 //! the surface are just the opposites of those that it is not, each carries what its opposite would have, and all that
 //! is scattered leaves. Every algorithm sees the same function. Light carried the other way takes the adjoint of Veach
-//! \[1997, 5.3\].
+//! \[1997, 5.3\]. Normal maps have a relief besides (`relief.rs`): there the directions that shine would be
+//! lost to, seen from the front, are mirrored out of the surface.
 
 use super::layered::Seen;
+use super::relief::{Relief, mirrored};
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 
@@ -26,6 +28,8 @@ pub struct Shading<'a> {
     pub(super) cos_og: f32,
     /// The two normals disagree about its side: `seen` is its opposite.
     opposite: bool,
+    /// Under a normal map: the interpolated normal.
+    pub(super) smooth: Option<Vec3>,
 }
 
 impl<'a> Shading<'a> {
@@ -36,7 +40,35 @@ impl<'a> Shading<'a> {
         let cos = wo.dot(ng);
         let opposite = local.z * cos < 0.0;
         let cos_og = if local.z == 0.0 { 0.0 } else { cos.abs() };
-        Shading { frame, ng, bsdf, seen: bsdf.seen(if opposite { -local } else { local }), cos_og, opposite }
+        let seen = bsdf.seen(if opposite { -local } else { local });
+        Shading { frame, ng, bsdf, seen, cos_og, opposite, smooth: None }
+    }
+
+    /// The same whose frame is that of a normal map on a surface of interpolated normal `smooth`.
+    #[inline]
+    pub fn mapped(self, smooth: Vec3) -> Shading<'a> {
+        Shading { smooth: (smooth != self.frame.n).then_some(smooth), ..self }
+    }
+
+    /// How light along `l` (world) meets the facets of a normal map. What shines meets it a second time along the
+    /// direction in the frame that comes with it, if there is one; the first time is there whenever the second is.
+    #[inline]
+    fn relief(&self, l: Vec3) -> Option<(Relief, Option<Vec3>)> {
+        let relief = Relief::new(l, self.frame.n, self.smooth?, self.ng);
+        let second = self.frame.to_local(relief.mirrored);
+        Some((relief, (self.shines() && second.z * l.dot(self.ng) > 0.0).then_some(second)))
+    }
+
+    /// Not all that is scattered is diffuse.
+    #[inline]
+    fn shines(&self) -> bool {
+        matches!(self.bsdf, Bsdf::Layered(_))
+    }
+
+    /// The direction that light comes along where the surface is seen by light: the one it is seen along.
+    #[inline]
+    fn own(&self) -> Vec3 {
+        self.frame.to_world(self.seen.wo())
     }
 
     /// `w`, which paths of `transport` come from, in the frame, and its cosine with the geometric normal; `None` where
@@ -59,12 +91,36 @@ impl<'a> Shading<'a> {
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
+        let adjoint = cos_ig / self.cos_og;
+        if self.smooth.is_some() {
+            let (value, pdf) = self.evaluate_relief(wi, i, transport, set);
+            return (if transport == Transport::Importance { value * adjoint } else { value }, pdf);
+        }
         let (f, pdf) = self.bsdf.evaluate_seen(&self.seen, i, transport, set);
         let cosine = match transport {
             Transport::Radiance => i.z.abs(),
-            Transport::Importance => self.seen.o.z * cos_ig / self.cos_og,
+            Transport::Importance => self.seen.o.z * adjoint,
         };
         (f * cosine, pdf)
+    }
+
+    /// Under a normal map: the BSDF times the cosine of light with the facet, summed over the ways on which light meets
+    /// it, and the density of `wi`, which is `i` in the frame.
+    #[inline(never)]
+    fn evaluate_relief(&self, wi: Vec3, i: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        let radiance = transport == Transport::Radiance;
+        let Some((relief, second)) = self.relief(if radiance { wi } else { self.own() }) else {
+            return (Rgb::ZERO, 0.0);
+        };
+        let (f, pdf) = self.bsdf.evaluate_dimmed(relief.diffuse, &self.seen, i, transport, set);
+        let first = f * if radiance { i.z.abs() } else { self.seen.o.z };
+        let Some(second) = second else { return (first, pdf) };
+        let (f, more) = if radiance {
+            self.bsdf.evaluate_dimmed(0.0, &self.seen, second, transport, set)
+        } else {
+            self.bsdf.evaluate_dimmed(0.0, &self.bsdf.seen(second), i, transport, set)
+        };
+        (first + f * second.z.abs(), if radiance { pdf + more } else { 0.5 * (pdf + more) })
     }
 
     /// The first part of [`Shading::evaluate_cos`].
@@ -89,7 +145,14 @@ impl<'a> Shading<'a> {
             Transport::Importance => Transport::Radiance,
         };
         let Some((i, _)) = self.local(wi, own) else { return 0.0 };
-        self.bsdf.pdf(i, self.seen.wo(), transport, set)
+        let to = self.seen.wo();
+        let pdf = self.bsdf.pdf(i, to, transport, set);
+        let light = if transport == Transport::Radiance { self.own() } else { wi };
+        let Some((_, Some(second))) = self.relief(light) else { return pdf };
+        match transport {
+            Transport::Radiance => pdf + self.bsdf.pdf(i, second, transport, set),
+            Transport::Importance => 0.5 * (pdf + self.bsdf.pdf(second, to, transport, set)),
+        }
     }
 
     /// What a photon from `wi` (unit, towards where it came from) adds to the radiance seen, per flux over kernel area:
@@ -101,6 +164,9 @@ impl<'a> Shading<'a> {
         let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {
             return Rgb::ZERO;
         };
+        if self.smooth.is_some() {
+            return self.evaluate_relief(wi, i, Transport::Radiance, set).0 / cosine;
+        }
         self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cosine)
     }
 
@@ -117,19 +183,50 @@ impl<'a> Shading<'a> {
         if self.cos_og == 0.0 || (importance && self.opposite) {
             return None;
         }
-        let mut sample = self.bsdf.sample_seen(&self.seen, transport, set, u_lobe, u)?;
+        // Under a normal map light leaves by the one way on which it meets the facet or by the other.
+        let second = if importance { self.relief(self.own()).and_then(|(_, second)| second) } else { None };
+        let Some(second) = second else { return self.sample_seen(&self.seen, 1.0, transport, set, u_lobe, u) };
+        if u_lobe < 0.5 {
+            return self.sample_seen(&self.seen, 0.5, transport, set, 2.0 * u_lobe, u);
+        }
+        self.sample_seen(&self.bsdf.seen(second), 0.5, transport, set, 2.0 * u_lobe - 1.0, u)
+    }
+
+    /// [`Shading::sample`] as seen along `seen`, which has been chosen with the probability `chance`.
+    #[inline(always)]
+    fn sample_seen(
+        &self,
+        seen: &Seen,
+        chance: f32,
+        transport: Transport,
+        set: LobeSet,
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<BsdfSample> {
+        let importance = transport == Transport::Importance;
+        let mut sample = self.bsdf.sample_seen(seen, transport, set, u_lobe, u)?;
         let mut wi = self.frame.to_world(sample.wi);
         let mut cos_ig = wi.dot(self.ng);
-        if sample.wi.z * cos_ig < 0.0 && importance {
-            (wi, cos_ig) = (-wi, -cos_ig);
+        if sample.wi.z * cos_ig < 0.0 {
+            if importance {
+                (wi, cos_ig) = (-wi, -cos_ig);
+            } else if self.smooth.is_some() && self.shines() {
+                (wi, cos_ig) = (mirrored(wi, self.ng), -cos_ig);
+            }
         }
         if sample.wi.z * cos_ig <= 0.0 {
             return None;
         }
-        if importance {
-            sample.weight *= self.seen.o.z * cos_ig.abs() / (self.cos_og * sample.wi.z.abs());
+        let local = std::mem::replace(&mut sample.wi, wi);
+        if self.smooth.is_some() && sample.lobe != LobeSet::DELTA {
+            let (value, pdf_w) = self.evaluate_cos(wi, transport, set);
+            (sample.weight, sample.pdf_w) = (value / pdf_w, pdf_w);
+            return (pdf_w > 0.0).then_some(sample);
         }
-        sample.wi = wi;
+        if importance {
+            sample.weight *= seen.o.z * cos_ig.abs() / (self.cos_og * local.z.abs() * chance);
+            sample.pdf_w *= chance;
+        }
         Some(sample)
     }
 }

@@ -130,8 +130,11 @@ impl Scattering {
         arena: &'a Bump,
     ) -> Shading<'a> {
         let ready = &self.of_materials[surface.material as usize];
-        let frame = if ready.plain_frame { Frame::from_normal(surface.ns) } else { materials.shading_frame(surface) };
-        Shading::new(frame, surface.ng, self.bsdf(ready, materials, surface, eta, arena), wo)
+        let bsdf = self.bsdf(ready, materials, surface, eta, arena);
+        if ready.plain_frame {
+            return Shading::new(Frame::from_normal(surface.ns), surface.ng, bsdf, wo);
+        }
+        Shading::new(materials.shading_frame(surface), surface.ng, bsdf, wo).mapped(surface.ns)
     }
 
     #[inline(always)]

@@ -57,6 +57,7 @@ pub(super) fn deliver(
     let mut set = rendered.layers(&facts.shape, wanted)?;
     let mut attributes = layers::cryptomattes(&facts.named, &rendered, selection, naming, &mut set)?;
     attributes.frame = Some(facts.frame);
+    attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
     let techniques = std::mem::take(&mut rendered.techniques);
     // The pixels are most of the memory, and all that is wanted of them is in the layers.
     let pixels = if keep { rendered.pixels } else { Vec::new() };
@@ -78,6 +79,12 @@ pub(super) fn deliver(
     header.insert("plan".into(), plan.clone());
     header.insert("arguments".into(), arguments.clone());
     header.insert("warnings".into(), json!(facts.warnings));
+    if let Some(number) = facts.made_for.frame {
+        header.insert("frame".into(), number.into());
+    }
+    if let Some(rate) = facts.made_for.frame_rate {
+        header.insert("frame_rate".into(), json!(rate));
+    }
     // That of the finished picture is in `combined`.
     header.insert("error_of".into(), "Noisy".into());
     header.insert("combined".into(), finished.as_ref().map_or(Value::Null, |(_, facts, _)| facts.clone()));

@@ -94,6 +94,10 @@ pub struct Picture {
     pub film_transparent: bool,
     /// The window that is rendered: left edge, top edge, width and height, in shares of the whole picture.
     pub crop: Option<[f64; 4]>,
+    /// Its number in a film.
+    pub frame: Option<i32>,
+    /// Frames in a second, as a fraction of two numbers above zero.
+    pub frame_rate: Option<[u32; 2]>,
 }
 
 /// Tone curves by name.

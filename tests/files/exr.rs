@@ -194,6 +194,37 @@ fn windows_cameras_and_colours_are_in_the_header() {
     }
 }
 
+/// A frame of a film says its number, its rate, and the time code of the two.
+#[test]
+fn frames_of_films_are_in_the_header() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let header = |number, rate| {
+        let attributes = Attributes { moment: exr::Moment { number, rate }, ..Attributes::default() };
+        exr::write(&path, &fixture(3, 2), &attributes, Options::default()).unwrap();
+        ::exr::meta::MetaData::read_from_file(&path, true).unwrap().headers.remove(0)
+    };
+    let found = header(Some(-7), Some([24000, 1001]));
+    assert_eq!(found.own_attributes.frames_per_second, Some((24000, 1001)));
+    let counter = |found: &::exr::meta::header::Header| {
+        let other = &found.own_attributes.other;
+        other.iter().find(|(name, _)| *name == "imageCounter").map(|(_, value)| value.to_i32().unwrap())
+    };
+    assert_eq!((counter(&found), found.shared_attributes.time_code), (Some(-7), None));
+    // 1 h 2 min 3 s and 4 frames: 23.976 frames in a second are counted as 24.
+    let code = header(Some(((60 + 2) * 60 + 3) * 24 + 4), Some([24000, 1001])).shared_attributes.time_code.unwrap();
+    assert_eq!((code.hours, code.minutes, code.seconds, code.frame, code.drop_frame), (1, 2, 3, 4, false));
+    let bare = header(None, None);
+    assert_eq!(
+        (bare.own_attributes.frames_per_second, counter(&bare), bare.shared_attributes.time_code),
+        (None, None, None)
+    );
+    // What a time code cannot say: 60 frames in a second, another day.
+    let code = |number, rate| exr::Moment { number: Some(number), rate: Some(rate) }.time_code();
+    assert_eq!((code(1, [60, 1]), code(24 * 3600 * 24, [24, 1])), (None, None));
+    assert_eq!(code(24 * 3600 * 24 - 1, [24, 1]), Some([23, 59, 59, 23]));
+}
+
 #[test]
 fn names_that_break_other_programs_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -202,6 +202,30 @@ class Export(unittest.TestCase):
         self.assertAlmostEqual(said["focus_distance"], 6, 5)
         self.assertEqual((first["name"], first["camera"]), ("eye", 0))
 
+    def test_frame_and_rate(self):
+        scene = bpy.context.scene
+        for fps, base, expected in ((24, 1, [24, 1]), (24, 1.001, [24000, 1001]), (25, 2, [25, 2])):
+            scene.render.fps, scene.render.fps_base = fps, base
+            scene.frame_set(fps)
+            document, _ = self.write()
+            said = document["scenes"][0]["extras"]["caustique"]
+            self.assertEqual((said["frame"], said["frame_rate"]), (fps, expected))
+
+    def test_closed_meshes_are_told(self):
+        def mesh(corners, faces):
+            made = bpy.data.meshes.new("tested")
+            made.from_pydata(corners, [], faces)
+            return made
+        whole = cube(node_material("m")).data
+        corners, faces = [tuple(v.co) for v in whole.vertices], [tuple(p.vertices) for p in whole.polygons]
+        # The same with vertices of its own for every face, a zero with a sign among them.
+        apart = mesh([tuple(-0.0 if c == 0 and i % 2 else c for c in corners[v]) for i, f in enumerate(faces) for v in f],
+                     [tuple(range(4 * i, 4 * i + 4)) for i in range(6)])
+        twice = mesh(corners, faces + faces[:1])
+        for made, expected in ((whole, True), (apart, True), (mesh(corners, faces[:5]), False), (twice, False),
+                               (mesh(corners, []), False), (None, False)):
+            self.assertIs(export._closed(made), expected)
+
     def test_lamps(self):
         for name, kind in (("p", "POINT"), ("s", "SUN")):
             data = bpy.data.lights.new(name, kind)
@@ -250,7 +274,7 @@ class Export(unittest.TestCase):
             by_lamp = self.render().mean((0, 1))
             with ExitStack() as undo:
                 flat = objects.Flat(bpy.context.scene, undo, lambda *lost: self.fail(lost))
-                lighting.hang(flat, undo, lambda *lost: self.fail(lost))
+                lighting.hang(flat, lambda *lost: self.fail(lost))
                 lamp.hide_render = True
                 for body in flat.things:
                     if body.name.startswith(shape):

@@ -4,6 +4,7 @@ import json
 import re
 import struct
 import unittest
+from pathlib import Path
 
 import flip_evaluator
 import numpy as np
@@ -50,6 +51,26 @@ class Written(support.Scratch):
         command = ["render", support.scene("cornell"), "-o", path, *size, "--no-combine", "--progress", "none"]
         support.run([*command, *extra], check=0)
         return path
+
+    def test_frames_of_films_say_their_number_and_rate(self):
+        data = Path(support.scene("cornell")).read_bytes()
+        size = struct.unpack_from("<I", data, 12)[0]
+        document = json.loads(data[20:20 + size])
+        document["scenes"][0].setdefault("extras", {}).setdefault("caustique", {}).update(frame=49, frame_rate=[24000, 1001])
+        text = json.dumps(document).encode()
+        text += b" " * (-len(text) % 4)
+        rest = data[20 + size:]
+        scene = self.dir / "frame.glb"
+        scene.write_bytes(data[:8] + struct.pack("<III", 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)
+        path = self.dir / "frame.exr"
+        size = ["--width", "9", "--iterations", "1", "--photons", "100", "--layers", "beauty", "--no-combine", "--allow-outside"]
+        support.run(["render", scene, "-o", path, *size, "--progress", "none"], check=0)
+        told = header(path)
+        rate, code = told["framesPerSecond"], told["timeCode"]
+        self.assertEqual((rate.numerator, rate.denominator), (24000, 1001))
+        self.assertEqual((code.hours, code.minutes, code.seconds, code.frame), (0, 0, 2, 1))
+        self.assertEqual(told["imageCounter"], 49)
+        self.assertEqual(json.loads(told["caustique"])["frame"], 49)
 
     def test_layers_types_and_header(self):
         path = self.render("plain.exr")

@@ -30,6 +30,33 @@ pub struct Attributes {
     pub texts: BTreeMap<String, String>,
     /// Where the picture is in a larger one, and what camera has seen it. Not read from files.
     pub frame: Option<Frame>,
+    /// Where the picture is in a film. Not read from files.
+    pub moment: Moment,
+}
+
+/// Where a picture is in a film.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Moment {
+    /// Its number: OpenEXR's `imageCounter`.
+    pub number: Option<i32>,
+    /// Frames in a second, as a fraction of two numbers above zero: OpenEXR's `framesPerSecond`.
+    pub rate: Option<[u32; 2]>,
+}
+
+impl Moment {
+    /// Hours, minutes, seconds and frames at which the picture is shown, frame 0 at midnight and frames counted without
+    /// leaps, as SMPTE 12M does it. `None` without a number or a rate, and for what a time code cannot say: more than
+    /// 30 frames in a second, frames before the first or of another day.
+    pub fn time_code(self) -> Option<[u8; 4]> {
+        let (number, [frames, of_seconds]) = (u32::try_from(self.number?).ok()?, self.rate?);
+        let rate = frames.checked_add(of_seconds / 2)?.checked_div(of_seconds)?;
+        if !(1..=30).contains(&rate) {
+            return None;
+        }
+        let seconds = number / rate;
+        let parts = [seconds / 3600, seconds / 60 % 60, seconds % 60, number % rate];
+        (parts[0] < 24).then(|| parts.map(|part| part as u8))
+    }
 }
 
 /// A picture as a part of a larger one, the display window, and its camera. Matrices are OpenEXR's: row by row, for row

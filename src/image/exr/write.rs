@@ -9,7 +9,7 @@ use exr::block::writer::ChunksWriter;
 use exr::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
 use exr::math::Vec2;
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LineOrder, SampleType, Text,
+    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LineOrder, SampleType, Text, TimeCode,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{SmallVec, f16};
@@ -135,6 +135,9 @@ fn header(
             Text::new_or_none(value).filter(|_| value.is_ascii()).ok_or_else(|| error("its text is not ASCII"))?;
         other.insert(key, AttributeValue::Text(text));
     }
+    if let Some(number) = attributes.moment.number {
+        other.insert(Text::from("imageCounter"), AttributeValue::I32(number));
+    }
     let mut own = LayerAttributes { other, software_name: Some(Text::from(SOFTWARE)), ..LayerAttributes::default() };
     let mut header = Header::new(Text::default(), (set.width, set.height), channels).with_encoding(
         compression,
@@ -148,6 +151,19 @@ fn header(
         own.world_to_camera = Some(options.naming.from_file_axes(world_to_camera));
         own.world_to_normalized_device = Some(options.naming.from_file_axes(world_to_ndc));
     }
+    own.frames_per_second = attributes.moment.rate.map(|[frames, seconds]| (frames as i32, seconds));
+    header.shared_attributes.time_code =
+        attributes.moment.time_code().map(|[hours, minutes, seconds, frame]| TimeCode {
+            hours,
+            minutes,
+            seconds,
+            frame,
+            drop_frame: false,
+            color_frame: false,
+            field_phase: false,
+            binary_group_flags: [false; 3],
+            binary_groups: [0; 8],
+        });
     Ok(header.with_attributes(own))
 }
 

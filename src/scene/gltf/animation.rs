@@ -82,13 +82,13 @@ pub(super) fn pose(document: &mut Document, frame: Option<Frame>, warnings: &mut
 fn rate(document: &Document, frame: Frame, warnings: &mut Vec<String>) -> Result<f64> {
     let index = document.default_scene()?;
     let said: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
-    let said = said.frame_rate.map(|rate| rate.frames_a_second());
     let good = |rate: &f64| rate.is_finite() && *rate > 0.0;
-    if said.is_some_and(|rate| !good(&rate)) {
-        let cause = "extras.caustique.frame_rate must be a number above zero, or two: frames, and in how many seconds";
-        return Err(fault(format!("scene {index}"), cause));
-    }
-    Ok(said.or(frame.rate.filter(good)).unwrap_or_else(|| {
+    // One that is none is told where the rest of the scene's extras are.
+    let said = said.frame_rate.map(|rate| {
+        let [frames, seconds] = rate.fraction().map(f64::from);
+        frames / seconds
+    });
+    Ok(said.filter(good).or(frame.rate.filter(good)).unwrap_or_else(|| {
         warnings.push(format!(
             "the file does not tell its frame rate: {USUAL_RATE} frames a second are assumed (--frame-rate decides)"
         ));

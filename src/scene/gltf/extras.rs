@@ -24,22 +24,24 @@ pub(super) struct SceneExtras {
     pub(super) tonemap: Option<ToneCurve>,
     pub(super) crop: Option<[f64; 4]>,
     pub(super) film_transparent: bool,
-    pub(super) frame_rate: Option<FrameRate>,
+    pub(super) frame: Option<i32>,
+    pub(super) frame_rate: Option<Rate>,
 }
 
-/// Frames a second, or frames and in how many seconds they are shown, as Blender and film count (24000 in 1001).
+/// Frames in a second: a whole number, or a fraction.
 #[derive(Clone, Copy, Deserialize)]
-#[serde(untagged)]
-pub(super) enum FrameRate {
-    Number(f64),
-    Ratio([f64; 2]),
+#[serde(untagged, expecting = "a whole number, or two for a fraction as in [24000, 1001]")]
+pub(super) enum Rate {
+    Whole(u32),
+    Fraction([u32; 2]),
 }
 
-impl FrameRate {
-    pub(super) fn frames_a_second(self) -> f64 {
+impl Rate {
+    /// Numerator and denominator.
+    pub(super) fn fraction(self) -> [u32; 2] {
         match self {
-            FrameRate::Number(rate) => rate,
-            FrameRate::Ratio([frames, seconds]) => frames / seconds,
+            Rate::Whole(rate) => [rate, 1],
+            Rate::Fraction(fraction) => fraction,
         }
     }
 }
@@ -159,6 +161,7 @@ pub(super) const SCENE: &[&str] = &[
     "tonemap",
     "crop",
     "film_transparent",
+    "frame",
     "frame_rate",
 ];
 pub(super) const MATERIAL: &[&str] =

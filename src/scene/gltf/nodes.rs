@@ -2,7 +2,7 @@
 
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
-use super::extras::{self, ObjectExtras, SceneExtras};
+use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
 use super::transform::{self, can_be_inverted, compose, finite, local};
@@ -124,7 +124,7 @@ impl Reader<'_> {
 
     /// The picture that the file was made for.
     fn picture(&mut self, place: &str) -> Result<()> {
-        let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, .. } = self.scene;
+        let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, frame, frame_rate, .. } = self.scene;
         if resolution.is_some_and(|size| size.contains(&0)) {
             return Err(fault(place, "extras.caustique.resolution must be two numbers above zero"));
         }
@@ -138,7 +138,15 @@ impl Reader<'_> {
             let cause = "extras.caustique.crop must be left edge, top edge, width and height within 0 and 1";
             return Err(fault(place, cause));
         }
-        self.out.picture = Picture { resolution, exposure, tonemap, film_transparent, crop };
+        let frame_rate = frame_rate.map(Rate::fraction);
+        // The EXR's attribute has a numerator with a sign.
+        if frame_rate.is_some_and(|rate| rate.contains(&0) || rate[0] > i32::MAX as u32) {
+            let cause = "extras.caustique.frame_rate must be one or two whole numbers above zero, below 2^31";
+            return Err(fault(place, cause));
+        }
+        // The frame that is shown, if one is asked for.
+        let frame = self.options.frame.map_or(frame, |frame| i32::try_from(frame.number).ok());
+        self.out.picture = Picture { resolution, exposure, tonemap, film_transparent, crop, frame, frame_rate };
         Ok(())
     }
 

@@ -202,10 +202,11 @@ fn frame_rates() {
         file.json["scenes"][0]["extras"] = json!({"caustique": {"frame_rate": rate}});
         near(seconds(&file, Some(60), Some(30.0)), x, &[]);
     }
-    for wrong in [json!(0), json!([24, 0]), json!(-1)] {
+    let above_zero = "extras.caustique.frame_rate must be one or two whole numbers above zero";
+    for (wrong, told) in [(json!(0), above_zero), (json!([24, 0]), above_zero), (json!(-1), "a whole number, or two")] {
         file.json["scenes"][0]["extras"] = json!({"caustique": {"frame_rate": wrong}});
         let error = seconds(&file, Some(60), None).unwrap_err();
-        assert!(error.contains("extras.caustique.frame_rate must be a number above zero"), "{error}");
+        assert!(error.contains(told), "{error}");
     }
     let mut still = thing();
     still.json["animations"] = json!([]);

@@ -16,6 +16,7 @@ fn what_the_picture_was_made_for() {
     let mut file = Glb::new();
     file.json["scenes"][0]["extras"] = caustique(json!({
         "resolution": [640, 200], "exposure": -1.5, "tonemap": "filmic", "crop": [0, 0, 0.5, 1], "film_transparent": true,
+        "frame": 12, "frame_rate": [24000, 1001],
         "losses": ["object \"Hair\": it is gone", "object \"Hair\": it is gone"],
         "environment": {"color": [1, 1, 1], "visible": {"camera": false}},
     }));
@@ -23,7 +24,9 @@ fn what_the_picture_was_made_for() {
     let (exposure, tonemap) = (Some(-1.5), Some(ToneCurve::Filmic));
     let crop = Some([0.0, 0.0, 0.5, 1.0]);
     let resolution = Some([640, 200]);
-    assert_eq!(description.picture, Picture { resolution, exposure, tonemap, film_transparent: true, crop });
+    let (frame, frame_rate) = (Some(12), Some([24000, 1001]));
+    let expected = Picture { resolution, exposure, tonemap, film_transparent: true, crop, frame, frame_rate };
+    assert_eq!(description.picture, expected);
     assert!(description.environment_hidden_from_camera);
     let said = |what: &str| description.warnings.iter().filter(|warning| warning.contains(what)).count();
     assert_eq!((said("Hair"), said("ignored")), (1, 0));
@@ -50,6 +53,11 @@ fn wrong_values_are_errors() {
         (json!({"losses": "all"}), "expected a sequence"),
         (json!({"crop": [0.5, 0, 0.6, 1]}), "within 0 and 1"),
         (json!({"crop": [0, 0, 0, 1]}), "within 0 and 1"),
+        (json!({"frame": 1.5}), "expected i32"),
+        (json!({"frame_rate": 23.976}), "two for a fraction as in [24000, 1001]"),
+        (json!({"frame_rate": [24, 0]}), "whole numbers above zero"),
+        (json!({"frame_rate": 0}), "whole numbers above zero"),
+        (json!({"frame_rate": 4294967295u32}), "below 2^31"),
     ] {
         let mut file = Glb::new();
         file.json["scenes"][0]["extras"] = caustique(keys);
