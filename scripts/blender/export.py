@@ -74,7 +74,8 @@ def write(path, scene=None, bake_size=bake.SIZE):
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.hang(flat, warn)
         if sun is not None:
-            sky.hang(sun, flat, ["camera"] if "visible" in said["environment"] else [])
+            environment = said["environment"]
+            sky.hang(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _bodies(flat.things)
         bpy.context.view_layer.update()
         _run_exporter(path)

@@ -121,7 +121,8 @@ def _area_mesh(thing, flat):
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     mesh.materials.append(material)
     # A mirroring scale would turn the front to the back.
-    flat.add(name, mesh, Matrix.LocRotScale(place, turn, [abs(s) for s in scale]), flat.hidden[thing.name])
+    flat.add(name, mesh, Matrix.LocRotScale(place, turn, [abs(s) for s in scale]), flat.hidden[thing.name],
+             flat.groups[thing.name])
 
 
 def _warn_of(thing, where, warn):

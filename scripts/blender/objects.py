@@ -23,17 +23,17 @@ _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes 
 class Flat:
     """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
 
-    `things` are its objects, `names` the names of the objects and meshes that they stand for, and `hidden` the kinds of
-    rays that do not see each of `things`.
+    `things` are its objects, `names` the names of the objects and meshes that they stand for, `hidden` the kinds of rays
+    that do not see each of `things`, and `groups` the group of lights that each is in, or None.
     """
 
     def __init__(self, scene, undo, warn):
         visibility.as_rendered(scene, undo, warn)
         layer = bpy.context.view_layer
         layer.update()
-        self.things, self.names, self.hidden = [], {}, {}
+        self.things, self.names, self.hidden, self.groups = [], {}, {}, {}
         self._warn, self._meshes, self._shapes, self._made = warn, {}, [], []
-        self._indirect = visibility.indirect_only(layer)
+        self._indirect, self._layer = visibility.indirect_only(layer), layer
         self.scene = bpy.data.scenes.new(scene.name)
         self.names[self.scene.name] = scene.name
         undo.callback(bpy.data.scenes.remove, self.scene)
@@ -55,7 +55,7 @@ class Flat:
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
             # It is looked through, although it is not shown.
             place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
-            found.append((scene.camera, scene.camera.data, place, []))
+            found.append((scene.camera, scene.camera.data, place, [], None))
         for mesh, original in self._shapes:
             standin.generate(original, mesh, lambda what, name=original.name: warn(f'object "{name}"', what))
         for taken in filter(None, found):
@@ -95,7 +95,8 @@ class Flat:
         hidden = visibility.hidden_rays(thing, instance.parent if instance.is_instance else None)
         if (instance.parent or thing).name in self._indirect and "camera" not in hidden:
             hidden.append("camera")
-        return data and (thing.original, data, instance.matrix_world.copy(), hidden)
+        group = visibility.light_group(thing, instance.parent if instance.is_instance else None, self._layer)
+        return data and (thing.original, data, instance.matrix_world.copy(), hidden, group)
 
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, made once for all that share it; None if it has no faces."""
@@ -119,7 +120,7 @@ class Flat:
         self._meshes[key] = mesh if mesh.polygons else None
         return self._meshes[key]
 
-    def _put(self, original, data, matrix, hidden):
+    def _put(self, original, data, matrix, hidden, group):
         if isinstance(data, bpy.types.Mesh) and not _is_plain(matrix):
             # A sheared object has no place that location, rotation and scale could tell: its mesh gets it instead.
             sheared = data.copy()
@@ -128,7 +129,7 @@ class Flat:
             if matrix.determinant() < 0:
                 sheared.flip_normals()
             data, matrix = sheared, Matrix()
-        body = self.add(original.name, data, matrix, hidden)
+        body = self.add(original.name, data, matrix, hidden, group)
         body.color, body.pass_index = original.color, original.pass_index
         if "caustique" in original:
             self.say(body, **original["caustique"].to_dict())
@@ -138,8 +139,8 @@ class Flat:
         if rest:
             self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it")
 
-    def add(self, name, data, matrix, hidden=()):
-        """A thing of this name, data, place (world matrix), and kinds of rays that do not see it."""
+    def add(self, name, data, matrix, hidden=(), group=None):
+        """A thing of this name, data, place (world matrix), kinds of rays that do not see it, and group of lights."""
         body = self.own(bpy.data.objects.new(name, data))
         self.names[body.name] = name
         self.scene.collection.objects.link(body)
@@ -148,6 +149,9 @@ class Flat:
         self.hidden[body.name] = hidden
         if "camera" in hidden:
             self.say(body, visible={"camera": False})
+        self.groups[body.name] = group
+        if group:
+            self.say(body, light_group=group)
         return body
 
     def remove(self, thing):

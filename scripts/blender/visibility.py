@@ -113,3 +113,10 @@ def indirect_only(layer):
 def hidden_rays(thing, instancer=None):
     """Kinds of rays that do not see an object in Cycles, of which those of its instancer hide it, too."""
     return [ray for ray in RAYS if not all(getattr(t, "visible_" + ray, True) for t in (thing, instancer) if t)]
+
+
+def light_group(thing, instancer, layer):
+    """The light group of an object, or of what instances it, if the view layer has it; else None."""
+    known = {group.name for group in getattr(layer, "lightgroups", ())}
+    names = (getattr(each, "lightgroup", "") for each in (thing, instancer) if each)
+    return next((name for name in names if name in known), None)

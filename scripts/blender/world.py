@@ -7,6 +7,7 @@ import os
 import bpy
 
 import sky
+import visibility
 from shading import constant, medium, nodes_of, output_of, source
 
 
@@ -39,6 +40,9 @@ def extras(scene, path, warn):
         if any(n.type == "LIGHT_PATH" and any(s.is_linked for s in n.outputs) for n in output.id_data.nodes):
             warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too")
     _say_visibility(world, said["environment"], where, warn)
+    group = visibility.light_group(world, None, bpy.context.view_layer)
+    if group:
+        said["environment"]["light_group"] = group
     return said, disc
 
 

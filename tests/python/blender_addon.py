@@ -49,6 +49,23 @@ class Renders(Installed):
         for axis, value in zip("XYZ", (0, -0.6, 0.8)):
             numpy.testing.assert_allclose(found[f"Normal.{axis}"], value, atol=1e-4)
 
+    def test_light_groups_are_passes(self):
+        """Each group's light has its colour; the finished groups make the picture."""
+        self.plane()
+        self.eye()
+        for colour, group in (((1, 0, 0), "key"), ((0, 1, 0), "rim light")):
+            bpy.ops.scene.view_layer_add_lightgroup(name=group)
+            body = self.sun(2)
+            body.data.color, body.lightgroup = colour, group
+        self.settings.method = "path"
+        self.passes("noisy_parts")
+        found = self.render()
+        for group, lit, dark in (("key", "R", "G"), ("rim_light", "G", "R")):
+            for name in (f"LightGroup_{group}", f"CombinedLightGroup_{group}"):
+                numpy.testing.assert_allclose(found[f"{name}.{lit}"], found[f"Combined.{lit}"], rtol=1e-3)
+                self.assertFalse(found[f"{name}.{dark}"].any(), name)
+            self.assertFalse(found[f"CombinedCaustic_{group}.{lit}"].any())
+
     def test_three_frames_move_as_they_are_animated(self):
         self.plane()
         self.sun(3)

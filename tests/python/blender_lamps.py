@@ -27,6 +27,30 @@ class Lamps(beside.Beside):
             self.alike(self.caustique(), theirs)
             self.assertEqual(self.warnings, [])
 
+    def test_light_groups(self):
+        """Lamps of all kinds, glowing meshes, their instances and the world say their group, if the view layer has it."""
+        self.floor()
+        eye((0, -2.5, 2.5), (0, 0, 0), lens=35)
+        for name in ("key", "Sky light"):
+            bpy.ops.scene.view_layer_add_lightgroup(name=name)
+        lamp("AREA", (0, 0, 1), 20, size=0.5).lightgroup = "key"
+        lamp("POINT", (1, 0, 1), 20, shadow_soft_size=0.0).lightgroup = "key"
+        lamp("SPOT", (-1, 0, 1), 20).lightgroup = "gone"
+        panel = shared.place("panel", square(glow("glowing", (1, 1, 1)), 0.2), (0, 1, 0.5))
+        panel.lightgroup = "Sky light"
+        world = bpy.data.worlds.new("world")
+        world.lightgroup = "Sky light"
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        self.scene.world = world
+        self.caustique(4, "--method", "path", "--layers", "beauty,LightGroup_key,LightGroup_Sky_light")
+        document, _ = glb.read(self.path)
+        said = {node["name"]: node.get("extras", {}).get("caustique", {}) for node in document["nodes"]}
+        groups = {name: keys["light_group"] for name, keys in said.items() if "light_group" in keys}
+        self.assertEqual(groups, {"area (area light)": "key", "point": "key", "panel": "Sky light"})
+        environment = document["scenes"][0]["extras"]["caustique"]["environment"]
+        self.assertEqual(environment["light_group"], "Sky light")
+
     def test_area_lamps_spread(self):
         self.floor()
         eye((0, -2.5, 2.5), (0, 0, 0), lens=35)

@@ -1,5 +1,6 @@
 """Which layers of the program become which passes of Blender, and how they get there."""
 
+import re
 from collections import namedtuple
 
 import numpy
@@ -11,6 +12,9 @@ Pass = namedtuple("Pass", "name components kind layer switch always")
 _COMBINED = "Combined"
 _PARTS = ("Direct", "Indirect", "Caustic", "Emission", "Volume")
 _BANDWIDTHS = 5
+_GROUPS = ("LightGroup_", "Caustic_")
+#: What no layer's name can have.
+_NO_LETTER = re.compile("[^0-9A-Za-z]")
 _CRYPTOMATTES = 3  # layers of two ranks each
 #: Switches that Blender itself has; the others are in `properties.Passes`.
 _BLENDERS = {"use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_cryptomatte_object",
@@ -39,7 +43,15 @@ def wanted(view_layer):
     def asked(switch):
         return getattr(view_layer if switch in _BLENDERS else view_layer.caustique, switch)
 
-    return [one for one in PASSES if asked(one.switch)]
+    return [one for one in PASSES if asked(one.switch)] + _of_groups(view_layer)
+
+
+def _of_groups(view_layer):
+    """The finished light of each light group, and its caustics; the estimates too, where those of parts are asked for."""
+    found = dict.fromkeys(_NO_LETTER.sub("_", group.name) for group in getattr(view_layer, "lightgroups", ()))
+    beginnings = [_COMBINED, ""] if view_layer.caustique.noisy_parts else [_COMBINED]
+    names = (f"{beginning}{kind}{group}" for group in found for beginning in beginnings for kind in _GROUPS)
+    return [Pass(name, "RGB", "COLOR", name, None, False) for name in names]
 
 
 def layers(chosen):
@@ -54,13 +66,15 @@ def fill(render_layer, picture, frame=None):
 
     `frame` is x, y (from the top left), width and height of the part that Blender renders, in pixels of the whole
     picture; without it everything. Returns the names of the passes that stay black because the program has not made
-    them. Parts are not among these: where one is absent, the scene has no such light, and black is right.
+    them. Parts and light groups are not among these: where one is absent, the scene has no such light, and black is
+    right; a method that does not tell lights apart says so itself.
     """
     missing = []
     for one in render_layer.passes:
         planes = _planes(picture, one.name, one.channel_id)
         if planes is None:
-            if one.name.replace(_COMBINED, "", 1) not in _PARTS:
+            plain = one.name.replace(_COMBINED, "", 1)
+            if plain not in _PARTS and not plain.startswith(_GROUPS):
                 missing.append(one.name)
             continue
         put(one, planes, picture, frame)
