@@ -88,12 +88,19 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
         text += &number("light_paths").map(|n| format!(", {n} light paths")).unwrap_or_default();
         text += &number("seconds").map(|s| format!(", {}", duration(s))).unwrap_or_default();
         let note = match object.get("error_of").and_then(Value::as_str) {
+            Some("finished picture") => " (finished picture, trimmed)".into(),
             Some(of) if !of.ends_with("bias") => format!(" ({of} only)"),
             _ => String::new(),
         };
         let error = number("error").map(|e| format!(", estimated relative error {}{note}", percent(e)));
         text += &error.unwrap_or_default();
         text.push('\n');
+        let halving = object.get("accuracy").and_then(|accuracy| accuracy.get("halving"));
+        let half = |key: &str| halving.and_then(|halving| halving.get(key)).and_then(Value::as_f64);
+        if let (Some(error), Some(seconds), Some(cores)) = (half("error"), half("seconds"), half("core_seconds")) {
+            let hours = cores / 3600.0;
+            text += &format!("{} would take about {} more, {hours:.2} core-hours\n", percent(error), duration(seconds));
+        }
     }
     for warning in object.get("warnings").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {
         text += &format!("warning: {warning}\n");
@@ -102,7 +109,10 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
     // A reproducible file has no clock in it.
     let timed = history.iter().any(|moment| moment.get("seconds").is_some());
     let (key, name) = if timed { ("seconds", "seconds") } else { ("iterations", "iterations") };
-    let point = |moment: &Value| Some((moment.get(key)?.as_f64()?, moment.get("error")?.as_f64()?));
+    let point = |moment: &Value| {
+        let error = moment.get("finished").filter(|error| !error.is_null()).or(moment.get("error"))?;
+        Some((moment.get(key)?.as_f64()?, error.as_f64()?))
+    };
     text + &plot::log_log(&history.iter().filter_map(point).collect::<Vec<_>>(), name, "estimated relative error")
 }
 

@@ -116,8 +116,8 @@ fn join(args: &MergeArgs) -> Result<()> {
     })?;
     if let Some(summary) = summary {
         summary.tell();
-        if let Some((name, account)) = &delivery.finished {
-            tell_finish(name, account, delivery.finishing, summary.told_of_finished());
+        if let Some((name, _)) = &delivery.finished {
+            tell_finish(name, delivery.reached.as_ref(), delivery.finishing, summary.told_of_finished());
         }
         summary.tell_rejected(&args.output);
     }

@@ -2,7 +2,7 @@
 
 use super::say;
 pub use caustique::pipeline::plan::percent;
-use caustique::render::{Progress, Settings, Told};
+use caustique::render::{Progress, Settings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::io::IsTerminal;
@@ -177,7 +177,17 @@ struct Line {
     remaining: Option<f64>,
     light_paths: u64,
     error: Option<f64>,
-    error_of: Told,
+    error_of: &'static str,
+    /// An error to come, and in how many seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected: Option<Expected>,
+}
+
+/// An error to come.
+#[derive(Serialize)]
+struct Expected {
+    error: f64,
+    seconds: f64,
 }
 
 impl Reporter {
@@ -205,10 +215,13 @@ impl Reporter {
                 }
             }
             Form::Json => {
-                let Progress { iteration, iterations, seconds, remaining, light_paths, error, told, .. } = *progress;
+                let Progress { iteration, iterations, seconds, remaining, light_paths, told, .. } = *progress;
+                let error = progress.finished.or(progress.error);
+                let error_of = if progress.finished.is_some() { "finished picture" } else { told.name() };
+                let expected = progress.expected.map(|(error, seconds)| Expected { error, seconds });
                 let frame = self.turn.map(|turn| turn.frame);
                 let line =
-                    Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of: told };
+                    Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of, expected };
                 if let Ok(line) = serde_json::to_string(&line) {
                     say(&line);
                 }
@@ -254,8 +267,15 @@ fn sentence(progress: &Progress) -> String {
     if progress.light_paths > 0 {
         text += &format!(", {} photons/s", count(progress.light_paths as f64 / progress.seconds.max(1e-9)));
     }
-    if let Some(error) = progress.error {
-        text += &format!(", error {}{}", percent(error), progress.told.note());
+    match (progress.finished, progress.expected) {
+        (Some(error), Some((wanted, seconds))) => {
+            text += &format!(", error {} now, {} in about {}", percent(error), percent(wanted), duration(seconds));
+        }
+        (Some(error), None) => text += &format!(", error {}", percent(error)),
+        (None, _) => {
+            let error = progress.error.map(|error| format!(", error {}{}", percent(error), progress.told.note()));
+            text += &error.unwrap_or_default();
+        }
     }
     text
 }
@@ -283,6 +303,7 @@ pub fn count(n: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use caustique::render::Told;
 
     #[test]
     fn sentences_are_for_people() {
@@ -295,10 +316,14 @@ mod tests {
             photons: 1,
             error: Some(0.031),
             told: Told::All,
+            finished: None,
+            expected: None,
         };
         assert_eq!(sentence(&progress), "iteration 12 of 64, 3.1 s, 4 min 10 s left, 387 k photons/s, error 3.1 %");
         let noise = Progress { told: Told::Noise, remaining: None, iterations: None, ..progress };
         assert_eq!(sentence(&noise), "iteration 12, 3.1 s, 387 k photons/s, error 3.1 % (noise only)");
+        let known = Progress { finished: Some(0.021), expected: Some((0.01, 40.0)), ..noise };
+        assert_eq!(sentence(&known), "iteration 12, 3.1 s, 387 k photons/s, error 2.1 % now, 1.0 % in about 40.0 s");
         assert_eq!(duration(7500.0), "2 h 5 min");
         assert_eq!(duration(99.7), "1 min 40 s");
         assert_eq!(count(9_999.0), "9999");

@@ -242,16 +242,29 @@ impl Finish {
         Ok(Account { combined, told, clamped })
     }
 
+    /// The squared error (trimmed, relative) of a picture finished from half of its iterations, as the other half tells
+    /// it; `None` where a quarter is missing or empty.
+    ///
+    /// # Errors
+    /// Layers are missing, or the denoiser fails.
+    pub fn squared_error_of_half(&mut self, set: &LayerSet) -> Result<Option<f64>> {
+        let estimate = Estimate::of(set)?;
+        self.half(set, &estimate)
+    }
+
     /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is
     /// missing or empty.
     fn told(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Option<Told>> {
+        Ok(self.half(set, estimate)?.map(|squared| Told { half: squared.max(0.0).sqrt() }))
+    }
+
+    fn half(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Option<f64>> {
         let Some(quarters) = quarters(set) else { return Ok(None) };
         let quality = std::mem::replace(&mut self.quality, Quality::Fast);
         let picture = self.picture(&estimate.first_half(&quarters));
         self.quality = quality;
         let picture = picture?;
-        let squared = told::squared_error(&picture, [&quarters[2], &quarters[3]], &picture);
-        Ok(Some(Told { half: squared.max(0.0).sqrt() }))
+        Ok(Some(told::squared_error(&picture, [&quarters[2], &quarters[3]], &picture)))
     }
 
     /// The finished parts that are wanted, with their layers' names: all or none of those are worked out that sum to

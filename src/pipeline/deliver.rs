@@ -8,7 +8,7 @@ use crate::estimator::Pixel;
 use crate::film::{LayerSet, Naming, Selection};
 use crate::finish::{Account, reads};
 use crate::image::exr::{self, Attributes};
-use crate::render::{Clock, Rendered, TechniquePicture, cpu_seconds, peak_memory};
+use crate::render::{Accuracy, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
 
 /// A picture with its layers and its header.
@@ -21,6 +21,8 @@ pub struct Delivery {
     pub techniques: Vec<TechniquePicture>,
     /// What finished the picture, and what it did.
     pub finished: Option<(String, Account)>,
+    /// The error of the finished picture and what half of it costs, where its quarters tell.
+    pub reached: Option<Reached>,
     /// Seconds from the last iteration to here.
     pub finishing: f64,
     /// Why the picture is not finished, though that was asked for.
@@ -59,6 +61,7 @@ pub(super) fn deliver(
     attributes.frame = Some(facts.frame);
     attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
     let techniques = std::mem::take(&mut rendered.techniques);
+    let history = std::mem::take(&mut rendered.history);
     // The pixels are most of the memory, and all that is wanted of them is in the layers.
     let pixels = if keep { rendered.pixels } else { Vec::new() };
     let applied = ready.map(|ready| {
@@ -85,8 +88,11 @@ pub(super) fn deliver(
     if let Some(rate) = facts.made_for.frame_rate {
         header.insert("frame_rate".into(), json!(rate));
     }
-    // That of the finished picture is in `combined`.
     header.insert("error_of".into(), "Noisy".into());
+    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account));
+    if let Some(reached) = &of_finished {
+        reached.tell(&mut header, reproducible);
+    }
     header.insert("combined".into(), finished.as_ref().map_or(Value::Null, |(_, facts, _)| facts.clone()));
     header.extend(more);
     if !reproducible {
@@ -94,7 +100,68 @@ pub(super) fn deliver(
     }
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let finished = finished.map(|(name, _, account)| (name, account));
-    Ok((Delivery { set, attributes, techniques, finished, finishing, refusal, tail: None }, pixels))
+    let reached = of_finished;
+    Ok((Delivery { set, attributes, techniques, finished, reached, finishing, refusal, tail: None }, pixels))
+}
+
+/// How far a render has come.
+pub struct Reached {
+    accuracy: Accuracy,
+    /// The last moment judged with the picture as it is.
+    history: Vec<History>,
+    last: History,
+}
+
+impl Reached {
+    /// By a history and what the finish has told at its end; `None` where nothing is known.
+    fn of(mut history: Vec<History>, account: &Account) -> Option<Reached> {
+        let last = history.last_mut()?;
+        if let Some(told) = account.told {
+            last.finished = Some(told.half * told.half);
+        }
+        let last = *last;
+        Some(Reached { accuracy: Accuracy::of(&history)?, history, last })
+    }
+
+    /// Estimated relative error of the finished picture: the root of relMSE, trimmed of the worst half per cent of the
+    /// pixels.
+    pub fn error(&self) -> f64 {
+        self.accuracy.error(self.last.iterations)
+    }
+
+    /// How many times what the render has cost half of the error costs beside it; `None` where bias forbids it.
+    pub fn halving(&self) -> Option<f64> {
+        let iterations = self.accuracy.iterations_to(0.5 * self.error())?;
+        Some(iterations / self.last.iterations as f64 - 1.0)
+    }
+
+    /// Seconds for half of the error, on top of those that the render has taken.
+    pub fn seconds_to_half(&self) -> Option<f64> {
+        Some(self.halving()? * self.last.seconds)
+    }
+
+    /// In place of the estimate's error, in the header.
+    fn tell(&self, header: &mut Map<String, Value>, reproducible: bool) {
+        if let Some(noisy) = header.insert("error".into(), self.error().into()) {
+            header.insert("error_noisy".into(), noisy);
+        }
+        header.insert("error_of".into(), "finished picture".into());
+        let mut halving = json!({"error": 0.5 * self.error()});
+        if let Some(more) = self.halving() {
+            halving["iterations"] = (more * self.last.iterations as f64).ceil().into();
+            if !reproducible {
+                halving["seconds"] = (more * self.last.seconds).into();
+                halving["core_seconds"] = (more * self.last.cpu_seconds).into();
+            }
+        }
+        let metric = "root of relMSE, trimmed of the worst 0.5 % of the pixels";
+        let exponent = self.accuracy.exponent;
+        header.insert("accuracy".into(), json!({"metric": metric, "exponent": exponent, "halving": halving}));
+        let moments = header.get_mut("history").and_then(Value::as_array_mut).into_iter().flatten();
+        for (entry, moment) in moments.zip(&self.history) {
+            entry["finished"] = moment.finished.map(|_| self.accuracy.error(moment.iterations)).into();
+        }
+    }
 }
 
 /// What the layers and their finish have cost.

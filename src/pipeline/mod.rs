@@ -8,6 +8,7 @@ pub mod checkpoint;
 mod deliver;
 mod facts;
 pub mod finish;
+mod judge;
 pub mod layers;
 pub mod load;
 pub mod memory;
@@ -19,7 +20,7 @@ pub mod seeds;
 pub mod shard;
 
 pub use checkpoint::Saving;
-pub use deliver::Delivery;
+pub use deliver::{Delivery, Reached};
 pub use facts::Facts;
 pub use finish::Ready;
 pub use load::Loaded;
@@ -178,6 +179,11 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     plan.warnings.extend(less);
     plan.warnings.extend(ungrouped(&scene, &settings));
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
+    // The error that is asked for is that of the picture that is delivered.
+    let (target, settings) = match (&ready, settings.target_error) {
+        (Some(_), Some(target)) => (Some(target), Settings { target_error: None, ..settings }),
+        _ => (None, settings),
+    };
     watch.begins(&plan, &settings);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
@@ -206,13 +212,26 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
         plan: told,
     };
     let mut saver = saving.map(|saving| Saver::new(saving, &head, order.resume.as_deref() == Some(&*saving.path)));
+    let mut judging = None;
     let stop = drive(&mut session, |progress, session| {
-        watch.progress(progress);
+        let accuracy = match judge::judge(session, ready.as_mut(), target) {
+            Ok(accuracy) => accuracy,
+            Err(error) => {
+                judging.get_or_insert(error);
+                None
+            }
+        };
+        let progress = judge::told(progress, session, accuracy, target);
+        watch.progress(&progress);
         preview(session, ready.as_mut(), &facts.frame, watch);
         if let Some(saver) = &mut saver {
             saver.save_if_due(session, watch);
         }
-        if watch.stops() { Control::Stop } else { Control::Continue }
+        match target {
+            _ if watch.stops() || judging.is_some() => Control::Stop,
+            Some(target) if judge::reached(&progress, session, accuracy, target) => Control::Reached,
+            _ => Control::Continue,
+        }
     });
     if let Some(saver) = &mut saver {
         saver.finish(&session, stop, watch);

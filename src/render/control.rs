@@ -11,6 +11,8 @@ pub enum Control {
     Continue,
     /// Stop here; what is finished is kept.
     Stop,
+    /// Stop here: the error that was asked for is reached.
+    Reached,
 }
 
 /// Why a render stopped.
@@ -47,6 +49,10 @@ pub struct Progress {
     pub error: Option<f64>,
     /// What that knows of.
     pub told: Told,
+    /// Relative error of the picture as it would be delivered, in place of that above, where it is known.
+    pub finished: Option<f64>,
+    /// An error that is still to be reached, and in how many seconds it may be.
+    pub expected: Option<(f64, f64)>,
 }
 
 /// One moment of a render's history.
@@ -62,4 +68,7 @@ pub struct History {
     pub light_paths: u64,
     /// Estimated squared relative error, when two iterations are done.
     pub estimate: Option<ErrorEstimate>,
+    /// Squared relative error (trimmed) of the picture finished from half of these iterations, where it was judged; noise
+    /// around a small one may make it negative.
+    pub finished: Option<f64>,
 }

@@ -42,8 +42,10 @@ pub fn drive<'a>(
             return StopReason::Iterations;
         }
         let progress = session.step();
-        if observe(&progress, session) == Control::Stop {
-            return StopReason::Interrupted;
+        match observe(&progress, session) {
+            Control::Continue => {}
+            Control::Stop => return StopReason::Interrupted,
+            Control::Reached => return StopReason::Error,
         }
         // Without a light the black picture is right.
         let error = progress.error.or(session.is_dark().then_some(0.0));

@@ -56,7 +56,7 @@ impl Rendered {
         let Rendered { seconds, iterations, light_paths, phases: Phases { pilot, light, map, eye }, .. } = *self;
         self.history.retain(|moment| moment.iterations < iterations);
         let cpu_seconds = pilot + light + map + eye;
-        self.history.push(History { seconds, cpu_seconds, iterations, light_paths, estimate });
+        self.history.push(History { seconds, cpu_seconds, iterations, light_paths, estimate, finished: None });
     }
 }
 
@@ -129,6 +129,7 @@ fn history(parts: &[Part]) -> Vec<History> {
             iterations: all.iter().map(|moment| moment.iterations).sum(),
             light_paths: all.iter().map(|moment| moment.light_paths).sum(),
             estimate,
+            finished: None,
         })
     };
     first.history.iter().filter_map(at).collect()

@@ -1,5 +1,6 @@
 //! Rendering: the pass loop, when it stops, and what it reports.
 
+mod accuracy;
 pub mod auto;
 mod bidirectional;
 mod choice;
@@ -30,9 +31,10 @@ mod tiles;
 mod told;
 mod volume;
 
+pub use accuracy::Accuracy;
 pub use clock::{Clock, Spent, cpu_seconds, peak_memory};
 pub use control::{Control, History, Progress, StopReason};
-pub use drive::{drive, render};
+pub use drive::{LEAST, drive, render};
 pub use error_estimate::ErrorEstimate;
 pub use forecast::photons_per_path;
 pub use joined::Part;

@@ -172,7 +172,35 @@ impl<'a> Session<'a> {
             photons: self.photons,
             error: error.map(|error| error.root()),
             told: settings.told(),
+            finished: None,
+            expected: None,
         }
+    }
+
+    /// Whether the last iteration is one of those that the history tells of.
+    pub fn records(&self) -> bool {
+        self.history.last().is_some_and(|moment| moment.iterations == self.done)
+    }
+
+    /// The error so far against time.
+    pub fn history(&self) -> &[History] {
+        &self.history
+    }
+
+    /// Keeps what was told of the picture finished from half of the iterations so far ([`History::finished`]).
+    pub fn judged(&mut self, squared: Option<f64>) {
+        if !self.records() {
+            self.push(self.estimate());
+        }
+        if let Some(moment) = self.history.last_mut() {
+            moment.finished = squared;
+        }
+    }
+
+    /// Seconds until so many iterations are done, at the pace so far.
+    pub fn seconds_to(&self, iterations: f64) -> f64 {
+        let pace = (self.spent.seconds - self.pilot_seconds) / self.done.max(1) as f64;
+        (iterations - self.done as f64).max(0.0) * pace
     }
 
     /// An iteration, and the error where it is wanted: for the history, or to stop the render.
@@ -191,10 +219,14 @@ impl<'a> Session<'a> {
     }
 
     fn record(&mut self, estimate: Option<ErrorEstimate>) {
+        self.push(estimate);
+        self.next_record = (self.done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
+    }
+
+    fn push(&mut self, estimate: Option<ErrorEstimate>) {
         let (iterations, light_paths) = (self.done, self.light_paths);
-        self.next_record = (iterations as f64 * std::f64::consts::SQRT_2).ceil() as u64;
         let Spent { seconds, cpu_seconds } = self.spent;
-        self.history.push(History { seconds, cpu_seconds, iterations, light_paths, estimate });
+        self.history.push(History { seconds, cpu_seconds, iterations, light_paths, estimate, finished: None });
     }
 
     /// Iterations of this shard, when their number is what stops the render.

@@ -24,6 +24,15 @@ pub enum Told {
 }
 
 impl Told {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Told::All => "noise and bias",
+            Told::Noise => "noise",
+            Told::PhotonNoise => "noise of photons",
+        }
+    }
+
     /// What is lacking, to be printed behind the number: ` (noise only)`; nothing where nothing is.
     pub fn note(self) -> &'static str {
         match self {

@@ -188,7 +188,7 @@ impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
         let Telling { args, summary, preview, made_for, .. } = self;
-        let Delivery { set, attributes, techniques, finished, finishing, refusal, tail } = delivery;
+        let Delivery { set, attributes, techniques, finished, reached, finishing, refusal, tail } = delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
         let written = files::write(args, &set, &attributes, tail.as_ref());
@@ -199,8 +199,8 @@ impl Telling<'_> {
         }
         if talk {
             summary.tell();
-            if let Some((name, account)) = finished {
-                tell_finish(&name, &account, finishing, summary.told_of_finished());
+            if let Some((name, _)) = finished {
+                tell_finish(&name, reached.as_ref(), finishing, summary.told_of_finished());
             }
         }
         summary.tell_full();

@@ -6,7 +6,7 @@ use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
-use caustique::finish::Account;
+use caustique::pipeline::Reached;
 use caustique::render::{Rendered, StopReason, Told, peak_memory};
 use std::path::Path;
 
@@ -129,9 +129,13 @@ pub fn tell_picture(output: &Path, set: &LayerSet) {
     say(&format!("{name}: {} x {}, {channels} channels", set.width, set.height));
 }
 
-/// What has finished a picture, and in how many seconds; what it tells of its error knows of `told`.
-pub fn tell_finish(name: &str, account: &Account, seconds: f64, told: Told) {
-    let error = account.told.map(|error| percent(error.half));
-    let error = error.map(|error| format!("; its quarters tell an error of {error}{}", told.note()));
+/// What has finished a picture, and in how many seconds; the error of that, which knows of `told`, and what half of it
+/// takes.
+pub fn tell_finish(name: &str, reached: Option<&Reached>, seconds: f64, told: Told) {
+    let error = reached.map(|reached| {
+        let error = format!("; error {}{}", percent(reached.error()), told.note());
+        let half = reached.seconds_to_half().map(|seconds| format!(", half of it in about {} more", duration(seconds)));
+        error + &half.unwrap_or_default()
+    });
     say(&format!("finished with {name} in {}{}", duration(seconds), error.unwrap_or_default()));
 }
