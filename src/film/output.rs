@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn the_parts_sum_to_the_image_and_radii_halve_their_squares() {
-        let mut pixel = Pixel::new(5, 0, [2.0, 4.0]);
+        let mut pixel = Pixel::new(5, 0, [2.0, 4.0]).with_groups(1);
         pixel.volume_bandwidth = 3.0;
         for i in 0..5 {
             let x = 0.1 + 0.37 * i as f32;
@@ -336,7 +336,7 @@ mod tests {
     /// Squares of what f32 can hold are not always f32.
     #[test]
     fn the_variance_of_great_radiance_is_finite() {
-        let mut pixel = Pixel::new(5, 0, [1.0; 2]);
+        let mut pixel = Pixel::new(5, 0, [1.0; 2]).with_groups(1);
         for pass in 1..=4 {
             let light = Rgb::splat(if pass % 2 == 0 { 1e20 } else { 3e20 });
             let measure = EyeMeasure { direct: light, ..EyeMeasure::default() };
@@ -350,7 +350,7 @@ mod tests {
 
     #[test]
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
-        let mut pixel = Pixel::new(5, 0, [1.0; 2]);
+        let mut pixel = Pixel::new(5, 0, [1.0; 2]).with_groups(1);
         pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)));
         let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");
