@@ -58,11 +58,13 @@ class Renders(Installed):
             body = self.sun(2)
             body.data.color, body.lightgroup = colour, group
         self.settings.method = "path"
-        self.passes("noisy_parts")
+        self.passes("noisy_parts", "noisy")
         found = self.render()
         for group, lit, dark in (("key", "R", "G"), ("rim_light", "G", "R")):
-            for name in (f"LightGroup_{group}", f"CombinedLightGroup_{group}"):
-                numpy.testing.assert_allclose(found[f"{name}.{lit}"], found[f"Combined.{lit}"], rtol=1e-3)
+            raw, finished = f"LightGroup_{group}", f"CombinedLightGroup_{group}"
+            numpy.testing.assert_allclose(found[f"{raw}.{lit}"], found[f"Noisy.{lit}"], rtol=1e-5)
+            numpy.testing.assert_allclose(found[f"{finished}.{lit}"], found[f"Combined.{lit}"], rtol=1e-3)
+            for name in (raw, finished):
                 self.assertFalse(found[f"{name}.{dark}"].any(), name)
             self.assertFalse(found[f"CombinedCaustic_{group}.{lit}"].any())
 

@@ -7,7 +7,7 @@ import beside  # first: it finds the scripts
 import bpy
 import export
 import glb
-from beside import eye, lamp, shared, square
+from beside import eye, glow, lamp, shared, square
 
 
 class Lamps(beside.Beside):
