@@ -109,11 +109,17 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
     // A reproducible file has no clock in it.
     let timed = history.iter().any(|moment| moment.get("seconds").is_some());
     let (key, name) = if timed { ("seconds", "seconds") } else { ("iterations", "iterations") };
-    let point = |moment: &Value| {
-        let error = moment.get("finished").filter(|error| !error.is_null()).or(moment.get("error"))?;
-        Some((moment.get(key)?.as_f64()?, error.as_f64()?))
+    let points = |of: &str| -> Vec<(f64, f64)> {
+        let point = |moment: &Value| Some((moment.get(key)?.as_f64()?, moment.get(of)?.as_f64()?));
+        history.iter().filter_map(point).collect()
     };
-    text + &plot::log_log(&history.iter().filter_map(point).collect::<Vec<_>>(), name, "estimated relative error")
+    // That of the finished picture, where it was judged more than once.
+    let finished = points("finished");
+    let (points, of) = match finished.len() {
+        0 | 1 => (points("error"), "estimated relative error"),
+        _ => (finished, "estimated relative error of the finished picture"),
+    };
+    text + &plot::log_log(&points, name, of)
 }
 
 fn scene_object(path: &Path, scene: &Scene) -> Value {
