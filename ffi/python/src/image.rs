@@ -9,7 +9,7 @@ use caustique::image::exr::{self, Attributes, Compression};
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
 use numpy::ndarray::{Array3, ArrayView2, Axis};
-use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn, PyArrayMethods};
+use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -1,6 +1,6 @@
 //! A render's options from keyword arguments.
 
-use crate::error::{raised, usage};
+use crate::error::usage;
 use crate::keywords::{Keywords, choice};
 use caustique::error::Error;
 use caustique::estimator::InitialBandwidth;
@@ -313,9 +313,4 @@ fn shares(given: &Bound<'_, PyAny>) -> PyResult<Crop> {
             "(left, top, width, height) in pixels, (320, 0, 640, 720), or in shares, (0.25, 0.0, 0.5, 1.0)",
         )),
     }
-}
-
-/// The library's result of something that only arguments can spoil.
-pub fn checked<T>(result: caustique::error::Result<T>) -> PyResult<T> {
-    result.map_err(raised)
 }
