@@ -95,7 +95,7 @@ def libraries(
     variables CAUSTIQUE_EMBREE, CAUSTIQUE_OIDN and CAUSTIQUE_ONNXRUNTIME of this process's environment. Without them
     the system's loader is asked, then the folder .deps of the current folder is looked into.
 
-    Returns {'embree' | 'oidn' | 'onnxruntime': {'found': True, 'version', 'path'} or {'found': False, 'cause', 'hint'}}.
+    Returns a dict for each of 'embree', 'oidn' and 'onnxruntime': 'found' and 'version', 'path' or 'cause', 'hint'.
     """
     named = {"embree": embree, "oidn": oidn, "onnxruntime": onnxruntime}
     for name, path in named.items():

@@ -6,12 +6,26 @@ from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
+
+__all__ = [
+    "Error",
+    "Image",
+    "Progress",
+    "Scene",
+    "SceneWarning",
+    "__version__",
+    "combine",
+    "compare",
+    "find_libraries",
+    "read",
+]
 
 __version__: str
 
-Method = Literal["auto", "path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm"]
-Denoise = Literal["auto", "oidn", "own", "none"]
-Picture = Image | str | os.PathLike[str] | NDArray[Any]
+_Method = Literal["auto", "path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm"]
+_Denoise = Literal["auto", "oidn", "own", "none"]
+_Picture = Image | str | os.PathLike[str] | NDArray[Any]
 
 class Error(Exception):
     hint: str | None
@@ -61,6 +75,7 @@ class Image:
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[str]: ...
 
+@disjoint_base
 class Scene:
     def __new__(
         cls,
@@ -84,7 +99,7 @@ class Scene:
     def render(
         self,
         *,
-        method: Method = "auto",
+        method: _Method = "auto",
         iterations: int | None = None,
         time: float | None = None,
         target_error: float | None = None,
@@ -101,7 +116,7 @@ class Scene:
         knn: int | None = None,
         guide: bool | None = None,
         finish: bool | None = None,
-        denoise: Denoise | None = None,
+        denoise: _Denoise | None = None,
         model: str | None = None,
         layers: str = "all",
         reproducible: bool = False,
@@ -111,7 +126,7 @@ class Scene:
     def plan(
         self,
         *,
-        method: Method = "auto",
+        method: _Method = "auto",
         iterations: int | None = None,
         time: float | None = None,
         target_error: float | None = None,
@@ -128,19 +143,19 @@ class Scene:
         knn: int | None = None,
         guide: bool | None = None,
         finish: bool | None = None,
-        denoise: Denoise | None = None,
+        denoise: _Denoise | None = None,
         model: str | None = None,
         threads: int = 0,
     ) -> dict[str, Any]: ...
     def converge(
         self,
         *,
-        methods: Sequence[Method] | None = None,
+        methods: Sequence[_Method] | None = None,
         runs: Mapping[str, dict[str, Any]] | None = None,
         iterations: int | None = None,
         time: float | None = None,
-        reference: Picture | None = None,
-        reference_method: Method | None = None,
+        reference: _Picture | None = None,
+        reference_method: _Method | None = None,
         reference_iterations: int | None = None,
         reference_time: float | None = None,
         metric: Literal["relmse", "relmse_trimmed", "mse"] = "relmse",
@@ -157,7 +172,7 @@ class Scene:
 
 def read(path: str | os.PathLike[str]) -> Image: ...
 def compare(
-    image: Picture, reference: Picture, *, layer: str | None = None, relative: bool = False
+    image: _Picture, reference: _Picture, *, layer: str | None = None, relative: bool = False
 ) -> dict[str, Any]: ...
-def combine(image: Image, *, denoise: Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
+def combine(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
 def find_libraries() -> dict[str, dict[str, Any]]: ...

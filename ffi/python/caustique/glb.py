@@ -48,7 +48,8 @@ def png(name: str, texture) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines.tobytes())) + chunk(b"IEND", b"")
+    parts = [chunk(b"IHDR", head), chunk(b"IDAT", zlib.compress(lines.tobytes())), chunk(b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
 def coefficients(medium: Medium) -> dict:
@@ -62,9 +63,9 @@ def numbers(values) -> list[float]:
 class Writer:
     """A document that grows, and its buffer."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.buffer = io.BytesIO()
-        self.document = {
+        self.document: dict = {
             "asset": {"version": "2.0", "generator": "caustique for Python"},
             "nodes": [], "meshes": [], "materials": [], "cameras": [], "accessors": [], "bufferViews": [],
             "images": [], "textures": [],
@@ -169,7 +170,7 @@ class Writer:
         return index
 
     def light(self, light: Light):
-        said = {"light_group": light.light_group}
+        said: dict = {"light_group": light.light_group}
         item: dict = {"name": light.name}
         match light:
             case PointLight():
@@ -202,10 +203,9 @@ class Writer:
             perspective["aspectRatio"] = float(camera.aspect)
         index = self.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
         pose = looking(camera.position, camera.target, camera.up)
-        distance = camera.focus_distance
-        if distance is None:
-            distance = np.linalg.norm(np.subtract(camera.target, camera.position))
-        lens = {"aperture_radius": float(camera.aperture_radius), "focus_distance": float(distance)}
+        to_target = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
+        distance = to_target if camera.focus_distance is None else float(camera.focus_distance)
+        lens = {"aperture_radius": float(camera.aperture_radius), "focus_distance": distance}
         self.node({"name": camera.name, "camera": index, "matrix": matrix(camera.name, pose)}, lens)
 
     def bytes(self, said: dict) -> bytes:

@@ -8,12 +8,15 @@ use crate::work::work;
 use caustique::image::exr::ATTRIBUTE;
 use caustique::image::{Floor, compare_above};
 use caustique::pipeline::finish::open;
-use numpy::ndarray::Array2;
 use numpy::IntoPyArray;
+use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 use serde_json::json;
 
 /// The error of a picture against a reference: the figures of `caustique compare --json`, and flip_map, (H, W) float32.
+///
+/// Both are Images, paths, or arrays (H, W, 3). `layer` takes that layer of both; `relative` adds 0.01 times the
+/// squared mean radiance of the reference in relMSE, instead of 0.01.
 #[pyfunction]
 #[pyo3(signature = (image, reference, *, layer = None, relative = false))]
 pub fn compare<'py>(
@@ -34,7 +37,10 @@ pub fn compare<'py>(
     Ok(told)
 }
 
-/// The image with its picture finished as a render finishes its own; all layers are kept. A new image.
+/// A new image whose picture is finished as a render finishes its own; all other layers are kept.
+///
+/// It needs what tells the noise: the layers of a render, or of another renderer's picture "Variance" (of the mean) or
+/// two independent halves "Half1" and "Half2". "albedo" and "normal" guide the denoiser.
 #[pyfunction]
 #[pyo3(signature = (image, *, denoise = "auto", model = None, threads = 0))]
 pub fn combine(

@@ -67,14 +67,18 @@ pub fn converge<'py>(
     let view = job::view(&mut keywords)?;
     let given: Option<Bound<'_, PyAny>> = keywords.take("reference")?;
     let own = Own {
-        method: keywords.take::<String>("reference_method")?.map_or(Ok(None), |name| job::method("reference_method", &name))?,
+        method: keywords
+            .take::<String>("reference_method")?
+            .map_or(Ok(None), |name| job::method("reference_method", &name))?,
         iterations: job::iterations(&mut keywords, "reference_iterations")?,
         time: job::seconds(&mut keywords, "reference_time")?,
     };
     let comparison = Comparison {
         runs: runs(py, &mut keywords)?,
         common: Common::take(&mut keywords, scene.switches)?,
-        moments: keywords.number("moments", 1.001..=10.0, "a ratio from 1.001 to 10")?.unwrap_or(std::f64::consts::SQRT_2),
+        moments: keywords
+            .number("moments", 1.001..=10.0, "a ratio from 1.001 to 10")?
+            .unwrap_or(std::f64::consts::SQRT_2),
         seeds: keywords.number("seeds", 1..=1000, "from 1 to 1000")?.unwrap_or(1),
         metric: keywords.choice("metric", &METRICS)?.unwrap_or_default(),
         own,
@@ -109,9 +113,10 @@ fn runs(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Vec<Run>> {
         runs.push(Run { name: name.extract()?, approach });
     }
     match (1..runs.len()).find(|&run| runs[..run].iter().any(|other| other.name == runs[run].name)) {
-        Some(twice) => {
-            Err(usage(format!("two runs are called '{}'", runs[twice].name), "give each a name of its own in runs={...}"))
-        }
+        Some(twice) => Err(usage(
+            format!("two runs are called '{}'", runs[twice].name),
+            "give each a name of its own in runs={...}",
+        )),
         None => Ok(runs),
     }
 }
@@ -237,7 +242,8 @@ impl Comparison {
             let Common { max_depth, switches, .. } = self.common;
             let asked = plan::Asked { choice: choice.as_ref(), max_depth, switches };
             let plan = plan::plan(&asked, settings.method, (built, camera), &scene.loaded.removed);
-            warnings.extend(plan.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
+            warnings
+                .extend(plan.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
             let order = approach.finish_order();
             let mut ready = order.map(|order| finish::open(&order, Some(settings.levels.count))).transpose()?;
             let missing = ready.as_mut().and_then(|ready| ready.missing.take());

@@ -9,8 +9,8 @@ create_exception!(
     caustique,
     Error,
     PyException,
-    "What the renderer refuses: str() tells place, fault and remedy; `hint` is the remedy alone or None, `place` the file \
-     and the place in it, `kind` one of 'usage', 'scene', 'image', 'io', 'library', 'model' and 'interrupted'."
+    "What the renderer refuses: str() tells place, fault and remedy; `hint` is the remedy alone or None, `place` the \
+     file and the place in it, `kind` one of 'usage', 'scene', 'image', 'io', 'library', 'model' and 'interrupted'."
 );
 create_exception!(
     caustique,

@@ -16,6 +16,14 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 
 /// A picture: named layers of float32 planes, and a header. It does not change once it is there.
+///
+/// image["Noisy"]                   a layer, (H, W, C), a copy; of layers with one plane, such as "Z", a view (H, W)
+/// image["Noisy.R"]                 a plane, (H, W), a view
+/// image.layers["Noisy"]["R"]       the same
+/// image.picture                    the picture itself, (H, W, 3), a copy
+///
+/// Views are read-only, share the image's memory and keep it alive. Rows run from the top. Radiance is scene-linear
+/// Rec. 709 in W/(sr m2); "Variance1" and its like are squares of that; "Z", "depth" and "P" are metres.
 #[pyclass(frozen, module = "caustique")]
 pub struct Image {
     /// The layers.
@@ -141,6 +149,10 @@ impl Image {
     }
 
     /// Writes an EXR with all layers, or with a name that ends in .png the picture to look at.
+    ///
+    /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
+    /// exposure      of the PNG, stops
+    /// tonemap       of the PNG: 'agx', 'filmic' or 'srgb'
     #[pyo3(signature = (path, *, compression = "zip", exposure = 0.0, tonemap = "agx"))]
     fn save(&self, py: Python<'_>, path: PathBuf, compression: &str, exposure: f32, tonemap: &str) -> PyResult<()> {
         let all = [
@@ -159,9 +171,7 @@ impl Image {
                 let options = exr::Options { compression, ..exr::Options::default() };
                 exr::write(&path, set, &self.attributes, options)
             }
-            () if is("png") => {
-                png::write_tonemapped(&path, set.width, set.height, &set.beauty()?, exposure, curve)
-            }
+            () if is("png") => png::write_tonemapped(&path, set.width, set.height, &set.beauty()?, exposure, curve),
             () => Err(Error::new(Kind::Usage, path.display(), "the name ends neither in .exr nor in .png")
                 .hint("an EXR holds all layers, a PNG is a picture to look at")),
         });
@@ -220,7 +230,8 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
     let chosen = |set: &LayerSet| {
         let found = if name.is_empty() { set.find(caustique::film::Role::Beauty) } else { set.get(name) };
         let names = || set.layers.iter().map(|layer| format!("\"{}\"", layer.name)).collect::<Vec<_>>().join(", ");
-        let layer = found.ok_or_else(|| usage(format!("{place}: no layer \"{name}\""), format!("there are {}", names())))?;
+        let layer =
+            found.ok_or_else(|| usage(format!("{place}: no layer \"{name}\""), format!("there are {}", names())))?;
         let layers = vec![Layer { name: String::new(), ..layer.clone() }];
         Ok(LayerSet { width: set.width, height: set.height, layers })
     };
@@ -245,7 +256,9 @@ pub fn radiance(place: &str, array: &Bound<'_, PyAny>) -> PyResult<(u32, u32, Ve
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok()).filter(|&(w, h)| w > 0 && h > 0);
     let texels = layer.triples();
     match size {
-        Some((width, height)) if layer.planes.len() >= 3 && texels.iter().flatten().all(|x| *x >= 0.0 && x.is_finite()) => {
+        Some((width, height))
+            if layer.planes.len() >= 3 && texels.iter().flatten().all(|x| *x >= 0.0 && x.is_finite()) =>
+        {
             Ok((width, height, texels))
         }
         _ => Err(usage(

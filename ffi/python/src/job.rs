@@ -94,8 +94,8 @@ pub fn missing(error: &Error) -> String {
 }
 
 impl Approach {
-    /// From the keywords `method photons levels alpha initial_bandwidth knn guide finish denoise model`; `usual` is what
-    /// method, levels and finish are where they are left out.
+    /// From the keywords `method photons levels alpha initial_bandwidth knn guide finish denoise model`; `usual` is
+    /// what method, levels and finish are where they are left out.
     ///
     /// # Errors
     /// An argument is of another type or out of range.

@@ -29,7 +29,8 @@ impl Progress {
 
 impl From<&caustique::render::Progress> for Progress {
     fn from(progress: &caustique::render::Progress) -> Progress {
-        let caustique::render::Progress { iteration, iterations, seconds, remaining, light_paths, error, .. } = *progress;
+        let caustique::render::Progress { iteration, iterations, seconds, remaining, light_paths, error, .. } =
+            *progress;
         Progress { iteration, iterations, seconds, remaining, light_paths, error }
     }
 }

@@ -49,9 +49,9 @@ impl Scene {
         };
         let switches = match keywords.take::<String>("effects")? {
             None => Switches::default(),
-            Some(text) => text.parse().map_err(|cause| {
-                usage(format!("Scene: effects='{text}': {cause}"), "such as '-dispersion,+volume'")
-            })?,
+            Some(text) => text
+                .parse()
+                .map_err(|cause| usage(format!("Scene: effects='{text}': {cause}"), "such as '-dispersion,+volume'"))?,
         };
         let order = load::Order {
             path: path.clone(),
@@ -96,7 +96,35 @@ impl Scene {
         self.loaded.scene.cameras.iter().map(|camera| camera.name.clone()).collect()
     }
 
-    /// Renders an image.
+    /// Renders the scene and returns an Image.
+    ///
+    /// The options are those of `caustique render`; the same ones with the same seed give the same bytes in every
+    /// layer, here and there, whatever the number of threads.
+    ///
+    /// method                    'auto', 'path', 'light', 'bdpt', 'pm', 'ppm', 'sppm', 'appm', 'cppm', 'bpm' or 'vcm'
+    /// iterations, time,         when to stop: after so many iterations, seconds, or at an estimated relative error,
+    /// target_error              whichever comes first; after 64 iterations if none is given
+    /// width, height             pixels; one given keeps the camera's aspect
+    /// camera                    by name; else the first
+    /// crop                      a window (left, top, width, height) in pixels, or in shares of the picture
+    /// seed                      another number, other noise
+    /// max_depth                 longest light path in segments
+    /// photons                   light paths of an iteration
+    /// levels                    bandwidth levels, 1 to 5, each 1/sqrt(2) of the next larger
+    /// alpha                     how fast bandwidths shrink, in (0, 1]
+    /// initial_bandwidth         'knn', 'footprint', or a length in metres
+    /// knn                       photons within the largest bandwidth to begin with
+    /// guide                     True or False: whether light paths start towards mirrors and glass
+    /// finish                    False leaves the estimate as it is
+    /// denoise                   'auto', 'oidn', 'own' or 'none'
+    /// model                     'compact' or a path: the network that combines levels
+    /// layers                    'all', 'comp', 'beauty', or names separated by commas
+    /// reproducible              leave clocks and threads out of the header
+    /// threads                   0 takes all cores
+    /// progress                  called with a Progress after every iteration, in the calling thread; False ends it
+    ///
+    /// An exception of `progress`, or Ctrl-C, ends the render after the running iteration; what is finished is the
+    /// attribute `image` of the exception. Other threads of Python run meanwhile.
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
@@ -164,7 +192,8 @@ impl Scene {
         }
     }
 
-    /// What a render would simulate, why, and what it warns of: the object of `caustique plan --json`.
+    /// What a render would simulate, why, and what it warns of: the object of `caustique plan --json`, a dict. The
+    /// options are those of `render`.
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
@@ -199,7 +228,23 @@ impl Scene {
         to_python(py, &done.whole()?)
     }
 
-    /// Accuracy against time of several methods: the object of `points.json` of `caustique converge`.
+    /// Accuracy against time of several methods: the object of `points.json` of `caustique converge`, a dict.
+    ///
+    /// methods                   names, each with its defaults, one bandwidth level and no finish
+    /// runs                      {name: options of render that are about the method or the finish}
+    /// iterations, time          when each run stops; after 60 seconds if neither is given
+    /// reference                 an Image, a path, or an array (H, W, 3); one is made if there is none
+    /// reference_method, reference_iterations, reference_time
+    ///                           of the two halves of one that is made
+    /// metric                    'relmse', 'relmse_trimmed' or 'mse'
+    /// moments                   ratio of the iterations after which runs are measured; sqrt(2) if not given
+    /// seed, seeds               the first seed, and how many races
+    /// progress                  called with a dict after every iteration: run (None: the reference), iterations,
+    ///                           seconds, and of runs fraction and relmse; False ends it and keeps what is measured
+    ///
+    /// 'points' is a list of dicts with run, seed, iterations, light_paths, seconds, cpu_seconds, relmse, mse, and
+    /// figure, the metric without the reference's own error. 'runs' tells of each method what theory expects and what
+    /// is fitted.
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, methods=None, runs=None, iterations=None, time=None, reference=None, \
@@ -309,7 +354,8 @@ impl Watch for Watcher<'_> {
     fn progress(&mut self, progress: &caustique::render::Progress) {
         let Some(callback) = self.progress.clone() else { return };
         let progress = Progress::from(progress);
-        self.caller.ask(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(pyo3::types::PyBool::new(py, false))));
+        self.caller
+            .ask(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(pyo3::types::PyBool::new(py, false))));
     }
 
     fn rendered(&mut self, _: &Rendered) {}

@@ -1,8 +1,8 @@
 //! Work without the interpreter's lock, and what the calling thread does in Python meanwhile.
 //!
-//! A thread pool of its own works. The calling thread waits with the lock released: it looks for signals (Ctrl-C), which
-//! Python shows to its main thread alone, and calls back where the work asks for it, so that a callback runs in the
-//! thread that its author expects.
+//! A thread pool of its own works. The calling thread waits with the lock released: it looks for signals (Ctrl-C),
+//! which Python shows to its main thread alone, and calls back where the work asks for it, so that a callback runs in
+//! the thread that its author expects.
 
 use crate::error::{SceneWarning, raised};
 use caustique::error::{Error, Kind, Result};
@@ -83,40 +83,43 @@ pub fn work<T: Send>(
     threads: usize,
     job: impl FnOnce(&Caller<'_>) -> Result<T> + Send,
 ) -> PyResult<Done<T>> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build().map_err(|cause| {
-        raised(Error::new(Kind::Io, "threads", cause).hint("ask for fewer threads"))
-    })?;
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|cause| raised(Error::new(Kind::Io, "threads", cause).hint("ask for fewer threads")))?;
     let stopped = AtomicBool::new(false);
-    Ok(py.detach(|| thread::scope(|scope| {
-        let (requests, asked) = channel::<(Request, Sender<()>)>();
-        let caller = Caller { requests, stopped: &stopped };
-        let worker = scope.spawn(move || pool.install(|| job(&caller)));
-        let mut first = None;
-        loop {
-            let (request, done) = match asked.recv_timeout(LOOK) {
-                Ok((request, done)) => (Some(request), Some(done)),
-                Err(RecvTimeoutError::Timeout) => (None, None),
-                Err(RecvTimeoutError::Disconnected) => break,
-            };
-            // After an exception Python is left alone until the work has ended.
-            if first.is_none() {
-                let answer = Python::attach(|py| {
-                    py.check_signals()?;
-                    request.map_or(Ok(true), |request| request(py))
-                });
-                if !matches!(answer, Ok(true)) {
-                    stopped.store(true, Ordering::Relaxed);
+    Ok(py.detach(|| {
+        thread::scope(|scope| {
+            let (requests, asked) = channel::<(Request, Sender<()>)>();
+            let caller = Caller { requests, stopped: &stopped };
+            let worker = scope.spawn(move || pool.install(|| job(&caller)));
+            let mut first = None;
+            loop {
+                let (request, done) = match asked.recv_timeout(LOOK) {
+                    Ok((request, done)) => (Some(request), Some(done)),
+                    Err(RecvTimeoutError::Timeout) => (None, None),
+                    Err(RecvTimeoutError::Disconnected) => break,
+                };
+                // After an exception Python is left alone until the work has ended.
+                if first.is_none() {
+                    let answer = Python::attach(|py| {
+                        py.check_signals()?;
+                        request.map_or(Ok(true), |request| request(py))
+                    });
+                    if !matches!(answer, Ok(true)) {
+                        stopped.store(true, Ordering::Relaxed);
+                    }
+                    first = answer.err();
                 }
-                first = answer.err();
+                if let Some(done) = done {
+                    // The work waits for it.
+                    let _ = done.send(());
+                }
             }
-            if let Some(done) = done {
-                // The work waits for it.
-                let _ = done.send(());
+            match worker.join() {
+                Ok(result) => Done { result, raised: first },
+                Err(panic) => std::panic::resume_unwind(panic),
             }
-        }
-        match worker.join() {
-            Ok(result) => Done { result, raised: first },
-            Err(panic) => std::panic::resume_unwind(panic),
-        }
-    })))
+        })
+    }))
 }

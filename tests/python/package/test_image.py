@@ -1,6 +1,7 @@
 """Images: arrays without copies, files, errors of pictures, finishes, and types that tell the truth."""
 
 import gc
+import inspect
 import subprocess
 import sys
 import tempfile
@@ -8,10 +9,9 @@ import unittest
 from pathlib import Path
 
 import numpy as np
+from shared import ROOT, TORUS, ground, still_life
 
 import caustique as cq
-
-from .test_scene import TORUS, ground, still_life
 
 
 def pointer(array):
@@ -174,9 +174,15 @@ class Convergence(unittest.TestCase):
 
 
 class Types(unittest.TestCase):
-    def test_the_stubs_are_the_module(self):
-        done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "caustique._native"], capture_output=True, text=True)
+    def check(self, *words):
+        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_the_stubs_are_the_module(self):
+        self.check("mypy.stubtest", "caustique._native")
+
+    def test_the_types_of_the_package_agree(self):
+        self.check("mypy", "--check-untyped-defs", ROOT / "ffi" / "python" / "caustique")
 
     def test_everything_is_documented(self):
         for name in cq.__all__:
@@ -184,6 +190,10 @@ class Types(unittest.TestCase):
                 self.assertTrue(getattr(cq, name).__doc__, name)
         for name in ("render", "plan", "converge", "from_meshes"):
             self.assertTrue(getattr(cq.Scene, name).__doc__, name)
+        for call in (cq.Scene.render, cq.Scene.converge):
+            shared = {"width", "height", "camera", "threads", "max_depth"} if call is cq.Scene.converge else set()
+            for option in set(inspect.signature(call).parameters) - {"self"} - shared:
+                self.assertRegex(call.__doc__, rf"\b{option}\b")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
 """Scenes from numpy meet closed forms; scenes from files give what the command line gives."""
 
+import json
 import os
+import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import unittest
@@ -9,57 +12,9 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from shared import ROOT, TORUS, ground, sphere, square, still_life
 
 import caustique as cq
-
-ROOT = Path(__file__).resolve().parents[3]
-TORUS = ROOT / "scenes" / "torus.glb"
-
-
-def sphere(steps=24):
-    """Vertices and triangles of a closed unit sphere, seen from outside."""
-    theta = np.linspace(0, np.pi, steps + 1)[1:-1]
-    phi = np.linspace(0, 2 * np.pi, 2 * steps, endpoint=False)
-    around = np.stack([np.cos(phi), np.zeros_like(phi), -np.sin(phi)], -1)
-    rings = np.sin(theta)[:, None, None] * around + np.cos(theta)[:, None, None] * np.array([0.0, 1.0, 0.0])
-    vertices = np.concatenate([[[0, 1, 0]], rings.reshape(-1, 3), [[0, -1, 0]]])
-    n, last = len(phi), len(vertices) - 1
-    triangles = []
-    for i in range(n):
-        j = (i + 1) % n
-        triangles.append((0, 1 + i, 1 + j))
-        triangles.append((last, last - n + j, last - n + i))
-        for ring in range(len(theta) - 1):
-            a, b = 1 + ring * n + i, 1 + ring * n + j
-            triangles += [(a, a + n, b), (b, a + n, b + n)]
-    return vertices, np.array(triangles)
-
-
-def square(size=2.0, y=0.0):
-    """Vertices and triangles of a square that faces up."""
-    h = size / 2
-    return np.array([[-h, y, h], [h, y, h], [h, y, -h], [-h, y, -h]]), np.array([[0, 1, 2], [0, 2, 3]])
-
-
-def ground(lights, albedo=0.6, **options):
-    """A Lambertian ground seen from above."""
-    matte = cq.Material(base_color=[albedo] * 3, specular=0.0)
-    camera = cq.Camera(position=(0, 1, 0), target=(0, 0, 0), up=(0, 0, -1), fov=10)
-    return cq.Scene.from_meshes([cq.Mesh(vertices=square(40.0)[0], triangles=square()[1], material=matte)],
-                                lights=lights, cameras=[camera], **options)
-
-
-def still_life():
-    """A matte ball on a matte ground, in light from all around: every pixel has noise."""
-    ball, faces = sphere(8)
-    matte = cq.Material(base_color=(0.7, 0.7, 0.7), specular=0.0)
-    floor, squares = square(40.0)
-    meshes = [
-        cq.Mesh(vertices=floor, triangles=squares, material=matte),
-        cq.Mesh(vertices=ball + (0, 1.0, 0), triangles=faces, material=matte),
-    ]
-    camera = cq.Camera(position=(0, 2, 6), target=(0, 0.5, 0))
-    return cq.Scene.from_meshes(meshes, cameras=[camera], environment=(1.0, 1.0, 1.0))
 
 
 class ClosedForms(unittest.TestCase):
@@ -107,7 +62,8 @@ class ClosedForms(unittest.TestCase):
                 scene = ground([lamp])
                 self.assertEqual(scene.warnings, [])
                 image = scene.render(method="path", iterations=2, width=4, height=4, finish=False)
-                np.testing.assert_allclose(image.picture, np.broadcast_to(0.6 * irradiance / np.pi, (4, 4, 3)), rtol=2e-3)
+                expected = np.broadcast_to(0.6 * irradiance / np.pi, (4, 4, 3))
+                np.testing.assert_allclose(image.picture, expected, rtol=2e-3)
 
     def test_emission_transforms_and_textures(self):
         """A glowing square, moved and turned towards the camera, shows its radiance; a texture, its texels."""
@@ -188,8 +144,6 @@ class BesideTheCommandLine(unittest.TestCase):
         self.assert_same(here, there)
 
     def test_a_plan(self):
-        import json
-
         out = subprocess.run([self.PROGRAM, "plan", TORUS, "--json", "--width", "64", "--method", "vcm"],
                              check=True, capture_output=True, text=True).stdout
         plan = cq.Scene(TORUS).plan(width=64, method="vcm")
@@ -229,8 +183,6 @@ class Running(unittest.TestCase):
         self.assertEqual(caught.exception.image.header["iterations"], 2)
 
     def test_a_signal_ends_it(self):
-        import signal
-
         def kill():
             signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
@@ -339,8 +291,6 @@ class Faults(unittest.TestCase):
         found = cq.libraries()
         self.assertTrue(found["embree"]["found"], found)
         code = "import caustique; print(caustique.libraries(oidn='/no/such.so')['oidn'])"
-        import sys
-
         told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
         self.assertIn("no such file", told)
         self.assertIn("setup.sh", told)
