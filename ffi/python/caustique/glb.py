@@ -20,8 +20,11 @@ def pack(
     lights: Sequence[Light] = (),
     cameras: Sequence[Camera] = (),
     medium: Medium | None = None,
+    extras: dict | None = None,
 ) -> bytes:
-    """The bytes of a .glb that `caustique render` takes; `medium` fills the space. Environments are files beside it.
+    """The bytes of a .glb that `caustique render` takes; `medium` fills the space.
+
+    `extras` are more keys of the scene's `extras.caustique`, such as {"environment": {"file": "sky.exr"}}.
 
     Raises ValueError for arrays that have other shapes than they should.
     """
@@ -32,7 +35,7 @@ def pack(
         writer.light(light)
     for camera in cameras:
         writer.camera(camera)
-    return writer.bytes({"light_units": "radiometric", **({"medium": coefficients(medium)} if medium else {})})
+    return writer.bytes({"light_units": "radiometric", **({"medium": coefficients(medium)} if medium else {}), **(extras or {})})
 
 
 def png(name: str, texture) -> bytes:
