@@ -5,6 +5,8 @@
 
 pub mod error;
 
+pub mod processor;
+
 pub mod memory;
 
 pub mod math;

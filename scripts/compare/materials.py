@@ -82,10 +82,11 @@ class Materials:
     def bsdf(self, mesh):
         """The BSDF that a mesh wears, made once a material."""
         if mesh.material not in self.known:
-            self.known[mesh.material] = mi.load_dict(self._bsdf(mesh))
+            self.known[mesh.material] = mi.load_dict(self.describe(mesh))
         return self.known[mesh.material]
 
-    def _bsdf(self, mesh):
+    def describe(self, mesh):
+        """The BSDF that a mesh wears, as a dictionary."""
         raw = self.raw(mesh.material)
         name = raw.get("name", "default")
         if "normalTexture" in raw:

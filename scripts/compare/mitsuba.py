@@ -2,6 +2,10 @@
 """Renders a glTF scene with caustique and with Mitsuba 3, both from the same file, and says how far they differ.
 
     scripts/compare/mitsuba.py SCENE.glb [--seeds 8] [--spp 256] [--method path] [--png DIFFERENCE.png] [--json]
+    scripts/compare/mitsuba.py export SCENE.glb -o SCENE.xml
+    scripts/compare/mitsuba.py import SCENE.xml -o SCENE.glb
+
+The other two commands write a scene as Mitsuba's (to_xml.py), and read one of Mitsuba's (from_xml.py).
 
 Prints the ratio of the means (caustique over Mitsuba) with its standard error, relMSE, and statistics over tiles of 16x16 pixels.
 Standard errors come from the spread over independent seeds on both sides. Everything that Mitsuba cannot say is an error.
@@ -103,8 +107,26 @@ def read(path):
         return np.stack([channels[c].pixels for c in "RGB"], axis=-1).astype(np.float64)
 
 
+def exchange(command, words):
+    """Writes or reads a scene of Mitsuba's."""
+    parser = argparse.ArgumentParser(prog=f"mitsuba.py {command}")
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    arguments = parser.parse_args(words)
+    mi.set_variant("scalar_rgb")
+    import from_xml
+    import to_xml
+    try:
+        (to_xml.write if command == "export" else from_xml.convert)(arguments.scene, arguments.output)
+    except (gltf.Unsupported, OSError) as error:
+        sys.exit(f"{arguments.scene}: {error}")
+
+
 def main():
     """The command."""
+    if sys.argv[1:2] in (["export"], ["import"]):
+        exchange(sys.argv[1], sys.argv[2:])
+        return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene")
     parser.add_argument("--width", type=int, default=256)

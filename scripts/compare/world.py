@@ -12,15 +12,19 @@ FAR = 1000.0
 
 def build(scene, width, height, correct=False, glass="auto"):
     """The Mitsuba scene, with its first camera and a film of this size."""
+    return mi.load_dict(describe(scene, width, height, Materials(scene, correct, glass), make_mesh))
+
+
+def describe(scene, width, height, materials, make):
+    """What `mi.load_dict` takes, with its first camera and a film of this size. `make(mesh, materials, medium)` makes shapes."""
     if not scene.cameras:
         raise Unsupported("a file without a camera")
-    materials = Materials(scene, correct, glass)
     world = {"type": "scene"}
     has_media = False
     for i, mesh in enumerate(scene.meshes):
         medium = materials.medium(mesh.material) if _transmits(materials, mesh) else None
         has_media |= medium is not None
-        world[f"mesh{i}"] = _mesh(mesh, materials, medium)
+        world[f"mesh{i}"] = make(mesh, materials, medium)
     low = np.min([m.positions.min(axis=0) for m in scene.meshes], axis=0)
     high = np.max([m.positions.max(axis=0) for m in scene.meshes], axis=0)
     center, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
@@ -32,7 +36,7 @@ def build(scene, width, height, correct=False, glass="auto"):
     # Absorption apart, both compute the same; the path integrator is faster.
     world["integrator"] = {"type": "volpathmis" if has_media else "path", "max_depth": -1, "rr_depth": 5}
     world["sensor"] = _camera(scene.cameras[0], width, height)
-    return mi.load_dict(world)
+    return world
 
 
 def _transmits(materials, mesh):
@@ -40,7 +44,7 @@ def _transmits(materials, mesh):
     return extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0) > 0.0
 
 
-def _mesh(mesh, materials, medium):
+def make_mesh(mesh, materials, medium):
     properties = mi.Properties()
     emission = materials.emission(mesh.material)
     properties["bsdf"] = materials.bsdf(mesh)
@@ -53,12 +57,13 @@ def _mesh(mesh, materials, medium):
     properties["face_normals"] = not smooth
     shape = mi.Mesh(mesh.name, len(mesh.positions), len(mesh.triangles), properties, smooth, textured)
     values = mi.traverse(shape)
-    values["vertex_positions"] = mi.Float(mesh.positions.astype(np.float32).ravel())
-    values["faces"] = mi.UInt32(mesh.triangles.astype(np.uint32).ravel())
-    if smooth:
-        values["vertex_normals"] = mi.Float(mesh.normals.astype(np.float32).ravel())
-    if textured:
-        values["vertex_texcoords"] = mi.Float(mesh.uvs.astype(np.float32).ravel())
+    # Of the type that they have, which differs from variant to variant.
+    given = {"vertex_positions": mesh.positions, "vertex_normals": mesh.normals if smooth else None,
+             "vertex_texcoords": mesh.uvs if textured else None}
+    for name, array in given.items():
+        if array is not None:
+            values[name] = type(values[name])(array.astype(np.float32).ravel())
+    values["faces"] = type(values["faces"])(mesh.triangles.astype(np.uint32).ravel())
     values.update()
     return shape
 

@@ -13,7 +13,6 @@ mod number;
 mod output;
 mod plan;
 mod plot;
-mod processor;
 mod progress;
 mod render;
 mod scene;
@@ -22,6 +21,7 @@ mod signals;
 mod usage;
 
 use caustique::error::{Error, Kind, Result};
+use caustique::processor;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fs::File;
 use std::io::Write;

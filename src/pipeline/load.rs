@@ -34,8 +34,10 @@ pub struct Order {
 pub enum Environment {
     /// One radiance from everywhere.
     Color(Rgb),
-    /// A latitude-longitude image.
+    /// A latitude-longitude image in a file.
     File(PathBuf),
+    /// The same as texels: finite and not negative.
+    Image(EnvironmentSource),
 }
 
 /// A scene as it was asked for.
@@ -51,9 +53,25 @@ pub struct Loaded {
 /// # Errors
 /// The file or what it names, by place; an environment that is changed and is not there.
 pub fn load(order: &Order, threads: usize) -> Result<Loaded> {
+    check_memory(order, threads)?;
+    build(gltf::read(&order.path, &order.options)?, order, threads)
+}
+
+/// Like [`load`], from the bytes of a file that would stand at the order's path.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_bytes(bytes: &[u8], order: &Order, threads: usize) -> Result<Loaded> {
+    check_memory(order, threads)?;
+    build(gltf::read_bytes(bytes, &order.path, &order.options)?, order, threads)
+}
+
+fn check_memory(order: &Order, threads: usize) -> Result<()> {
     memory::check(START_BYTES + threads as u64 * THREAD_BYTES, "Embree and its threads")
-        .map_err(|e| e.within(order.path.display()).hint("give the program more memory, or fewer --threads"))?;
-    let mut description = gltf::read(&order.path, &order.options)?;
+        .map_err(|e| e.within(order.path.display()).hint("give the program more memory, or fewer --threads"))
+}
+
+fn build(mut description: Description, order: &Order, threads: usize) -> Result<Loaded> {
     environment(&mut description, order)?;
     let removed = switch::off(&mut description, order.off);
     Ok(Loaded { scene: Scene::build(description, threads)?, removed })
@@ -65,6 +83,7 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
         let source = match choice {
             Environment::Color(color) => EnvironmentSource::Color(*color),
             Environment::File(path) => environment_file::read(path, &mut description.warnings)?,
+            Environment::Image(source) => source.clone(),
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
         description.environment_hidden_from_camera = false;

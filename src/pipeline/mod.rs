@@ -147,14 +147,23 @@ pub trait Watch {
 ///
 /// # Errors
 /// The scene, options that contradict it, memory, or an end that was asked for before the first iteration.
-pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
-    let auto = order.auto.take();
+pub fn render(order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     watch.waits(Some(Wait::Reading));
-    let Loaded { scene, removed } = load::load(&order.scene, rayon::current_num_threads())?;
+    let loaded = load::load(&order.scene, rayon::current_num_threads())?;
     watch.waits(None);
-    watch.loaded(&scene)?;
+    render_loaded(order, &loaded, watch)
+}
+
+/// Like [`render`], of a scene that has been loaded as the order says, and that can be rendered again.
+///
+/// # Errors
+/// Those of [`render`].
+pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watch) -> Result<Delivery> {
+    let Loaded { scene, removed } = loaded;
+    let auto = order.auto.take();
+    watch.loaded(scene)?;
     let camera = scene.camera(&order.view)?;
-    let stage = (&scene, &camera);
+    let stage = (scene, &camera);
     let (settings, selection) = checked(&order, stage)?;
     let kept = order.saving.is_some() || order.resume.is_some() || settings.is_shard();
     let identity = if kept { order.hash()? } else { None };
@@ -175,9 +184,9 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     };
     let (settings, less) = fitted(&order, stage, settings)?;
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
-    let mut plan = plan::plan(&asked, settings.method, stage, &removed);
+    let mut plan = plan::plan(&asked, settings.method, stage, removed);
     plan.warnings.extend(less);
-    plan.warnings.extend(ungrouped(&scene, &settings));
+    plan.warnings.extend(ungrouped(scene, &settings));
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     // The error that is asked for is that of the picture that is delivered.
     let (target, settings) = match (&ready, settings.target_error) {
@@ -187,8 +196,8 @@ pub fn render(mut order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     watch.begins(&plan, &settings);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
-    let facts = Facts::new(&scene, &order.view, &settings)?;
-    let stage = Stage::new(&scene, &camera, &settings);
+    let facts = Facts::new(scene, &order.view, &settings)?;
+    let stage = Stage::new(scene, &camera, &settings);
     let (mut session, told) = match saved {
         None => {
             let spent = choice.as_ref().map(|choice| choice.spent).unwrap_or_default();

@@ -82,19 +82,27 @@ impl Reference {
     /// A file that cannot be read, without a picture, or of another size.
     pub fn read(path: &Path, size: (u32, u32)) -> Result<(Reference, Value)> {
         let (set, attributes) = exr::read(path)?;
+        let header = attributes.object().unwrap_or(Value::Null);
+        let reference = Reference::of(&set, &header, size, path.display().to_string())?;
+        Ok((reference, header))
+    }
+
+    /// A picture, with the error that its header's object tells. `about` says where it is from.
+    ///
+    /// # Errors
+    /// A set without a picture, or of another size.
+    pub fn of(set: &LayerSet, header: &Value, size: (u32, u32), about: String) -> Result<Reference> {
         let (width, height) = (size.0 as usize, size.1 as usize);
         if (set.width, set.height) != (width, height) {
             let cause = format!("the reference has {} x {} pixels, not {width} x {height}", set.width, set.height);
-            let error = Error::new(Kind::Usage, path.display(), cause);
+            let error = Error::new(Kind::Usage, about, cause);
             return Err(error.hint(format!("use --width {} --height {}", set.width, set.height)));
         }
-        let picture = set.beauty().map_err(|error| error.within(path.display()))?;
+        let picture = set.beauty().map_err(|error| error.within(&about))?;
         if !picture.iter().flatten().any(|v| v.is_finite()) {
-            return Err(Error::new(Kind::Image, path.display(), "the reference has no finite value"));
+            return Err(Error::new(Kind::Image, about, "the reference has no finite value"));
         }
-        let header = attributes.object().unwrap_or(Value::Null);
-        let about = path.display().to_string();
-        Ok((Reference { width, height, picture, error: told(&header), about }, header))
+        Ok(Reference { width, height, picture, error: told(header), about })
     }
 
     /// Writes it as a beauty with its estimated standard error, and its own error in the header.

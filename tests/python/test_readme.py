@@ -12,7 +12,7 @@ DOCS = sorted((support.ROOT / "docs").glob("*.md"))
 PAGES = [README, *DOCS]
 PROGRAM = "target/release/caustique"
 #: What sets everything up: it is there, and too much for a test.
-WHOLE = ("./scripts/demo.sh", "./scripts/test.sh")
+WHOLE = ("./scripts/demo.sh", "./scripts/test.sh", "./scripts/python.sh")
 #: Scripts that need Blender.
 EXPORTER = "scripts/blender/export.py"
 MOST_LINES = 200

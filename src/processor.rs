@@ -3,12 +3,15 @@
 //! `.cargo/config.toml` builds for x86-64-v3. `is_x86_feature_detected!` is no help: where a feature is enabled at
 //! build time it is simply `true`. So the kernel is asked, which lists the features as `flags` in `/proc/cpuinfo`.
 
-use caustique::error::{Error, Kind, Result};
+use crate::error::{Error, Kind, Result};
 
 /// Features of x86-64-v3 by the kernel's names.
 const NEEDED: [&str; 5] = ["avx2", "bmi2", "f16c", "fma", "movbe"];
 
 /// Checks the processor; without the instructions the program would end with a signal somewhere in the middle.
+///
+/// # Errors
+/// An instruction is lacking.
 pub fn check() -> Result<()> {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux", target_feature = "avx2")) {
         return Ok(());

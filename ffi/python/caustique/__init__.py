@@ -1,0 +1,109 @@
+"""caustique renders caustics, and caustics seen through glass, water and mirrors, with known error.
+
+    import caustique
+
+    scene = caustique.Scene("pool.glb")
+    image = scene.render(iterations=64, width=640)
+    image.save("pool.exr")
+    noisy = image["Noisy"]                # (H, W, 3) float32
+    red = image.layers["Noisy"]["R"]      # (H, W) float32, not copied
+
+Lengths are metres, the world is right-handed with y up, colours are scene-linear Rec. 709. Radiance is in W/(sr m2),
+radiant intensity in W/sr, irradiance in W/m2. Whatever a scene says that is ignored or approximated is a SceneWarning;
+what is refused is an Error, which says what to do.
+"""
+
+import os
+from collections.abc import Sequence
+
+from . import _native
+from ._native import Error, Image, Progress, SceneWarning, __version__, combine, compare, read
+from .glb import pack
+from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight
+
+__all__ = [
+    "Camera",
+    "Error",
+    "Image",
+    "Light",
+    "Material",
+    "Medium",
+    "Mesh",
+    "PointLight",
+    "Progress",
+    "Scene",
+    "SceneWarning",
+    "SpotLight",
+    "SunLight",
+    "__version__",
+    "combine",
+    "compare",
+    "libraries",
+    "pack",
+    "read",
+]
+
+
+class Scene(_native.Scene):
+    """A scene, read and built; it can be rendered as often as one likes, and from several threads at once.
+
+    `source` is the path of a .glb or .gltf file, or the bytes of a .glb. Options:
+
+    environment            light from all around in place of the scene's own: a path of an .exr or .hdr, radiance
+                           (r, g, b), or an array (H, W, 3) of radiance in latitude and longitude, the top row first
+    environment_rotation   turn about the vertical, degrees, counter-clockwise seen from above
+    environment_strength   factor on the environment's radiance
+    light_units            'auto', 'radiometric' or 'photometric': the unit of the file's lamps
+    glass                  'auto', 'solid' or 'thin': what glass is whose file does not say
+    effects                effects to leave out or ask for, such as '-dispersion,+volume'
+    frame                  frame of the file's animation
+    allow_outside          let the scene name files outside its own folder
+    strict                 make an error of whatever is ignored or approximated
+    threads                threads that build the scene; 0 takes all cores
+    """
+
+    @classmethod
+    def from_meshes(
+        cls,
+        meshes: Sequence[Mesh],
+        *,
+        lights: Sequence[Light] = (),
+        cameras: Sequence[Camera] = (),
+        environment=None,
+        medium: Medium | None = None,
+        **options,
+    ) -> "Scene":
+        """A scene of numpy meshes; `options` are those of Scene. `medium` fills the space.
+
+        The arrays are copied. `pack` makes a file of the same meshes, lights and cameras.
+        """
+        if environment is None:
+            # Said, so that nobody asks whether light is missing.
+            environment = (0.0, 0.0, 0.0)
+        return cls(pack(meshes, lights=lights, cameras=cameras, medium=medium), environment=environment, **options)
+
+
+def libraries(
+    *,
+    embree: str | os.PathLike | None = None,
+    oidn: str | os.PathLike | None = None,
+    onnxruntime: str | os.PathLike | None = None,
+) -> dict[str, dict]:
+    """The libraries that are loaded when they are needed: which are found, where, and what to do about the others.
+
+    Arguments name files to take instead of what is found; the first use decides, so name them before it. They set the
+    variables CAUSTIQUE_EMBREE, CAUSTIQUE_OIDN and CAUSTIQUE_ONNXRUNTIME of this process's environment. Without them
+    the system's loader is asked, then the folder .deps of the current folder is looked into.
+
+    Returns a dict for each of 'embree', 'oidn' and 'onnxruntime': 'found' and 'version', 'path' or 'cause', 'hint'.
+    """
+    named = {"embree": embree, "oidn": oidn, "onnxruntime": onnxruntime}
+    for name, path in named.items():
+        if path is not None:
+            os.environ[f"CAUSTIQUE_{name.upper()}"] = os.fspath(path)
+    found = _native.find_libraries()
+    for name, path in named.items():
+        taken = found[name].get("path")
+        if path is not None and taken is not None and not os.path.samefile(path, taken):
+            raise Error(f"{name}: {taken} is loaded already\nhint: call caustique.libraries before anything else")
+    return found

@@ -1,0 +1,178 @@
+"""Types of the native part; what it does is told by the docstrings of the package."""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
+
+__all__ = [
+    "Error",
+    "Image",
+    "Progress",
+    "Scene",
+    "SceneWarning",
+    "__version__",
+    "combine",
+    "compare",
+    "find_libraries",
+    "read",
+]
+
+__version__: str
+
+_Method = Literal["auto", "path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm"]
+_Denoise = Literal["auto", "oidn", "own", "none"]
+_Picture = Image | str | os.PathLike[str] | NDArray[Any]
+
+class Error(Exception):
+    hint: str | None
+    place: str
+    kind: Literal["usage", "scene", "image", "io", "library", "model", "interrupted"]
+
+class SceneWarning(UserWarning): ...
+
+@final
+class Progress:
+    @property
+    def iteration(self) -> int: ...
+    @property
+    def iterations(self) -> int | None: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def remaining(self) -> float | None: ...
+    @property
+    def light_paths(self) -> int: ...
+    @property
+    def error(self) -> float | None: ...
+
+@final
+class Image:
+    @staticmethod
+    def from_arrays(layers: dict[str, ArrayLike], header: dict[str, Any] | None = None) -> Image: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def layers(self) -> dict[str, dict[str, NDArray[np.float32]]]: ...
+    @property
+    def picture(self) -> NDArray[np.float32]: ...
+    @property
+    def header(self) -> dict[str, Any]: ...
+    def keys(self) -> list[str]: ...
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        compression: Literal["zip", "zips", "piz", "none"] = "zip",
+        exposure: float = 0.0,
+        tonemap: Literal["agx", "filmic", "srgb"] = "agx",
+    ) -> None: ...
+    def __getitem__(self, name: str, /) -> NDArray[np.float32]: ...
+    def __contains__(self, name: str, /) -> bool: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[str]: ...
+
+@disjoint_base
+class Scene:
+    def __new__(
+        cls,
+        source: str | os.PathLike[str] | bytes,
+        *,
+        environment: str | os.PathLike[str] | Sequence[float] | NDArray[Any] | None = None,
+        environment_rotation: float | None = None,
+        environment_strength: float | None = None,
+        light_units: Literal["auto", "radiometric", "photometric"] = "auto",
+        glass: Literal["auto", "solid", "thin"] = "auto",
+        effects: str | None = None,
+        frame: int | None = None,
+        allow_outside: bool = False,
+        strict: bool = False,
+        threads: int = 0,
+    ) -> Scene: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def cameras(self) -> list[str]: ...
+    def render(
+        self,
+        *,
+        method: _Method = "auto",
+        iterations: int | None = None,
+        time: float | None = None,
+        target_error: float | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        camera: str | None = None,
+        crop: Sequence[float] | None = None,
+        seed: int = 0,
+        max_depth: int | None = None,
+        photons: int | None = None,
+        levels: int | None = None,
+        alpha: float | None = None,
+        initial_bandwidth: float | Literal["knn", "footprint"] | None = None,
+        knn: int | None = None,
+        guide: bool | None = None,
+        finish: bool | None = None,
+        denoise: _Denoise | None = None,
+        model: str | None = None,
+        layers: str = "all",
+        reproducible: bool = False,
+        threads: int = 0,
+        progress: Callable[[Progress], object] | None = None,
+    ) -> Image: ...
+    def plan(
+        self,
+        *,
+        method: _Method = "auto",
+        iterations: int | None = None,
+        time: float | None = None,
+        target_error: float | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        camera: str | None = None,
+        crop: Sequence[float] | None = None,
+        seed: int = 0,
+        max_depth: int | None = None,
+        photons: int | None = None,
+        levels: int | None = None,
+        alpha: float | None = None,
+        initial_bandwidth: float | Literal["knn", "footprint"] | None = None,
+        knn: int | None = None,
+        guide: bool | None = None,
+        finish: bool | None = None,
+        denoise: _Denoise | None = None,
+        model: str | None = None,
+        threads: int = 0,
+    ) -> dict[str, Any]: ...
+    def converge(
+        self,
+        *,
+        methods: Sequence[_Method] | None = None,
+        runs: Mapping[str, dict[str, Any]] | None = None,
+        iterations: int | None = None,
+        time: float | None = None,
+        reference: _Picture | None = None,
+        reference_method: _Method | None = None,
+        reference_iterations: int | None = None,
+        reference_time: float | None = None,
+        metric: Literal["relmse", "relmse_trimmed", "mse"] = "relmse",
+        moments: float | None = None,
+        seed: int = 0,
+        seeds: int = 1,
+        max_depth: int | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        camera: str | None = None,
+        threads: int = 0,
+        progress: Callable[[dict[str, Any]], object] | None = None,
+    ) -> dict[str, Any]: ...
+
+def read(path: str | os.PathLike[str]) -> Image: ...
+def compare(
+    image: _Picture, reference: _Picture, *, layer: str | None = None, relative: bool = False
+) -> dict[str, Any]: ...
+def combine(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
+def find_libraries() -> dict[str, dict[str, Any]]: ...

@@ -1,0 +1,242 @@
+"""Meshes, lights and cameras as the bytes of a .glb, so that scenes from numpy come in by the way of all others."""
+
+import io
+import json
+import struct
+import zlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, looking
+
+FLOAT, UINT = 5126, 5125
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
+
+
+def pack(
+    meshes: Sequence[Mesh],
+    *,
+    lights: Sequence[Light] = (),
+    cameras: Sequence[Camera] = (),
+    medium: Medium | None = None,
+    extras: dict | None = None,
+) -> bytes:
+    """The bytes of a .glb that `caustique render` takes; `medium` fills the space.
+
+    `extras` are more keys of the scene's `extras.caustique`, such as {"environment": {"file": "sky.exr"}}.
+
+    Raises ValueError for arrays that have other shapes than they should.
+    """
+    writer = Writer()
+    for mesh in meshes:
+        writer.mesh(mesh)
+    for light in lights:
+        writer.light(light)
+    for camera in cameras:
+        writer.camera(camera)
+    return writer.bytes({"light_units": "radiometric", **({"medium": coefficients(medium)} if medium else {}), **(extras or {})})
+
+
+def png(name: str, texture) -> bytes:
+    """An image (H, W, 3) of bytes as PNG."""
+    pixels = np.asarray(texture)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
+        raise ValueError(f"{name}: a texture is (H, W, 3) uint8, not {pixels.shape} {pixels.dtype}")
+    height, width = pixels.shape[:2]
+    lines = np.zeros((height, 1 + 3 * width), np.uint8)
+    lines[:, 1:] = pixels.reshape(height, -1)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    parts = [chunk(b"IHDR", head), chunk(b"IDAT", zlib.compress(lines.tobytes())), chunk(b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
+
+
+def coefficients(medium: Medium) -> dict:
+    return {"sigma_a": numbers(medium.sigma_a), "sigma_s": numbers(medium.sigma_s), "g": float(medium.g)}
+
+
+def numbers(values) -> list[float]:
+    return [float(x) for x in values]
+
+
+class Writer:
+    """A document that grows, and its buffer."""
+
+    def __init__(self) -> None:
+        self.buffer = io.BytesIO()
+        self.document: dict = {
+            "asset": {"version": "2.0", "generator": "caustique for Python"},
+            "nodes": [], "meshes": [], "materials": [], "cameras": [], "accessors": [], "bufferViews": [],
+            "images": [], "textures": [],
+        }
+        self.lights: list[dict] = []
+        self.extensions: set[str] = set()
+        self.worn: dict[int, tuple[Material, int]] = {}
+
+    def add(self, kind: str, item: dict) -> int:
+        self.document[kind].append(item)
+        return len(self.document[kind]) - 1
+
+    def view(self, data: bytes) -> int:
+        self.buffer.write(b"\0" * (-self.buffer.tell() % 4))
+        start = self.buffer.tell()
+        self.buffer.write(data)
+        return self.add("bufferViews", {"buffer": 0, "byteOffset": start, "byteLength": len(data)})
+
+    def accessor(self, place: str, values, width: int, kind: int = FLOAT) -> int:
+        """An array (N, width)."""
+        array = np.asarray(values)
+        if array.ndim != 2 or array.shape[1] != width:
+            raise ValueError(f"{place}: an array of shape (N, {width}) is needed, not {array.shape}")
+        if kind == UINT:
+            if not np.issubdtype(array.dtype, np.integer) or (array.size and int(array.min()) < 0):
+                raise ValueError(f"{place}: indices are whole numbers from 0 up")
+            flat = np.ascontiguousarray(array, "<u4").reshape(-1)
+            return self.add("accessors", {
+                "bufferView": self.view(flat.tobytes()), "componentType": UINT, "count": len(flat), "type": "SCALAR",
+            })
+        array = np.ascontiguousarray(array, "<f4")
+        item = {
+            "bufferView": self.view(array.tobytes()), "componentType": FLOAT, "count": len(array), "type": TYPES[width],
+        }
+        if width == 3 and len(array) and np.isfinite(array).all():
+            item |= {"min": numbers(array.min(axis=0)), "max": numbers(array.max(axis=0))}
+        return self.add("accessors", item)
+
+    def mesh(self, mesh: Mesh):
+        place = f'mesh "{mesh.name}"'
+        attributes = {"POSITION": self.accessor(f"{place}, vertices", mesh.vertices, 3)}
+        if mesh.normals is not None:
+            attributes["NORMAL"] = self.accessor(f"{place}, normals", mesh.normals, 3)
+        if mesh.uvs is not None:
+            attributes["TEXCOORD_0"] = self.accessor(f"{place}, uvs", mesh.uvs, 2)
+        primitive = {
+            "attributes": attributes,
+            "indices": self.accessor(f"{place}, triangles", mesh.triangles, 3, UINT),
+            "material": self.material(mesh.material),
+        }
+        node: dict = {"name": mesh.name, "mesh": self.add("meshes", {"name": mesh.name, "primitives": [primitive]})}
+        if mesh.transform is not None:
+            node["matrix"] = matrix(place, mesh.transform)
+        self.node(node, {"light_group": mesh.light_group})
+
+    def node(self, node: dict, said: dict):
+        said = {key: value for key, value in said.items() if value is not None}
+        if said:
+            node["extras"] = {"caustique": said}
+        self.add("nodes", node)
+
+    def material(self, material: Material) -> int:
+        """Its index; a material that several meshes wear is written once."""
+        if id(material) in self.worn:
+            return self.worn[id(material)][1]
+        item: dict = {
+            "name": material.name,
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [*numbers(material.base_color), 1.0],
+                "metallicFactor": float(material.metallic),
+                "roughnessFactor": float(material.roughness),
+            },
+            "doubleSided": bool(material.double_sided),
+        }
+        if material.base_color_texture is not None:
+            data = png(f'material "{material.name}"', material.base_color_texture)
+            image = self.add("images", {"bufferView": self.view(data), "mimeType": "image/png"})
+            item["pbrMetallicRoughness"]["baseColorTexture"] = {"index": self.add("textures", {"source": image})}
+        extensions: dict = {}
+        if material.transmission > 0.0:
+            extensions["KHR_materials_transmission"] = {"transmissionFactor": float(material.transmission)}
+            extensions["KHR_materials_volume"] = {"thicknessFactor": 0.0 if material.thin else 1.0}
+        if material.ior != 1.5:
+            extensions["KHR_materials_ior"] = {"ior": float(material.ior)}
+        if material.specular != 1.0:
+            extensions["KHR_materials_specular"] = {"specularFactor": float(material.specular)}
+        if material.dispersion > 0.0:
+            extensions["KHR_materials_dispersion"] = {"dispersion": float(material.dispersion)}
+        emission = np.asarray(material.emission, float)
+        if emission.any():
+            strength = max(1.0, float(emission.max()))
+            item["emissiveFactor"] = numbers(emission / strength)
+            extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
+        if material.medium is not None:
+            item["extras"] = {"caustique": {"medium": coefficients(material.medium)}}
+        if extensions:
+            item["extensions"] = extensions
+            self.extensions.update(extensions)
+        index = self.add("materials", item)
+        # With the material itself: another could get its id otherwise.
+        self.worn[id(material)] = material, index
+        return index
+
+    def light(self, light: Light):
+        said: dict = {"light_group": light.light_group}
+        item: dict = {"name": light.name}
+        match light:
+            case PointLight():
+                item |= {"type": "point"}
+                pose = np.eye(4)
+                pose[:3, 3] = light.position
+                said["radius"], power = float(light.radius), light.intensity
+            case SpotLight():
+                angles = {"innerConeAngle": np.radians(light.inner), "outerConeAngle": np.radians(light.outer)}
+                item |= {"type": "spot", "spot": angles}
+                pose = looking(light.position, light.target)
+                said["radius"], power = float(light.radius), light.intensity
+            case SunLight():
+                item |= {"type": "directional"}
+                pose = looking((0.0, 0.0, 0.0), light.direction)
+                said["angle_deg"], power = float(light.angle), light.irradiance
+            case _:
+                raise TypeError(f"a light is a PointLight, SpotLight or SunLight, not {type(light).__name__}")
+        # A light's colour ends at one.
+        strength = max(numbers(power)) or 1.0
+        item |= {"color": [x / strength for x in numbers(power)], "intensity": strength}
+        self.lights.append(item)
+        self.extensions.add("KHR_lights_punctual")
+        reference = {"KHR_lights_punctual": {"light": len(self.lights) - 1}}
+        self.node({"name": light.name, "matrix": matrix(light.name, pose), "extensions": reference}, said)
+
+    def camera(self, camera: Camera):
+        perspective = {"yfov": float(np.radians(camera.fov)), "znear": 0.01}
+        if camera.aspect is not None:
+            perspective["aspectRatio"] = float(camera.aspect)
+        index = self.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
+        pose = looking(camera.position, camera.target, camera.up)
+        to_target = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
+        distance = to_target if camera.focus_distance is None else float(camera.focus_distance)
+        lens = {"aperture_radius": float(camera.aperture_radius), "focus_distance": distance}
+        self.node({"name": camera.name, "camera": index, "matrix": matrix(camera.name, pose)}, lens)
+
+    def bytes(self, said: dict) -> bytes:
+        document = {key: value for key, value in self.document.items() if value}
+        document["scenes"] = [{"nodes": list(range(len(self.document["nodes"]))), "extras": {"caustique": said}}]
+        document["scene"] = 0
+        if self.lights:
+            document["extensions"] = {"KHR_lights_punctual": {"lights": self.lights}}
+        if self.extensions:
+            document["extensionsUsed"] = sorted(self.extensions)
+        binary = self.buffer.getvalue()
+        binary += b"\0" * (-len(binary) % 4)
+        if binary:
+            document["buffers"] = [{"byteLength": len(binary)}]
+        try:
+            text = json.dumps(document, allow_nan=False).encode()
+        except ValueError as error:
+            raise ValueError(f"a number of the scene is not finite: {error}") from error
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        if binary:
+            chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def matrix(place: str, values) -> list[float]:
+    """Column by column, as glTF has it."""
+    array = np.asarray(values, float)
+    if array.shape != (4, 4):
+        raise ValueError(f"{place}: a transform is (4, 4), not {array.shape}")
+    return numbers(array.T.reshape(-1))

@@ -1,0 +1,67 @@
+//! Errors of pictures, and pictures that are finished anew.
+
+use crate::error::raised;
+use crate::image::{Image, picture};
+use crate::job::finish_order;
+use crate::value::to_python;
+use crate::work::work;
+use caustique::image::exr::ATTRIBUTE;
+use caustique::image::{Floor, compare_above};
+use caustique::pipeline::finish::open;
+use numpy::IntoPyArray;
+use numpy::ndarray::Array2;
+use pyo3::prelude::*;
+use serde_json::json;
+
+/// The error of a picture against a reference: the figures of `caustique compare --json`, and flip_map, (H, W) float32.
+///
+/// Both are Images, paths, or arrays (H, W, 3). `layer` takes that layer of both; `relative` adds 0.01 times the
+/// squared mean radiance of the reference in relMSE, instead of 0.01.
+#[pyfunction]
+#[pyo3(signature = (image, reference, *, layer = None, relative = false))]
+pub fn compare<'py>(
+    py: Python<'py>,
+    image: &Bound<'py, PyAny>,
+    reference: &Bound<'py, PyAny>,
+    layer: Option<&str>,
+    relative: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (a, b) = (picture("image", image, layer)?, picture("reference", reference, layer)?);
+    let floor = if relative { Floor::Relative } else { Floor::Papers };
+    let mut comparison = py.detach(|| compare_above(&a, &b, floor)).map_err(raised)?;
+    let map = std::mem::take(&mut comparison.flip_map);
+    let told = to_python(py, &json!(comparison))?;
+    if let Ok(map) = Array2::from_shape_vec((a.height, a.width), map) {
+        told.set_item("flip_map", map.into_pyarray(py))?;
+    }
+    Ok(told)
+}
+
+/// A new image whose picture is finished as a render finishes its own; all other layers are kept.
+///
+/// It needs what tells the noise: the layers of a render, or of another renderer's picture "Variance" (of the mean) or
+/// two independent halves "Half1" and "Half2". "albedo" and "normal" guide the denoiser.
+#[pyfunction]
+#[pyo3(signature = (image, *, denoise = "auto", model = None, threads = 0))]
+pub fn combine(
+    py: Python<'_>,
+    image: &Bound<'_, Image>,
+    denoise: &str,
+    model: Option<String>,
+    threads: usize,
+) -> PyResult<Image> {
+    let order = finish_order("combine", denoise, model)?;
+    let image = image.get();
+    let done = work(py, threads, |caller| {
+        let mut ready = open(&order, None)?;
+        let missing = ready.missing.take();
+        caller.warn(&missing.map(|error| super::job::missing(&error)).into_iter().collect::<Vec<_>>());
+        let (mut set, mut attributes) = (image.set.clone(), image.attributes.clone());
+        let account = ready.finish().apply(&mut set, |_| true)?;
+        let mut header = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
+        header["combined"] = ready.facts(&account);
+        attributes.insert(ATTRIBUTE, &header)?;
+        Ok(Image { set, attributes })
+    })?;
+    done.whole()
+}

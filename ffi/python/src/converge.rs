@@ -1,0 +1,279 @@
+//! Accuracy against time.
+
+use crate::error::{raised, usage};
+use crate::image::{Image, picture};
+use crate::job::{self, Approach, Common};
+use crate::keywords::Keywords;
+use crate::scene::Scene;
+use crate::value::to_python;
+use crate::work::{Caller, work};
+use caustique::camera::Camera;
+use caustique::error::Result;
+use caustique::finish::Finish;
+use caustique::pipeline::{Ready, check, finish, memory, plan, sized};
+use caustique::plan::{Effect, Presence};
+use caustique::render::auto::choose;
+use caustique::render::{Control, Method, Settings, Spent};
+use caustique::report::crop::Look;
+use caustique::report::data;
+use caustique::report::entry::{Entry, Metric};
+use caustique::report::race::{Rules, race};
+use caustique::report::reference::{Halves, Reference};
+use caustique::report::summary::{Subject, Wishes, summarize};
+use caustique::scene::Scene as Built;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict};
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// Seconds of each run where nothing says when to stop, as on the command line.
+const DEFAULT_TIME: f64 = 60.0;
+/// Methods where none are named, as there.
+const USUAL: [&str; 4] = ["path", "sppm", "cppm", "vcm"];
+const METRICS: [(&str, Metric); 3] =
+    [("relmse", Metric::RelMse), ("relmse_trimmed", Metric::RelMseTrimmed), ("mse", Metric::Mse)];
+
+/// A run and how it was asked for.
+struct Run {
+    name: String,
+    approach: Approach,
+}
+
+/// A comparison that is asked for.
+struct Comparison {
+    runs: Vec<Run>,
+    common: Common,
+    moments: f64,
+    seeds: u64,
+    metric: Metric,
+    /// How a reference is made, where none is given.
+    own: Own,
+}
+
+/// A reference to be made.
+struct Own {
+    method: Option<Method>,
+    iterations: Option<u64>,
+    time: Option<f64>,
+}
+
+/// See [`Scene`]'s method of this name.
+pub fn converge<'py>(
+    scene: &Scene,
+    py: Python<'py>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut keywords = Keywords::of(py, "converge", options);
+    let view = job::view(&mut keywords)?;
+    let given: Option<Bound<'_, PyAny>> = keywords.take("reference")?;
+    let own = Own {
+        method: keywords
+            .take::<String>("reference_method")?
+            .map_or(Ok(None), |name| job::method("reference_method", &name))?,
+        iterations: job::iterations(&mut keywords, "reference_iterations")?,
+        time: job::seconds(&mut keywords, "reference_time")?,
+    };
+    let comparison = Comparison {
+        runs: runs(py, &mut keywords)?,
+        common: Common::take(&mut keywords, scene.switches)?,
+        moments: keywords
+            .number("moments", 1.001..=10.0, "a ratio from 1.001 to 10")?
+            .unwrap_or(std::f64::consts::SQRT_2),
+        seeds: keywords.number("seeds", 1..=1000, "from 1 to 1000")?.unwrap_or(1),
+        metric: keywords.choice("metric", &METRICS)?.unwrap_or_default(),
+        own,
+    };
+    let threads = keywords.take("threads")?.unwrap_or(0);
+    let progress = keywords.take::<Py<PyAny>>("progress")?.map(Arc::new);
+    keywords.finish()?;
+    let camera = scene.loaded.scene.camera(&view).map_err(raised)?;
+    let reference = given.map(|given| reference(&given, camera.size())).transpose()?;
+    let settled = comparison.settle()?;
+    let done = work(py, threads, |caller| {
+        let told = Told { caller, progress };
+        comparison.run((scene, &camera), settled, reference, &told)
+    })?;
+    to_python(py, &done.whole()?)
+}
+
+/// Runs by method and by name.
+fn runs(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Vec<Run>> {
+    let methods: Option<Vec<String>> = keywords.take("methods")?;
+    let named: Option<Bound<'_, PyDict>> = keywords.take("runs")?;
+    let usual = || if named.is_none() { USUAL.map(String::from).to_vec() } else { Vec::new() };
+    let mut runs = Vec::new();
+    for name in methods.unwrap_or_else(usual) {
+        let approach = Approach::single(job::method("converge: methods", &name)?);
+        runs.push(Run { name, approach });
+    }
+    for (name, options) in named.iter().flat_map(|named| named.iter()) {
+        let mut options = Keywords::of(py, "run", Some(options.cast::<PyDict>()?));
+        let approach = Approach::take(&mut options, &Approach::usual())?;
+        options.finish()?;
+        runs.push(Run { name: name.extract()?, approach });
+    }
+    match (1..runs.len()).find(|&run| runs[..run].iter().any(|other| other.name == runs[run].name)) {
+        Some(twice) => Err(usage(
+            format!("two runs are called '{}'", runs[twice].name),
+            "give each a name of its own in runs={...}",
+        )),
+        None => Ok(runs),
+    }
+}
+
+/// A reference that is given: an image, a file, or an array (H, W, 3).
+fn reference(given: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Reference> {
+    let header = given.cast::<Image>().ok().and_then(|image| image.get().attributes.object()).unwrap_or(Value::Null);
+    let set = picture("reference", given, None)?;
+    Reference::of(&set, &header, size, "reference".into()).map_err(raised)
+}
+
+/// Who is told how it goes.
+struct Told<'a> {
+    caller: &'a Caller<'a>,
+    progress: Option<Arc<Py<PyAny>>>,
+}
+
+impl Told<'_> {
+    /// Tells, and whether to go on.
+    fn tell(&self, state: Value) -> Control {
+        if let Some(callback) = self.progress.clone() {
+            self.caller.ask(move |py| {
+                let answer = callback.call1(py, (to_python(py, &state)?,))?;
+                Ok(!answer.bind(py).is(PyBool::new(py, false)))
+            });
+        }
+        if self.caller.stops() { Control::Stop } else { Control::Continue }
+    }
+}
+
+impl Comparison {
+    /// Settings of all runs, and those of a reference, as far as they do not depend on the scene.
+    fn settle(&self) -> PyResult<(Vec<Settings>, Settings)> {
+        let of = |approach: &Approach| approach.settings(&self.common, approach.way());
+        let settings = self.runs.iter().map(|run| of(&run.approach)).collect::<PyResult<_>>()?;
+        let method = self.own.method.unwrap_or(Method::Vcm);
+        if method == Method::Pm {
+            return Err(usage("pm does not converge: it makes no reference", "choose another reference_method"));
+        }
+        Ok((settings, of(&Approach::single(Some(method)))?))
+    }
+
+    /// Seconds of each run.
+    fn time(&self) -> Option<f64> {
+        self.common.time.or(self.common.iterations.is_none().then_some(DEFAULT_TIME))
+    }
+
+    fn run(
+        self,
+        (scene, camera): (&Scene, &Camera),
+        (settings, own): (Vec<Settings>, Settings),
+        reference: Option<Reference>,
+        told: &Told<'_>,
+    ) -> Result<Value> {
+        let built = &scene.loaded.scene;
+        for of in &settings {
+            check::media(&scene.path, of, built)?;
+            check::bandwidth(&scene.path, of, built)?;
+        }
+        let (entries, mut finishes) = self.entries((scene, camera), settings, told)?;
+        memory::check_all((built, camera), entries.iter().map(|entry| &entry.settings))?;
+        let reference = reference.unwrap_or_else(|| self.make(own, (built, camera), told));
+        let Common { seed, iterations, .. } = self.common;
+        let rules = Rules {
+            time: self.time(),
+            iterations,
+            ratio: self.moments,
+            more: Vec::new(),
+            seeds: (0..self.seeds).map(|i| seed.wrapping_add(i)).collect(),
+        };
+        // Where pictures of the race are kept meanwhile.
+        let folder = tempfile::tempdir().map_err(|cause| caustique::error::Error::io(&std::env::temp_dir(), &cause))?;
+        let stage = (built, camera);
+        let mut outcome = race(stage, &entries, &mut finishes, &rules, &reference, folder.path(), |step| {
+            told.tell(json!({
+                "run": entries[step.run].name,
+                "iterations": step.iterations,
+                "seconds": step.seconds,
+                "fraction": step.fraction,
+                "relmse": step.point.map(|point| point.errors.relmse),
+            }))
+        })?;
+        let subject = Subject {
+            scene: scene.path.display().to_string(),
+            size: camera.size(),
+            machine: Vec::new(),
+            settings: Vec::new(),
+            metric: self.metric,
+            entries,
+            rules,
+            reference,
+        };
+        let look = Look { exposure: 0.0, tonemap: Default::default() };
+        let none = Wishes { targets: Vec::new(), targets_of: Vec::new(), windows: Vec::new(), look, notes: Vec::new() };
+        let summary = summarize(&subject, &mut outcome, &none)?;
+        match outcome.failures.pop() {
+            Some(error) => Err(error),
+            None => Ok(data::json(&subject, &outcome, &summary)),
+        }
+    }
+
+    /// What competes: with auto settled, and finishes opened.
+    fn entries(
+        &self,
+        (scene, camera): (&Scene, &Camera),
+        settings: Vec<Settings>,
+        told: &Told<'_>,
+    ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
+        let built = &scene.loaded.scene;
+        let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+        for (Run { name, approach }, settings) in self.runs.iter().zip(settings) {
+            let mut settings = sized(settings, approach.photons, camera.size());
+            let mut decided = Spent::default();
+            let mut choice = None;
+            if approach.method.is_none() {
+                let limits = Common { time: self.time(), ..self.common };
+                let make = |way| approach.allowed(&limits, way, camera.size());
+                choice = choose((built, camera), &mut approach.pilot_finish()?, make, || told.caller.stops());
+            }
+            if let Some(choice) = &choice {
+                (settings, decided) = (choice.settings.clone(), choice.spent);
+            }
+            let Common { max_depth, switches, .. } = self.common;
+            let asked = plan::Asked { choice: choice.as_ref(), max_depth, switches };
+            let plan = plan::plan(&asked, settings.method, (built, camera), &scene.loaded.removed);
+            warnings
+                .extend(plan.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
+            let order = approach.finish_order();
+            let mut ready = order.map(|order| finish::open(&order, Some(settings.levels.count))).transpose()?;
+            let missing = ready.as_mut().and_then(|ready| ready.missing.take());
+            warnings.extend(missing.map(|error| job::missing(&error)));
+            let settings = Settings { iterations: None, time: None, ..settings };
+            let finish = ready.as_ref().map(Ready::name);
+            entries.push(Entry { name: name.clone(), options: String::new(), settings, decided, finish });
+            finishes.push(ready.map(Ready::into_finish));
+        }
+        told.caller.warn(&warnings);
+        Ok((entries, finishes))
+    }
+
+    /// Makes a reference: two halves.
+    fn make(&self, settings: Settings, (scene, camera): (&Built, &Camera), told: &Told<'_>) -> Reference {
+        let seen_through_glass = Presence::of(scene, camera).has(Effect::Sds);
+        let plain = self.own.method.is_none() && !seen_through_glass;
+        let method = if plain { Method::Bdpt } else { settings.method };
+        let ends = match (self.own.iterations, self.own.time) {
+            (None, None) => match self.time() {
+                Some(time) => (None, Some(8.0 * time)),
+                None => (self.common.iterations.map(|n| n.saturating_mul(16).max(2)), None),
+            },
+            asked => asked,
+        };
+        let settings = Settings { method, iterations: ends.0, time: ends.1, target_error: None, ..settings };
+        let settings = sized(settings, None, camera.size());
+        let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
+            told.tell(json!({"run": null, "iterations": iterations, "seconds": seconds}))
+        });
+        halves.reference(camera.size())
+    }
+}

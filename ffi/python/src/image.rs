@@ -1,0 +1,269 @@
+//! A picture with its layers. Planes are handed out as they lie in memory.
+
+use crate::error::{raised, usage};
+use crate::keywords::choice;
+use crate::value::{to_json, to_python};
+use caustique::error::{Error, Kind};
+use caustique::film::{Layer, LayerSet, Plane, Sample};
+use caustique::image::exr::{self, Attributes, Compression};
+use caustique::image::png;
+use caustique::image::tonemap::ToneMap;
+use numpy::ndarray::{Array3, ArrayView2, Axis};
+use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+
+/// A picture: named layers of float32 planes, and a header. It does not change once it is there.
+///
+/// image["Noisy"]                   a layer, (H, W, C), a copy; of layers with one plane, such as "Z", a view (H, W)
+/// image["Noisy.R"]                 a plane, (H, W), a view
+/// image.layers["Noisy"]["R"]       the same
+/// image.picture                    the picture itself, (H, W, 3), a copy
+///
+/// Views are read-only, share the image's memory and keep it alive. Rows run from the top. Radiance is scene-linear
+/// Rec. 709 in W/(sr m2); "Variance1" and its like are squares of that; "Z", "depth" and "P" are metres.
+#[pyclass(frozen, module = "caustique")]
+pub struct Image {
+    /// The layers.
+    pub set: LayerSet,
+    /// The header's attributes.
+    pub attributes: Attributes,
+}
+
+/// Components of a layer by their number.
+const COMPONENTS: [&str; 4] = ["X", "XY", "RGB", "RGBA"];
+/// Layers of vectors.
+const VECTORS: [&str; 2] = ["normal", "P"];
+
+#[pymethods]
+impl Image {
+    /// An image of arrays (H, W) or (H, W, C) by layer name, C up to 4; "" is the picture itself. Values are copied.
+    #[staticmethod]
+    #[pyo3(signature = (layers, header = None))]
+    fn from_arrays(layers: &Bound<'_, PyDict>, header: Option<&Bound<'_, PyDict>>) -> PyResult<Image> {
+        let mut set = LayerSet::default();
+        for (name, array) in layers.iter() {
+            let name: String = name.extract()?;
+            let (size, layer) = layer(&name, &array)?;
+            if set.layers.is_empty() {
+                (set.height, set.width) = size;
+            }
+            set.push(layer).map_err(raised)?;
+        }
+        if set.pixels() == 0 {
+            return Err(usage("an image without pixels", "give a layer \"\" of shape (H, W, 3)"));
+        }
+        let attributes = match header {
+            Some(header) => Attributes::of(&to_json(header)?).map_err(raised)?,
+            None => Attributes::default(),
+        };
+        Ok(Image { set, attributes })
+    }
+
+    /// Height and width in pixels.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        (self.set.height, self.set.width)
+    }
+
+    /// The planes of every layer, {layer: {component: (H, W) float32}}, read-only and without copies.
+    #[getter]
+    fn layers<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(this.py());
+        for layer in &this.get().set.layers {
+            let planes = PyDict::new(this.py());
+            for plane in &layer.planes {
+                planes.set_item(&plane.component, view(this, plane)?)?;
+            }
+            all.set_item(&layer.name, planes)?;
+        }
+        Ok(all)
+    }
+
+    /// The picture itself: (H, W, 3) float32, scene-linear radiance. A copy.
+    #[getter]
+    fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let pixels = self.set.beauty().map_err(raised)?;
+        let values: Vec<f32> = pixels.into_iter().flatten().collect();
+        Ok(shaped(Array3::from_shape_vec((self.set.height, self.set.width, 3), values))?.into_pyarray(py).into_any())
+    }
+
+    /// What the file's header says, a dict: arguments, seed, plan, warnings, error against seconds, and more.
+    #[getter]
+    fn header<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match self.attributes.object() {
+            Some(object) => to_python(py, &object),
+            None => Ok(PyDict::new(py).into_any()),
+        }
+    }
+
+    /// Names of the layers; the picture itself is "".
+    fn keys(&self) -> Vec<String> {
+        self.set.layers.iter().map(|layer| layer.name.clone()).collect()
+    }
+
+    /// A layer, (H, W, C) or (H, W), or a plane such as "Noisy.R", (H, W). Single planes are views, several are stacked
+    /// into a copy.
+    fn __getitem__<'py>(this: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let set = &this.get().set;
+        if let Some(layer) = set.get(name) {
+            return match layer.planes.as_slice() {
+                [plane] => view(this, plane),
+                planes => {
+                    let size = (set.height, set.width, planes.len());
+                    let mut stacked = Array3::zeros(size);
+                    for (mut to, plane) in stacked.axis_iter_mut(Axis(2)).zip(planes) {
+                        to.assign(&shaped(ArrayView2::from_shape((set.height, set.width), &plane.values))?);
+                    }
+                    Ok(stacked.into_pyarray(this.py()).into_any())
+                }
+            };
+        }
+        let (layer, component) = name.rsplit_once('.').unwrap_or(("", name));
+        match set.get(layer).and_then(|layer| layer.plane(component)) {
+            Some(plane) => view(this, plane),
+            None => {
+                let names: Vec<String> = set.layers.iter().map(|layer| format!("'{}'", layer.name)).collect();
+                Err(PyKeyError::new_err(format!("no layer or plane '{name}'; there are {}", names.join(", "))))
+            }
+        }
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        let (layer, component) = name.rsplit_once('.').unwrap_or(("", name));
+        self.set.get(name).is_some() || self.set.get(layer).is_some_and(|layer| layer.plane(component).is_some())
+    }
+
+    fn __len__(&self) -> usize {
+        self.set.layers.len()
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.keys().into_pyobject(py)?.try_iter()?.into_any())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<caustique.Image: {} x {} pixels, {} layers>", self.set.width, self.set.height, self.set.layers.len())
+    }
+
+    /// Writes an EXR with all layers, or with a name that ends in .png the picture to look at.
+    ///
+    /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
+    /// exposure      of the PNG, stops
+    /// tonemap       of the PNG: 'agx', 'filmic' or 'srgb'
+    #[pyo3(signature = (path, *, compression = "zip", exposure = 0.0, tonemap = "agx"))]
+    fn save(&self, py: Python<'_>, path: PathBuf, compression: &str, exposure: f32, tonemap: &str) -> PyResult<()> {
+        let all = [
+            ("zip", Compression::Zip),
+            ("zips", Compression::Zips),
+            ("piz", Compression::Piz),
+            ("none", Compression::None),
+        ];
+        let compression = choice("save: compression", compression, &all)?;
+        let curves = [("agx", ToneMap::Agx), ("filmic", ToneMap::Filmic), ("srgb", ToneMap::Srgb)];
+        let curve = choice("save: tonemap", tonemap, &curves)?;
+        let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+        let set = &self.set;
+        let written = py.detach(|| match () {
+            () if is("exr") => {
+                let options = exr::Options { compression, ..exr::Options::default() };
+                exr::write(&path, set, &self.attributes, options)
+            }
+            () if is("png") => png::write_tonemapped(&path, set.width, set.height, &set.beauty()?, exposure, curve),
+            () => Err(Error::new(Kind::Usage, path.display(), "the name ends neither in .exr nor in .png")
+                .hint("an EXR holds all layers, a PNG is a picture to look at")),
+        });
+        written.map_err(raised)
+    }
+}
+
+/// Reads an EXR of any program: all its layers, by their names in the file.
+#[pyfunction]
+pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Image> {
+    let (set, attributes) = py.detach(|| exr::read(&path)).map_err(raised)?;
+    Ok(Image { set, attributes })
+}
+
+/// A plane as it lies in memory.
+fn view<'py>(this: &Bound<'py, Image>, plane: &Plane) -> PyResult<Bound<'py, PyAny>> {
+    let set = &this.get().set;
+    let values = shaped(ArrayView2::from_shape((set.height, set.width), &plane.values))?;
+    // SAFETY: the plane belongs to `this`, which the array keeps alive. An image is frozen: its planes are neither
+    // moved nor freed before it is, and nobody writes to them, this array not either (the next line).
+    let array = unsafe { PyArray2::borrow_from_array(&values, this.clone().into_any()) };
+    array.call_method1("setflags", (false,))?;
+    Ok(array.into_any())
+}
+
+/// A layer of a numpy array, and its height and width.
+fn layer(name: &str, array: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Layer)> {
+    let array: PyArrayLikeDyn<'_, f32, AllowTypeChange> = array.extract()?;
+    let array = array.as_array();
+    let shape = array.shape().to_vec();
+    let (height, width, depth) = match shape[..] {
+        [height, width] => (height, width, 1),
+        [height, width, depth @ 1..=4] => (height, width, depth),
+        _ => {
+            let cause = format!("layer \"{name}\": an array of shape {shape:?}");
+            return Err(usage(cause, "layers are (H, W) or (H, W, C) with up to four components"));
+        }
+    };
+    let components = match (name, depth) {
+        (name, 3) if VECTORS.contains(&name) => "XYZ",
+        ("Z" | "depth", 1) => "Z",
+        _ => COMPONENTS[depth - 1],
+    };
+    let all = shaped(array.to_shape((height * width, depth)))?;
+    let planes = components.chars().zip(all.columns()).map(|(component, values)| Plane {
+        component: component.into(),
+        sample: Sample::Float,
+        values: values.to_vec(),
+    });
+    Ok(((height, width), Layer { name: name.into(), planes: planes.collect() }))
+}
+
+/// The picture of an image, of a layer of it, of a file or of an array (H, W, 3), alone. `place` names the argument.
+pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyResult<LayerSet> {
+    let name = name.unwrap_or("");
+    let chosen = |set: &LayerSet| {
+        let found = if name.is_empty() { set.find(caustique::film::Role::Beauty) } else { set.get(name) };
+        let names = || set.layers.iter().map(|layer| format!("\"{}\"", layer.name)).collect::<Vec<_>>().join(", ");
+        let layer =
+            found.ok_or_else(|| usage(format!("{place}: no layer \"{name}\""), format!("there are {}", names())))?;
+        let layers = vec![Layer { name: String::new(), ..layer.clone() }];
+        Ok(LayerSet { width: set.width, height: set.height, layers })
+    };
+    if let Ok(image) = given.cast::<Image>() {
+        return chosen(&image.get().set);
+    }
+    if let Ok(path) = given.extract::<PathBuf>() {
+        return chosen(&read(given.py(), path)?.set);
+    }
+    let ((height, width), layer) = layer("", given)?;
+    Ok(LayerSet { width, height, layers: vec![layer] })
+}
+
+/// An array whose shape and values come from one place.
+fn shaped<T, E: std::fmt::Display>(array: Result<T, E>) -> PyResult<T> {
+    array.map_err(|cause| raised(Error::new(Kind::Image, "", cause)))
+}
+
+/// Triples per pixel of an array (H, W, 3) of finite, not negative radiance, and its width and height.
+pub fn radiance(place: &str, array: &Bound<'_, PyAny>) -> PyResult<(u32, u32, Vec<[f32; 3]>)> {
+    let ((height, width), layer) = layer(place, array)?;
+    let size = u32::try_from(width).ok().zip(u32::try_from(height).ok()).filter(|&(w, h)| w > 0 && h > 0);
+    let texels = layer.triples();
+    match size {
+        Some((width, height))
+            if layer.planes.len() >= 3 && texels.iter().flatten().all(|x| *x >= 0.0 && x.is_finite()) =>
+        {
+            Ok((width, height, texels))
+        }
+        _ => Err(usage(
+            format!("{place}: it is no array (H, W, 3) of numbers from zero up"),
+            "radiance is finite and not negative",
+        )),
+    }
+}

@@ -1,0 +1,95 @@
+//! Keyword arguments, taken by name: what is left is unknown, and an error that names the nearest.
+
+use crate::error::usage;
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::fmt::Display;
+use std::ops::RangeBounds;
+
+/// Keyword arguments of a call.
+pub struct Keywords<'py> {
+    call: &'static str,
+    given: Bound<'py, PyDict>,
+    known: Vec<&'static str>,
+}
+
+impl<'py> Keywords<'py> {
+    /// Those that a call was given.
+    pub fn of(py: Python<'py>, call: &'static str, given: Option<&Bound<'py, PyDict>>) -> Self {
+        Keywords { call, given: given.cloned().unwrap_or_else(|| PyDict::new(py)), known: Vec::new() }
+    }
+
+    /// An argument; `None` where it is None or left out.
+    ///
+    /// # Errors
+    /// It is of another type, or a number that does not fit.
+    pub fn take<T: FromPyObjectOwned<'py>>(&mut self, name: &'static str) -> PyResult<Option<T>> {
+        self.known.push(name);
+        let Some(value) = self.given.get_item(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
+        value.extract::<T>().map(Some).map_err(|error| {
+            let error: PyErr = error.into();
+            let text = format!("{}() argument '{name}': {}", self.call, error.value(value.py()));
+            match error.is_instance_of::<PyTypeError>(value.py()) {
+                true => PyTypeError::new_err(text),
+                false => PyValueError::new_err(text),
+            }
+        })
+    }
+
+    /// A number within a range, which `say` tells in words.
+    ///
+    /// # Errors
+    /// It is not.
+    pub fn number<T>(&mut self, name: &'static str, range: impl RangeBounds<T>, say: &str) -> PyResult<Option<T>>
+    where
+        T: FromPyObjectOwned<'py> + PartialOrd + Display,
+    {
+        match self.take::<T>(name)? {
+            Some(value) if !range.contains(&value) => {
+                Err(usage(format!("{}: {name}={value} is out of range", self.call), format!("{name} is {say}")))
+            }
+            value => Ok(value),
+        }
+    }
+
+    /// One of some names.
+    ///
+    /// # Errors
+    /// There is no such name.
+    pub fn choice<T: Copy>(&mut self, name: &'static str, all: &[(&str, T)]) -> PyResult<Option<T>> {
+        let Some(given) = self.take::<String>(name)? else { return Ok(None) };
+        choice(&format!("{}: {name}", self.call), &given, all).map(Some)
+    }
+
+    /// Errors: an argument that nothing has taken.
+    pub fn finish(self) -> PyResult<()> {
+        for (key, _) in self.given.iter() {
+            let key: String = key.extract()?;
+            if !self.known.contains(&key.as_str()) {
+                let matches = nearest(&self.given, &key, &self.known)?;
+                let hint = matches.map(|near| format!("; did you mean '{near}'?")).unwrap_or_default();
+                let call = self.call;
+                return Err(PyTypeError::new_err(format!("{call}() got an unexpected keyword argument '{key}'{hint}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The value of a name; `place` says whose it is.
+///
+/// # Errors
+/// There is no such name.
+pub fn choice<T: Copy>(place: &str, given: &str, all: &[(&str, T)]) -> PyResult<T> {
+    let names = || all.iter().map(|(name, _)| format!("'{name}'")).collect::<Vec<_>>().join(", ");
+    let found = all.iter().find(|(name, _)| *name == given).map(|(_, value)| *value);
+    found.ok_or_else(|| usage(format!("{place}='{given}' does not exist"), format!("one of {}", names())))
+}
+
+/// The known name nearest to another, by Python's difflib.
+fn nearest(given: &Bound<'_, PyDict>, key: &str, known: &[&str]) -> PyResult<Option<String>> {
+    let matches = given.py().import("difflib")?.call_method1("get_close_matches", (key, known.to_vec(), 1))?;
+    Ok(matches.extract::<Vec<String>>()?.into_iter().next())
+}

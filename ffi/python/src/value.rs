@@ -1,0 +1,21 @@
+//! JSON to Python and back, through Python's own json.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::Value;
+
+/// A JSON value as Python objects.
+pub fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    py.import("json")?.call_method1("loads", (value.to_string(),))
+}
+
+/// Keyword arguments as JSON: what has no such form as its `str`.
+pub fn to_json(arguments: &Bound<'_, PyDict>) -> PyResult<Value> {
+    let py = arguments.py();
+    let options = PyDict::new(py);
+    options.set_item("default", py.import("builtins")?.getattr("str")?)?;
+    options.set_item("sort_keys", true)?;
+    let text: String = py.import("json")?.call_method("dumps", (arguments,), Some(&options))?.extract()?;
+    // Python writes infinities, which JSON does not have.
+    Ok(serde_json::from_str(&text).unwrap_or(Value::String(text)))
+}

@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Builds the Python package and installs it.
+#
+#   scripts/python.sh          the wheel, into target/wheels and into .venv-python
+#
+# The wheel holds neither Embree nor Open Image Denoise nor ONNX Runtime: they are found when they are needed, as the
+# program finds them.
+
+set -euo pipefail
+
+# shellcheck source=scripts/setup.sh
+. "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+setup wheel
+cd "$ROOT"
+wheels=$(realpath -m "${CARGO_TARGET_DIR:-target}/wheels")
+rm -rf "$wheels"
+# In the main build's profile and folder, so that what `cargo build --workspace` has compiled is not compiled again.
+.venv-python/bin/maturin build --quiet --release --manifest-path ffi/python/Cargo.toml --compatibility linux \
+    --interpreter .venv-python/bin/python --out "$wheels"
+.venv-python/bin/python -m pip install -q --disable-pip-version-check --force-reinstall --no-deps "$wheels"/*.whl
+printf '%s\n' "$wheels"/*.whl

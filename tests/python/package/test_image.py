@@ -1,0 +1,200 @@
+"""Images: arrays without copies, files, errors of pictures, finishes, and types that tell the truth."""
+
+import gc
+import inspect
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+from shared import ROOT, TORUS, ground, still_life
+
+import caustique as cq
+
+
+def pointer(array):
+    return array.__array_interface__["data"][0]
+
+
+class Layers(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scene = ground([cq.SunLight(direction=(0, -1, 0), irradiance=(1, 1, 1))], albedo=0.5)
+        cls.image = scene.render(method="path", iterations=4, width=6, height=4, finish=False)
+
+    def test_planes_are_not_copied(self):
+        image = self.image
+        red = image.layers["Noisy"]["R"]
+        self.assertEqual((red.shape, red.dtype, red.flags.owndata), ((4, 6), np.float32, False))
+        self.assertIs(red.base, image)
+        self.assertEqual(pointer(red), pointer(image["Noisy.R"]))
+        self.assertEqual(pointer(image["Z"]), pointer(image.layers["Z"]["Z"]))
+        stacked = image["Noisy"]
+        self.assertEqual(stacked.shape, (4, 6, 3))
+        np.testing.assert_array_equal(stacked[..., 0], red)
+        self.assertFalse(np.shares_memory(stacked, red))
+
+    def test_an_image_does_not_change(self):
+        red = self.image["R"]
+        with self.assertRaises(ValueError):
+            red[0, 0] = 1.0
+        with self.assertRaises(ValueError):
+            red.flags.writeable = True
+
+    def test_arrays_outlive_the_image(self):
+        image = ground([]).render(method="path", iterations=1, width=64, height=64, finish=False)
+        depth = image["Z"]
+        expected = depth.copy()
+        del image
+        gc.collect()
+        np.testing.assert_array_equal(depth, expected)
+
+    def test_names(self):
+        image = self.image
+        self.assertIn("Noisy", image)
+        self.assertIn("Noisy.R", image)
+        self.assertNotIn("Nosy", image)
+        self.assertEqual(list(image), image.keys())
+        with self.assertRaisesRegex(KeyError, "Nosy.*'Noisy'"):
+            image["Nosy"]
+
+    def test_header(self):
+        header = self.image.header
+        self.assertEqual((header["iterations"], header["seed"], header["method"]), (4, 0, "path"))
+        self.assertEqual(header["arguments"]["width"], 6)
+
+
+class Files(unittest.TestCase):
+    def test_written_and_read(self):
+        values = np.arange(24, dtype=np.float32).reshape(4, 2, 3)
+        image = cq.Image.from_arrays({"": values, "normal": values, "Z": values[..., 0]}, {"note": "made"})
+        self.assertEqual(list(image.layers["normal"]), ["X", "Y", "Z"])
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "a.exr"
+            image.save(path)
+            again = cq.read(path)
+            np.testing.assert_array_equal(again.picture, values)
+            np.testing.assert_array_equal(again["Z"], values[..., 0])
+            self.assertEqual(again.header, {"note": "made"})
+            image.save(Path(folder) / "a.png", exposure=-2.0)
+            self.assertEqual((Path(folder) / "a.png").read_bytes()[:4], b"\x89PNG")
+            for name in ("a.jpg", "no/such/a.exr"):
+                with self.subTest(name), self.assertRaises(cq.Error):
+                    image.save(Path(folder) / name)
+            with self.assertRaises(cq.Error):
+                cq.read(Path(folder) / "a.png")
+        with self.assertRaises(cq.Error):
+            cq.Image.from_arrays({"": values, "Z": np.zeros((3, 3))})
+
+
+class Errors(unittest.TestCase):
+    def test_figures_are_those_of_their_definitions(self):
+        rng = np.random.default_rng(1)
+        reference = rng.uniform(0.1, 2.0, (16, 24, 3)).astype(np.float32)
+        image = (reference * rng.normal(1.0, 0.1, reference.shape)).astype(np.float32)
+        told = cq.compare(image, reference)
+        squares = (image.astype(float) - reference) ** 2
+        floor = reference.astype(float).mean(-1) ** 2 + 0.01
+        self.assertAlmostEqual(told["mse"], squares.mean(), delta=1e-6 * squares.mean())
+        self.assertAlmostEqual(told["relmse"], (squares.mean(-1) / floor).mean(), delta=1e-6 * told["relmse"])
+        self.assertAlmostEqual(told["mean_ratio"], image.mean(dtype=float) / reference.mean(dtype=float), places=5)
+        self.assertEqual((told["flip_map"].shape, told["flip_map"].dtype), ((16, 24), np.float32))
+        self.assertAlmostEqual(told["flip"], told["flip_map"].mean(dtype=float), places=5)
+        as_image = cq.Image.from_arrays({"": image, "Level1": reference})
+        self.assertEqual(cq.compare(as_image, reference)["mse"], told["mse"])
+        self.assertEqual(cq.compare(as_image, as_image, layer="Level1")["mse"], 0.0)
+        with self.assertRaises(cq.Error):
+            cq.compare(image, reference[1:])
+
+    def test_combine_is_the_finish_of_a_render(self):
+        """Layers of an unfinished render, finished afterwards, are the picture of a finished one."""
+        scene = cq.Scene(TORUS)
+        options = {"method": "vcm", "iterations": 8, "width": 48, "height": 32}
+        raw = scene.render(finish=False, **options)
+        before = raw.picture
+        finished = cq.combine(raw, denoise="own")
+        expected = scene.render(denoise="own", **options)
+        np.testing.assert_array_equal(raw.picture, before)
+        np.testing.assert_allclose(finished.picture, expected.picture, rtol=1e-5, atol=1e-7)
+        self.assertFalse(np.array_equal(finished.picture, before))
+        with self.assertRaises(cq.Error) as caught:
+            cq.combine(cq.Image.from_arrays({"": before}))
+        self.assertTrue(caught.exception.hint)
+
+
+class Convergence(unittest.TestCase):
+    def test_points_are_errors_of_renders(self):
+        """A point after N iterations is the error that `compare` finds of a render of N iterations."""
+        scene, told = still_life(), []
+        options = {"width": 16, "height": 12}
+        reference = scene.render(method="bdpt", iterations=256, seed=9, finish=False, **options)
+        result = scene.converge(
+            methods=["path", "sppm"], reference=reference, iterations=16, moments=2.0,
+            progress=lambda step: told.append((step["run"], step["iterations"])), **options,
+        )
+        self.assertEqual(set(told), {(run, n) for run in ("path", "sppm") for n in range(1, 17)})
+        points = {(point["run"], point["iterations"]): point for point in result["points"]}
+        self.assertEqual(set(points), {(run, n) for run in ("path", "sppm") for n in (1, 2, 4, 8, 16)})
+        for run, n in [("path", 1), ("path", 16), ("sppm", 8)]:
+            levels = {"levels": 1} if run == "sppm" else {}
+            image = scene.render(method=run, iterations=n, finish=False, **levels, **options)
+            error = cq.compare(image, reference)["relmse"]
+            self.assertAlmostEqual(points[run, n]["relmse"], error, delta=1e-9 * error)
+        self.assertEqual([run["theory"]["exponent"] for run in result["runs"]][0], -1.0)
+        # Unbiased and without fireflies: a factor of 16 in the squared error, or more, for points are well spread.
+        self.assertGreater(points["path", 1]["relmse"] / points["path", 16]["relmse"], 8)
+
+    def test_a_reference_is_made_where_none_is_given(self):
+        told = []
+        result = still_life().converge(
+            methods=["path"], reference_iterations=8, iterations=2, width=8, height=8,
+            progress=lambda step: told.append(step["run"]),
+        )
+        self.assertEqual(told.count(None), 8)
+        self.assertGreater(result["reference"]["error"]["relmse"], 0.0)
+        stopped = still_life().converge(
+            methods=["path"], reference=np.ones((8, 8, 3)), iterations=100, width=8, height=8,
+            progress=lambda step: step["iterations"] < 3,
+        )
+        self.assertEqual(stopped["points"][-1]["iterations"], 3)
+
+    def test_named_runs_and_a_given_reference(self):
+        scene = ground([cq.SunLight(direction=(0, -1, 0), irradiance=(1, 1, 1))])
+        reference = np.full((8, 8, 3), 0.6 / np.pi, np.float32)
+        runs = {"mine": {"method": "sppm", "photons": 500, "levels": 1, "finish": False}}
+        result = scene.converge(runs=runs, reference=reference, iterations=2, width=8, height=8)
+        self.assertEqual([run["name"] for run in result["runs"]], ["mine"])
+        self.assertLess(result["points"][-1]["relmse"], 1e-4)
+        with self.assertRaisesRegex(TypeError, "'photon'; did you mean 'photons'"):
+            scene.converge(runs={"mine": {"photon": 3}}, iterations=1)
+        with self.assertRaises(cq.Error):
+            scene.converge(methods=["path"], reference=reference[1:], iterations=1, width=8, height=8)
+
+
+class Types(unittest.TestCase):
+    def check(self, *words):
+        done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_the_stubs_are_the_module(self):
+        self.check("mypy.stubtest", "caustique._native")
+
+    def test_the_types_of_the_package_agree(self):
+        self.check("mypy", "--check-untyped-defs", ROOT / "ffi" / "python" / "caustique")
+
+    def test_everything_is_documented(self):
+        for name in cq.__all__:
+            if name not in ("__version__", "Light"):
+                self.assertTrue(getattr(cq, name).__doc__, name)
+        for name in ("render", "plan", "converge", "from_meshes"):
+            self.assertTrue(getattr(cq.Scene, name).__doc__, name)
+        for call in (cq.Scene.render, cq.Scene.converge):
+            shared = {"width", "height", "camera", "threads", "max_depth"} if call is cq.Scene.converge else set()
+            for option in set(inspect.signature(call).parameters) - {"self"} - shared:
+                self.assertRegex(call.__doc__, rf"\b{option}\b")
+
+
+if __name__ == "__main__":
+    unittest.main()

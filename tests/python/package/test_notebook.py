@@ -1,0 +1,35 @@
+"""The notebook runs, and what it prints and draws is what its text says."""
+
+import re
+import unittest
+
+import nbclient
+import nbformat
+from shared import ROOT
+
+NOTEBOOK = ROOT / "docs" / "convergence.ipynb"
+
+
+class Notebook(unittest.TestCase):
+    def test_it_runs_and_shows_what_it_says(self):
+        notebook = nbformat.read(NOTEBOOK, 4)
+        for cell in notebook.cells:
+            self.assertFalse(cell.get("outputs"), "the notebook is kept without outputs")
+        nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
+        outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+        text = "".join(output.get("text", "") for output in outputs if output.get("name") == "stdout")
+        said = "".join(output.get("text", "") for output in outputs if output.get("name") == "stderr")
+        self.assertNotIn("SceneWarning", said)
+        self.assertEqual(sum("image/png" in output.get("data", {}) for output in outputs), 2)
+        slopes = {run: (float(measured), float(theory)) for run, measured, theory in
+                  re.findall(r"(\w+): measured (\S+), theory (\S+)", text)}
+        theories = {run: theory for run, (_, theory) in slopes.items()}
+        self.assertEqual(theories, {"path": -1.0, "sppm": -0.67, "vcm": -0.5})
+        # What merges falls as theory says or faster, and not faster than noise of independent samples by much.
+        for run in ("sppm", "vcm"):
+            self.assertLess(slopes[run][0], slopes[run][1], run)
+            self.assertGreater(slopes[run][0], -1.6, run)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,300 @@
+"""Scenes from numpy meet closed forms; scenes from files give what the command line gives."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+import warnings
+from pathlib import Path
+
+import numpy as np
+from shared import ROOT, TORUS, ground, sphere, square, still_life
+
+import caustique as cq
+
+
+class ClosedForms(unittest.TestCase):
+    """Known answers, from meshes and numbers alone."""
+
+    def test_a_lambertian_sphere_in_a_uniform_environment(self):
+        """A convex body of albedo a under radiance L from everywhere sends out a L, whatever its shape."""
+        vertices, triangles = sphere()
+        matte = cq.Material(base_color=(0.5, 0.25, 0.75), specular=0.0)
+        scene = cq.Scene.from_meshes(
+            [cq.Mesh(vertices=vertices, triangles=triangles, material=matte)],
+            cameras=[cq.Camera(position=(0, 0, 8), fov=5)], environment=(2.0, 2.0, 2.0),
+        )
+        image = scene.render(method="path", iterations=64, width=16, height=16, finish=False)
+        pixels = image.picture.reshape(-1, 3).astype(float) / [1.0, 0.5, 1.5]
+        error = pixels[:, 0].std() / 16
+        # Sharp enough to tell an albedo that is off by a hundredth, at four standard errors.
+        self.assertLess(error, 0.0025)
+        np.testing.assert_allclose(pixels.mean(axis=0), 1.0, atol=4 * error)
+
+    def test_clear_glass_in_a_uniform_environment_is_invisible(self):
+        """A furnace: glass neither adds nor takes radiance, so it shows what is behind it."""
+        vertices, triangles = sphere()
+        glass = cq.Material(transmission=1.0, roughness=0.0, ior=1.5)
+        scene = cq.Scene.from_meshes(
+            [cq.Mesh(vertices=vertices, triangles=triangles, normals=vertices, material=glass)],
+            cameras=[cq.Camera(position=(0, 0, 8), fov=20)], environment=np.full((8, 16, 3), 0.7, np.float32),
+        )
+        self.assertEqual(scene.warnings, [])
+        image = scene.render(method="path", iterations=16, width=8, height=8, finish=False)
+        np.testing.assert_allclose(image.picture, 0.7, rtol=2e-3)
+
+    def test_lamps_by_their_units(self):
+        """A ground of albedo a under irradiance E sends out a E / pi: of a sun, and of a point lamp I / d^2."""
+        lamps = {
+            "sun": (cq.SunLight(direction=(0, -1, 0), irradiance=(3.0, 2.0, 1.0)), np.array([3.0, 2.0, 1.0])),
+            "point": (cq.PointLight(position=(0, 20, 0), intensity=(800.0, 400.0, 0.0)), np.array([2.0, 1.0, 0.0])),
+            "spot": (
+                cq.SpotLight(position=(0, 20, 0), target=(0, 0, 0), intensity=(400.0,) * 3, inner=30, outer=40),
+                np.array([1.0, 1.0, 1.0]),
+            ),
+        }
+        for name, (lamp, irradiance) in lamps.items():
+            with self.subTest(name):
+                scene = ground([lamp])
+                self.assertEqual(scene.warnings, [])
+                image = scene.render(method="path", iterations=2, width=4, height=4, finish=False)
+                expected = np.broadcast_to(0.6 * irradiance / np.pi, (4, 4, 3))
+                np.testing.assert_allclose(image.picture, expected, rtol=2e-3)
+
+    def test_emission_transforms_and_textures(self):
+        """A glowing square, moved and turned towards the camera, shows its radiance; a texture, its texels."""
+        vertices, triangles = square()
+        turn = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
+        upright = np.linalg.inv(turn)
+        upright[:3, 3] = (0, 0, -3)
+        glow = cq.Material(base_color=(0, 0, 0), emission=(5.0, 0.5, 0.25), specular=0.0)
+        camera = cq.Camera(position=(0, 0, 0), target=(0, 0, -1), fov=10)
+        mesh = cq.Mesh(vertices=vertices, triangles=triangles, material=glow, transform=upright)
+        image = cq.Scene.from_meshes([mesh], cameras=[camera]).render(
+            method="path", iterations=1, width=4, height=4, finish=False)
+        np.testing.assert_allclose(image.picture, np.broadcast_to([5.0, 0.5, 0.25], (4, 4, 3)), rtol=1e-5)
+        np.testing.assert_allclose(image["Z"], 3.0, rtol=1e-5)
+
+        texture = np.zeros((8, 8, 3), np.uint8)
+        texture[:4, :4] = 255
+        uvs = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])
+        matte = cq.Material(base_color_texture=texture, specular=0.0)
+        mesh = cq.Mesh(vertices=vertices, triangles=triangles, uvs=uvs, material=matte, transform=upright)
+        camera = cq.Camera(position=(0, 0, 0), target=(0, 0, -1), fov=2 * np.degrees(np.arctan(1 / 3)))
+        image = cq.Scene.from_meshes([mesh], cameras=[camera], environment=(1.0,) * 3).render(
+            method="path", iterations=1, width=16, height=16, finish=False)
+        albedo = image["albedo"]
+        # Two pixels a texel, the first row on top; between its quarters the texture is interpolated.
+        np.testing.assert_allclose(albedo[2:6, 2:6], 1.0, rtol=1e-5)
+        np.testing.assert_allclose(albedo[10:14, 2:14], 0.0, atol=1e-5)
+        np.testing.assert_allclose(albedo[2:14, 10:14], 0.0, atol=1e-5)
+
+
+class BesideTheCommandLine(unittest.TestCase):
+    """The package is the program: the same settings give the same bytes."""
+
+    PROGRAM = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")
+
+    def by_program(self, scene, *options):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "out.exr"
+            subprocess.run([self.PROGRAM, "render", scene, "-o", path, "--progress", "none", *options],
+                           check=True, capture_output=True)
+            return cq.read(path)
+
+    def assert_same(self, a, b, crop=None):
+        """A file's picture is as large as its display window: what is rendered is the window `crop` of it."""
+        self.assertEqual(sorted(a.keys()), sorted(b.keys()))
+        left, top, width, height = crop or (0, 0, *reversed(a.shape))
+        window = np.s_[top:top + height, left:left + width]
+        for name, planes in a.layers.items():
+            for component, values in planes.items():
+                there = b.layers[name][component][window]
+                self.assertTrue(values.tobytes() == there.tobytes(), f"{name}.{component}")
+
+    def test_every_layer_of_a_render(self):
+        cases = [
+            ({}, []),
+            ({"method": "sppm", "photons": 2000, "alpha": 0.7, "seed": 5, "crop": (4, 2, 16, 8)},
+             ["--method", "sppm", "--photons", "2000", "--alpha", "0.7", "--seed", "5", "--crop", "4,2,16,8"]),
+            ({"method": "vcm", "guide": True, "finish": False, "max_depth": 6},
+             ["--method", "vcm", "--guide", "on", "--no-combine", "--max-depth", "6"]),
+        ]
+        for keywords, options in cases:
+            with self.subTest(**keywords), warnings.catch_warnings(action="ignore"):
+                image = cq.Scene(TORUS).render(iterations=4, width=32, threads=3, **keywords)
+                self.assert_same(image, self.by_program(TORUS, "--iterations", "4", "--width", "32", *options),
+                                 keywords.get("crop"))
+        self.assertFalse(np.array_equal(image.picture, cq.Scene(TORUS).render(iterations=4, width=32).picture))
+
+    def test_packed_meshes_are_a_file_of_the_program(self):
+        vertices, triangles = sphere(8)
+        meshes = [cq.Mesh(vertices=vertices, triangles=triangles, material=cq.Material(transmission=1, roughness=0))]
+        lights = [cq.PointLight(position=(0, 3, 0), intensity=(10, 10, 10), radius=0.1)]
+        cameras = [cq.Camera(position=(0, 0, 5))]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "packed.glb"
+            path.write_bytes(cq.pack(meshes, lights=lights, cameras=cameras))
+            there = self.by_program(path, "--iterations", "2", "--width", "16", "--height", "16", "--env", "0,0,0")
+        here = cq.Scene.from_meshes(meshes, lights=lights, cameras=cameras).render(iterations=2, width=16, height=16)
+        self.assert_same(here, there)
+
+    def test_a_plan(self):
+        out = subprocess.run([self.PROGRAM, "plan", TORUS, "--json", "--width", "64", "--method", "vcm"],
+                             check=True, capture_output=True, text=True).stdout
+        plan = cq.Scene(TORUS).plan(width=64, method="vcm")
+        self.assertEqual(plan, json.loads(out))
+
+
+class Running(unittest.TestCase):
+    """Progress, ends, threads."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.scene = still_life()
+
+    def render(self, **options):
+        return self.scene.render(method="path", width=8, height=8, finish=False, **options)
+
+    def test_progress_comes_in_the_calling_thread_once_an_iteration(self):
+        told = []
+        self.render(iterations=5, progress=lambda p: told.append((p.iteration, p.iterations, threading.get_ident())))
+        self.assertEqual(told, [(i, 5, threading.get_ident()) for i in range(1, 6)])
+
+    def test_false_ends_it_and_keeps_what_is_done(self):
+        image = self.render(iterations=1000, progress=lambda p: p.iteration < 3)
+        self.assertEqual(image.header["iterations"], 3)
+        whole = self.render(iterations=3)
+        self.assertEqual(image["Noisy"].tobytes(), whole["Noisy"].tobytes())
+        # What is no False goes on.
+        self.assertEqual(self.render(iterations=4, progress=lambda p: None).header["iterations"], 4)
+
+    def test_an_exception_comes_out_with_the_image(self):
+        def fail(progress):
+            if progress.iteration == 2:
+                raise KeyboardInterrupt
+
+        with self.assertRaises(KeyboardInterrupt) as caught:
+            self.render(iterations=1000, progress=fail)
+        self.assertEqual(caught.exception.image.header["iterations"], 2)
+
+    def test_a_signal_ends_it(self):
+        def kill():
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+        timer = threading.Timer(0.5, kill)
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt) as caught:
+            self.render(time=60)
+        self.assertGreater(caught.exception.image.header["iterations"], 0)
+
+    def test_two_renders_at_once_are_those_of_one_after_another(self):
+        alone = [self.render(iterations=20, seed=seed)["Noisy"].tobytes() for seed in (1, 2)]
+        both = [None, None]
+
+        def run(index):
+            both[index] = self.render(iterations=20, seed=index + 1)["Noisy"].tobytes()
+
+        threads = [threading.Thread(target=run, args=(index,)) for index in (0, 1)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertTrue(alone == both)
+        self.assertTrue(both[0] != both[1])
+
+    def test_python_goes_on_meanwhile(self):
+        """Another thread counts while a render runs: the lock is not held."""
+        counts, done = [0], threading.Event()
+
+        def count():
+            while not done.is_set():
+                counts[0] += 1
+                done.wait(0.005)
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        self.render(time=0.5)
+        done.set()
+        thread.join()
+        self.assertGreater(counts[0], 20)
+
+
+class Faults(unittest.TestCase):
+    """What is wrong is said, with the remedy, and nothing is silent."""
+
+    def test_unknown_keywords_name_the_nearest(self):
+        scene = ground([])
+        for call, wrong, near in [
+            (scene.render, "iteration", "iterations"), (scene.plan, "photon", "photons"),
+            (scene.converge, "method", "methods"), (lambda **k: cq.Scene(TORUS, **k), "enviroment", "environment"),
+        ]:
+            with self.subTest(wrong), self.assertRaisesRegex(TypeError, f"'{wrong}'; did you mean '{near}'"):
+                call(**{wrong: 3})
+
+    def test_values_out_of_range_and_of_no_effect(self):
+        scene = ground([])
+        for options, fault, hint in [
+            ({"method": "photons"}, "method='photons'", "'sppm'"),
+            ({"iterations": 0}, "iterations=0", "above 0"),
+            ({"method": "path", "photons": 5}, "photons has no effect", "leave photons out"),
+            ({"method": "vcm", "levels": 9}, "levels=9", "from 1 to 5"),
+            ({"width": 10**5}, "100000", "32768"),
+            ({"layers": "Nosy", "method": "path"}, "Nosy", "Noisy"),
+            ({"camera": "front"}, "front", "camera"),
+            ({"crop": (0, 0, 2, 2.5)}, "crop", "pixels"),
+        ]:
+            with self.subTest(**options), self.assertRaises(cq.Error) as caught:
+                scene.render(**{"height": 8, "width": 8} | options)
+            self.assertIn(fault, str(caught.exception))
+            self.assertIn(hint, caught.exception.hint)
+        with self.assertRaisesRegex(TypeError, "argument 'width'"):
+            scene.render(width="wide")
+        with self.assertRaisesRegex(ValueError, "argument 'seed'"):
+            scene.render(seed=-1)
+
+    def test_scenes_that_are_wrong(self):
+        vertices, triangles = square()
+        with self.assertRaises(cq.Error) as caught:
+            cq.Scene.from_meshes([cq.Mesh(vertices=vertices, triangles=triangles + 10)])
+        self.assertEqual(caught.exception.kind, "scene")
+        self.assertIn("past the 4 vertices", str(caught.exception))
+        with self.assertRaises(cq.Error) as caught:
+            cq.Scene("no/such.glb")
+        self.assertEqual(caught.exception.kind, "io")
+        for arrays, text in [
+            ({"vertices": vertices[:, :2]}, r"mesh \"mesh\", vertices: an array of shape \(N, 3\)"),
+            ({"triangles": triangles - 1}, "from 0 up"),
+            ({"triangles": triangles * 1.0}, "whole numbers"),
+            ({"transform": np.eye(3)}, r"\(4, 4\)"),
+        ]:
+            with self.subTest(text), self.assertRaisesRegex(ValueError, text):
+                cq.Scene.from_meshes([cq.Mesh(**{"vertices": vertices, "triangles": triangles} | arrays)])
+        with self.assertRaises(cq.Error):
+            cq.Scene.from_meshes([cq.Mesh(vertices=vertices * np.nan, triangles=triangles)])
+
+    def test_what_is_approximated_is_a_warning(self):
+        vertices, triangles = square()
+        glass = cq.Material(transmission=1.0, roughness=0.0, name="pane")
+        meshes = [cq.Mesh(vertices=vertices, triangles=triangles, material=glass)]
+        with self.assertWarnsRegex(cq.SceneWarning, "pane|mesh"):
+            scene = cq.Scene.from_meshes(meshes, cameras=[cq.Camera()])
+        self.assertTrue(scene.warnings)
+        with self.assertRaises(cq.Error):
+            cq.Scene.from_meshes(meshes, cameras=[cq.Camera()], strict=True)
+
+    def test_a_named_library_that_is_missing_says_so(self):
+        found = cq.libraries()
+        self.assertTrue(found["embree"]["found"], found)
+        code = "import caustique; print(caustique.libraries(oidn='/no/such.so')['oidn'])"
+        told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        self.assertIn("no such file", told)
+        self.assertIn("setup.sh", told)
+
+
+if __name__ == "__main__":
+    unittest.main()
