@@ -59,7 +59,8 @@ def main(given):
         where, what, hint = fault.where, fault.fault, fault.hint
     except ImportError as error:
         where, what = "", f"{sys.executable} lacks a module: {error}"
-        hint = "install what scripts/requirements-usd.txt lists, such as by pip install usd-core"
+        hint = ("run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip install usd-core numpy "
+                "OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
     except Exception as error:  # whatever USD raises about stages that come from anywhere
         where, what, hint = "", f"USD says: {' '.join(str(error).split()) or type(error).__name__}", None
     print(json.dumps({"prim": where, "fault": what, "hint": hint}), file=sys.stderr)

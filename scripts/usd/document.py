@@ -78,6 +78,8 @@ class Document:
 
     def write(self, path):
         """Writes the .glb: chunks are padded to four bytes as the format asks."""
+        if not self.json["scenes"][0]["nodes"]:
+            del self.json["scenes"][0]["nodes"]  # the format has no empty lists
         self._buffer += b"\0" * (-len(self._buffer) % 4)
         if self._buffer:
             self.json["buffers"] = [{"byteLength": len(self._buffer)}]

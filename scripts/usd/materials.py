@@ -34,18 +34,18 @@ class Materials:
             self._stage.losses.name(prim.GetPath(), f"the material {relationship.GetTargets()[0]} is not there")
         return material if material else None
 
-    def wear(self, material, closed, glow=None):
+    def wear(self, material, closed, glow=None, fades=False):
         """The `Worn` of a material, None for that of displayColor, on a mesh that is `closed` or not; `glow`: radiance
-        (3 numbers) that a light adds to it."""
-        key = (material.GetPath() if material else None, closed, glow)
+        (3 numbers) that a light lends it; `fades`: displayOpacity counts."""
+        key = (material.GetPath() if material else None, closed, glow, fades)
         if key not in self._worn:
             try:
-                self._worn[key] = self._made(material, closed, glow)
+                self._worn[key] = self._made(material, closed, glow, fades)
             except Fault as fault:
                 raise fault if fault.where else Fault(key[0], fault.fault, fault.hint)
         return self._worn[key]
 
-    def _made(self, material, closed, glow):
+    def _made(self, material, closed, glow, fades):
         name = str(material.GetPath()) if material else "displayColor"
         surface = self._surface(material)
         if glow is not None:
@@ -60,7 +60,7 @@ class Materials:
         self._extensions(surface, entry, sets, closed, keys, name)
         if keys:
             entry["extras"] = {"caustique": keys}
-        if material is None:
+        if color == "displayColor" and fades:
             entry["alphaMode"] = "BLEND"
         entry["doubleSided"] = glow is None
         return Worn(self._document.add("materials", entry), sets, color)

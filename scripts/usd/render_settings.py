@@ -55,7 +55,8 @@ class Settings:
         for prim in (self.product, self.prim):
             targets = prim.GetRelationship("camera").GetForwardedTargets() if prim else ()
             if targets:
-                if not self._stage.stage.GetPrimAtPath(targets[0]).IsA(UsdGeom.Camera):
+                found = self._stage.stage.GetPrimAtPath(targets[0])
+                if not (found and found.IsA(UsdGeom.Camera)):
                     raise Fault(prim.GetPath(), f"its camera {targets[0]} is not there", "name a Camera of the stage")
                 return targets[0]
         return None

@@ -37,8 +37,9 @@ class Scene:
         for child in self._stage.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE):
             for make, matrix in self._walk(child, Gf.Matrix4d(1), True, "default", purposes):
                 self._place(make, matrix)
-        self._place_cameras()
         keys = self._settings.keys()
+        self._place_cameras(keys)
+        self._settings.arguments()  # they are the program's: here, what they lose is named
         if self._dome.keys is not None:
             keys["environment"] = self._dome.keys
         keys.setdefault("environment", {"color": [0.0] * 3})
@@ -51,7 +52,7 @@ class Scene:
             world = matrix * self._stage.to_world
             self.document.node({**made, "matrix": [float(x) for row in world for x in row]})
 
-    def _place_cameras(self):
+    def _place_cameras(self, keys):
         """The camera that is asked for comes first: readers take the first."""
         asked, settings = self._settings.camera(), self._settings
         self._cameras.sort(key=lambda seen: seen[0].GetPath() != asked)
@@ -60,7 +61,7 @@ class Scene:
             self._place(lambda _, node=node, prim=prim: {"name": str(prim.GetPath()), **node}, matrix)
             stops = cameras.exposure(prim, self._stage)
             if at == 0 and stops:
-                self.document.json["scenes"][0].setdefault("extras", {})
+                keys.setdefault("exposure", stops)
 
     def _walk(self, prim, above, shown, purpose, purposes, own_transform=True):
         """Yields for everything that is seen what makes its node of its matrix, and that matrix (the stage's units)."""
@@ -166,7 +167,9 @@ class Scene:
             primitives.append((triangles[taken[of_face]], worn))
             rest[chosen] = False
         primitives.append((triangles[rest[of_face]], material))
-        made = [self._primitive(prim, faces, normals, corners.reshape(-1), self._materials.wear(worn, closed, glow))
+        fades = meshes.primvar(prim, "displayOpacity", stage) is not None
+        made = [self._primitive(prim, faces, normals, corners.reshape(-1),
+                                self._materials.wear(worn, closed, glow, fades))
                 for corners, worn in primitives if len(corners)]
         return self.document.add("meshes", {"name": str(where), "primitives": made}) if made else None
 

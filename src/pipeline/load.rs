@@ -6,7 +6,7 @@ use crate::memory;
 use crate::plan::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
-use crate::scene::{Scene, environment_file, gltf};
+use crate::scene::{Scene, environment_file, gltf, usd};
 use std::path::PathBuf;
 
 /// Room for Embree's library, and for each of its threads: it ends the process where they get none. A bound found by
@@ -53,7 +53,8 @@ pub struct Loaded {
 pub fn load(order: &Order, threads: usize) -> Result<Loaded> {
     memory::check(START_BYTES + threads as u64 * THREAD_BYTES, "Embree and its threads")
         .map_err(|e| e.within(order.path.display()).hint("give the program more memory, or fewer --threads"))?;
-    let mut description = gltf::read(&order.path, &order.options)?;
+    let read = if usd::is_stage(&order.path) { usd::read } else { gltf::read };
+    let mut description = read(&order.path, &order.options)?;
     environment(&mut description, order)?;
     let removed = switch::off(&mut description, order.off);
     Ok(Loaded { scene: Scene::build(description, threads)?, removed })
