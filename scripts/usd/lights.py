@@ -54,7 +54,9 @@ class Light:
         default = 50000.0 if self.prim.GetTypeName() == "DistantLight" else 1.0
         power = self.get("intensity", default) * 2.0 ** self.get("exposure", 0.0)
         color = Gf.Vec3f(self.get("color", Gf.Vec3f(1)))
-        if self.get("enableColorTemperature", False):
+        # Blender writes white lamps as 6500 K, which the reference tints.
+        white = self.stage.by_blender and self.get("colorTemperature", 6500.0) == 6500.0
+        if self.get("enableColorTemperature", False) and not white:
             color = Gf.CompMult(color, UsdLux.BlackbodyTemperatureAsRgb(self.get("colorTemperature", 6500.0)))
         emitted = tuple(float(c) * power for c in color)
         if not all(math.isfinite(c) for c in emitted):
@@ -104,12 +106,15 @@ def _lengths(matrix):
 
 
 def _sphere(light, document, matrix):
-    radius = 0.0 if light.get("treatAsPoint", False) and light.normalized else float(light.get("radius", 0.5))
+    as_point = light.stage.get(light.prim.GetAttribute("treatAsPoint"), False)
+    radius = 0.0 if as_point and light.normalized else float(light.get("radius", 0.5))
     a, b, c = (radius * length for length in _lengths(matrix))
     if radius < 0 or not math.isfinite(a + b + c):
         raise Fault(light.where, f"its radius is {radius}", "give it a number that is not negative")
     if radius > 0 and max(a, b, c) > 1.001 * min(a, b, c):
         return _ellipsoid(light, document, radius, (a, b, c))
+    if as_point and not light.normalized:
+        light.lose("treatAsPoint counts with normalize alone: it stays a sphere")
     if a == 0 and not light.normalized:
         light.lose("a sphere of radius 0 has no light unless it is normalized: its intensity is taken as if it were")
     emitted = light.emitted()
@@ -191,6 +196,8 @@ def _cone_flux(angle, softness):
 
 def _cylinder(light, document, matrix):
     radius, half = light.get("radius", 0.5), light.get("length", 1.0) / 2
+    if light.stage.get(light.prim.GetAttribute("treatAsLine"), False):
+        light.lose("treatAsLine is not carried: it stays a cylinder")
     if light.cone() is not None:
         light.lose("shaping of a cylinder is not carried: it shines in all directions")
     a, b, c = (length * size for length, size in zip(_lengths(matrix), (2 * half, radius, radius)))
@@ -208,6 +215,9 @@ def _distant(light, document, _matrix):
         angle = min(max(angle, 0.0), 180.0)
     light.cone()
     irradiance = light.emitted()
+    if light.stage.by_blender:
+        light.lose("Blender 4 writes suns with a quarter of their strength and half their angle: both are taken back")
+        irradiance, angle = tuple(4 * e for e in irradiance), min(2 * angle, 180.0)
     if angle > 0 and not light.normalized:
         share = math.pi * math.sin(math.radians(angle / 2)) ** 2
         irradiance = tuple(e * share for e in irradiance)

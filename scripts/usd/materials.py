@@ -37,12 +37,14 @@ class Materials:
     def wear(self, material, closed, glow=None, fades=False):
         """The `Worn` of a material, None for that of displayColor, on a mesh that is `closed` or not; `glow`: radiance
         (3 numbers) that a light lends it; `fades`: displayOpacity counts."""
-        key = (material.GetPath() if material else None, closed, glow, fades)
-        if key not in self._worn:
-            try:
+        where = material.GetPath() if material else None
+        try:
+            closed = closed or self._surface(material).transmission == 0
+            key = (where, closed, glow, fades)
+            if key not in self._worn:
                 self._worn[key] = self._made(material, closed, glow, fades)
-            except Fault as fault:
-                raise fault if fault.where else Fault(key[0], fault.fault, fault.hint)
+        except Fault as fault:
+            raise fault if fault.where else Fault(where, fault.fault, fault.hint)
         return self._worn[key]
 
     def _made(self, material, closed, glow, fades):

@@ -46,6 +46,10 @@ _LOST = {
     "film": "a thin film is not carried",
     "diffuse_roughness": "diffuse roughness is not carried: the surface is Lambertian",
 }
+# What counts only where something else is not 0.
+_OF = {"inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
+       "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
+       "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission"}
 _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
              "transmission"}
 
@@ -53,8 +57,11 @@ _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence
 def surface(shader, reader, losses):
     """The surface of a shader of either model."""
     where = shader.GetPath()
-    given = {}
-    for key, (name, default) in _NAMES[shader.GetIdAttr().Get()].items():
+    given, names = {}, _NAMES[shader.GetIdAttr().Get()]
+    for key, (name, default) in sorted(names.items(), key=lambda item: item[0] in _OF):
+        if not given.get(_OF.get(key), True):
+            given[key] = default
+            continue
         value = reader.read(shader, name, default) if name else default
         if isinstance(value, (Texture, Primvar)) and (key not in _TEXTURED or (
                 isinstance(value, Primvar) and key != "base")):

@@ -1,7 +1,7 @@
 """From a stage to a document: the walk over its prims, and what stands on each."""
 
 import numpy
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
+from pxr import Gf, UsdGeom, UsdLux, UsdShade
 
 import cameras
 import lights
@@ -32,7 +32,6 @@ class Scene:
 
     def fill(self):
         """Visits the whole stage."""
-        _warn_of_blender(self._stage)
         purposes = self._settings.purposes()
         for child in self._stage.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE):
             for make, matrix in self._walk(child, Gf.Matrix4d(1), True, "default", purposes):
@@ -228,13 +227,3 @@ class Scene:
 
 def _named(name, made):
     return None if made is None else {"name": name, **made}
-
-
-def _warn_of_blender(stage):
-    """Blender writes suns otherwise than UsdLux reads them."""
-    if not (stage.stage.GetRootLayer().documentation or "").startswith("Blender v"):
-        return
-    for prim in Usd.PrimRange(stage.stage.GetPseudoRoot(), PREDICATE):
-        if prim.GetTypeName() == "DistantLight":
-            stage.losses.name(prim.GetPath(), "Blender writes suns at a quarter of their strength and half their angle: "
-                              "multiply inputs:intensity by 4 and inputs:angle by 2, or export by export.py")

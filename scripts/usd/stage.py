@@ -11,7 +11,10 @@ PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 class Stage:
-    """A stage at a moment: `time`, `stage` (Usd.Stage), `losses`, and the way from its axes and units to glTF's."""
+    """A stage at a moment: `time`, `stage` (Usd.Stage), `losses`, and the way from its axes and units to glTF's.
+
+    `by_blender`: Blender 4 wrote it, some of whose lights mean other than they say.
+    """
 
     def __init__(self, path, frame=None, allow_outside=False):
         self.path = os.path.abspath(path)
@@ -31,6 +34,7 @@ class Stage:
         self.metres = UsdGeom.GetStageMetersPerUnit(self.stage)
         if not (math.isfinite(self.metres) and self.metres > 0):
             raise Fault("/", f"metersPerUnit is {self.metres}", "it has to be a number above zero")
+        self.by_blender = (self.stage.GetRootLayer().documentation or "").startswith("Blender v4.")
         self.z_up = UsdGeom.GetStageUpAxis(self.stage) == UsdGeom.Tokens.z
         self.to_world = self._axes() * Gf.Matrix4d().SetScale(self.metres)
         self._bake_skins()

@@ -23,7 +23,7 @@ class Irradiance(usd_support.Stages):
         """Irradiance of the middle, 3 numbers, and its standard error."""
         self.floor(ALBEDO)
         self.camera((1.5, 0.6, 0))
-        picture = self.render("--width", SIZE, "--height", SIZE, "--iterations", 48, "--method", "path", "--no-combine",
+        picture = self.render("--width", SIZE, "--height", SIZE, "--iterations", 256, "--method", "path", "--no-combine",
                               *options).reshape(-1, 3)
         scale = math.pi / ALBEDO
         return picture.mean(0) * scale, picture.std(0) * scale / math.sqrt(len(picture))

@@ -32,11 +32,11 @@ class Stages(support.Scratch):
         lost = convert.write(str(path or self.path), str(self.dir / "out.glb"), **options)
         return *read_glb(self.dir / "out.glb"), lost
 
-    def render(self, *options, path=None, layer="Noisy", check=0):
-        """Saves and renders: the layer's picture (height, width, 3) in double precision."""
-        self.stage.GetRootLayer().Save()
+    def render(self, *options, layer="Noisy"):
+        """Saves, converts and renders: the layer's picture (height, width, 3) in double precision."""
+        self.convert()
         out = self.dir / "out.exr"
-        support.run(["render", path or self.path, "-o", out, "--progress", "none", *options], check=check)
+        support.run(["render", self.dir / "out.glb", "-o", out, "--progress", "none", *options], check=0)
         return read_exr(out, layer)
 
     def mesh(self, path, points, counts, indices, scheme="none"):

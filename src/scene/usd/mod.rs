@@ -72,8 +72,9 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
 /// Those of the converter, as for [`read`].
 pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
     let output = Converter::new(path)?.run(&["--arguments".into()], allow_outside)?;
-    serde_json::from_slice(&output.stdout)
-        .map_err(|cause| Error::new(Kind::Scene, path.display(), format!("the converter does not say options: {cause}")))
+    serde_json::from_slice(&output.stdout).map_err(|cause| {
+        Error::new(Kind::Scene, path.display(), format!("the converter does not say options: {cause}"))
+    })
 }
 
 /// What the converter says of an error.
@@ -112,9 +113,9 @@ impl<'p> Converter<'p> {
         if allow_outside {
             command.arg("--allow-outside");
         }
-        let output = command.output().map_err(|cause| {
-            Error::new(Kind::Library, self.interpreter.path().display(), cause).hint(python::HINT)
-        })?;
+        let output = command
+            .output()
+            .map_err(|cause| Error::new(Kind::Library, self.interpreter.path().display(), cause).hint(python::HINT))?;
         if output.status.success() {
             return Ok(output);
         }
