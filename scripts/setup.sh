@@ -4,7 +4,8 @@
 #   scripts/setup.sh render    what building and rendering need: Rust (checked), a C linker, Embree, ONNX Runtime; and
 #                              Open Image Denoise, where it can be had
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
-#   scripts/setup.sh test      python, and Blender as a Python module in .venv-bpy
+#   scripts/setup.sh usd       render, and what reads stages of USD in .venv-usd
+#   scripts/setup.sh test      python, usd, and Blender as a Python module in .venv-bpy
 #
 # Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
 # CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
@@ -244,9 +245,9 @@ need_bpy() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|test
+# setup render|python|usd|test
 setup() {
-    case $1 in render | python | test) ;; *) fail "unknown mode '$1'" "one of: render python test" ;; esac
+    case $1 in render | python | usd | test) ;; *) fail "unknown mode '$1'" "one of: render python usd test" ;; esac
     need_rust
     need_linker
     need_python
@@ -256,6 +257,8 @@ setup() {
     say "Embree: $EMBREE; ONNX Runtime: $ONNXRUNTIME; Open Image Denoise: $OIDN"
     [ "$1" != render ] || return 0
     need_venv_module
+    [ "$1" = python ] || need_venv .venv-usd "$PYTHON" requirements-usd.txt
+    [ "$1" != usd ] || return 0
     need_venv .venv "$PYTHON" requirements-test.txt
     [ "$1" != python ] || return 0
     need_bpy

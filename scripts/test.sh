@@ -86,4 +86,5 @@ fi
 RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --release --workspace --no-deps
 tests 'cargo test' cargo test --release --workspace --no-fail-fast
 tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
+tests 'Python with USD' .venv-usd/bin/python -m unittest discover -s tests/python -p 'usd_*.py'
 tests 'Python with Blender' .venv-bpy/bin/python -m unittest discover -s tests/python -p 'blender_*.py'

@@ -54,7 +54,8 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
 def _fitted(width, height, aspect, policy):
     """The aperture for a picture of another shape (UsdRenderSettingsBase, aspectRatioConformPolicy)."""
     wide = aspect > width / height
-    if policy == "adjustApertureWidth" or (policy == "expandAperture" and wide) or (policy == "cropAperture" and not wide):
+    by_width = {"adjustApertureWidth": True, "expandAperture": wide, "cropAperture": not wide}
+    if by_width.get(policy, False):
         return height * aspect, height
     return width, width / aspect
 

@@ -1,7 +1,7 @@
 """Turn a stage of USD (.usd, .usda, .usdc, .usdz) into a .glb that caustique renders.
 
     python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]
-    python3 scripts/usd/convert.py STAGE --arguments     the options of `render` that the stage's RenderSettings stand for
+    python3 scripts/usd/convert.py STAGE --arguments     the options of `render` that its RenderSettings stand for
 
 It needs `usd-core`, which composes the stage, and what else scripts/requirements-usd.txt lists. `caustique render
 STAGE` runs it by itself. What glTF cannot say stands in `extras.caustique` (docs/scene-format.md); an environment image
@@ -59,8 +59,8 @@ def main(given):
         where, what, hint = fault.where, fault.fault, fault.hint
     except ImportError as error:
         where, what = "", f"{sys.executable} lacks a module: {error}"
-        hint = ("run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip install usd-core numpy "
-                "OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
+        hint = ("run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip install usd-core "
+                "numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
     except Exception as error:  # whatever USD raises about stages that come from anywhere
         where, what, hint = "", f"USD says: {' '.join(str(error).split()) or type(error).__name__}", None
     print(json.dumps({"prim": where, "fault": what, "hint": hint}), file=sys.stderr)

@@ -23,7 +23,8 @@ class Dome:
     def take(self, prim, matrix):
         """Takes a dome light that stands at `matrix` (in glTF's axes)."""
         light = Light(prim, self._stage)
-        light.cone()
+        if light.cone() is not None:
+            light.lose("shaping of a dome light is not carried: it shines from everywhere")
         asset = light.get("texture:file", None)
         plain = asset is None or not asset.path
         if self.keys is not None:
@@ -70,8 +71,8 @@ class Dome:
         # Our own mapping: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi.
         phi = ((numpy.arange(width) + 0.5) / width - 0.5) * 2 * math.pi
         theta = (numpy.arange(height) + 0.5) / height * math.pi
-        out = numpy.stack([numpy.sin(theta)[:, None] * numpy.cos(phi), numpy.repeat(numpy.cos(theta)[:, None], width, 1),
-                           numpy.sin(theta)[:, None] * numpy.sin(phi)], axis=2)
+        sin, cos = (f(theta)[:, None] for f in (numpy.sin, numpy.cos))
+        out = numpy.stack([sin * numpy.cos(phi), numpy.repeat(cos, width, 1), sin * numpy.sin(phi)], axis=2)
         local = out @ turn.T
         # OpenEXR's: the middle at +Z, longitude growing to the left.
         u = 0.5 - numpy.arctan2(local[:, :, 0], local[:, :, 2]) / (2 * math.pi)

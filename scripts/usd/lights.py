@@ -34,7 +34,7 @@ class Light:
             self.lose("light filters are not carried")
         for collection in (self.api.GetLightLinkCollectionAPI(), self.api.GetShadowLinkCollectionAPI()):
             if collection.GetIncludesRel().GetTargets() or collection.GetExcludesRel().GetTargets():
-                self.lose(f"{collection.GetName()} is not carried: it shines on everything, and everything casts shadows")
+                self.lose(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
 
     def get(self, name, default):
         """The value of an input of this name."""
@@ -213,7 +213,8 @@ def _distant(light, document, _matrix):
     if not 0 <= angle <= 180:
         light.lose(f"its angle of {angle:g} degrees is taken as 180")
         angle = min(max(angle, 0.0), 180.0)
-    light.cone()
+    if light.cone() is not None:
+        light.lose("shaping of a distant light is not carried: it shines everywhere")
     irradiance = light.emitted()
     if light.stage.by_blender:
         light.lose("Blender 4 writes suns with a quarter of their strength and half their angle: both are taken back")

@@ -1,6 +1,7 @@
 """Bound materials as glTF materials, with `extras.caustique` for what that cannot say."""
 
 import copy
+import math
 
 import materialx
 import preview
@@ -89,7 +90,7 @@ class Materials:
             return materialx.surface(plain, self._reader, losses)
         found = kind or id_
         what = f"a surface {found} is not read" if found else "it has no surface that is read"
-        losses.name(where, f"{what} (UsdPreviewSurface, OpenPBR and Standard Surface are): displayColor takes its place")
+        losses.name(where, f"{what} (UsdPreviewSurface, OpenPBR, Standard Surface are): displayColor takes its place")
         return Surface(base=Primvar("displayColor"), roughness=1.0, specular=0.0)
 
     def _core(self, surface, entry, sets):
@@ -136,8 +137,9 @@ class Materials:
             self._lost(entry, "roughness and metalness are placed by different coordinates: roughness's place both")
         first = textured[min(textured)]
         images = {at: self._textures.data_as_is(part, at) for at, part in textured.items()}
-        alone = len(textured) == 1 and (2 in textured or core["metallicFactor"] == 0 or None)
-        image = next(iter(images.values())) if len(set(images.values())) == 1 and (alone or len(textured) == 2) else None
+        # An image of roughness alone may hold anything in blue where nothing is metal, and one of metalness in green not.
+        fits = len(textured) == 2 or (1 in textured and core["metallicFactor"] == 0)
+        image = images[min(images)] if fits and len(set(images.values())) == 1 else None
         if image is None:
             image = self._textures.packed(textured)
         core["metallicRoughnessTexture"] = self._textures.reference(first, sets, image)
@@ -161,7 +163,9 @@ class Materials:
         glow(self._document, entry, radiance)
 
     def _extensions(self, surface, entry, sets, closed, keys, name):
-        add = lambda extension, value: entry.setdefault("extensions", {}).__setitem__(self._document.use(extension), value)
+        def add(extension, value):
+            entry.setdefault("extensions", {})[self._document.use(extension)] = value
+
         if surface.ior != 1.5:
             add("KHR_materials_ior", {"ior": max(surface.ior, 1.0)})
         if surface.specular != 1 or surface.specular_color != (1.0,) * 3:
@@ -234,7 +238,6 @@ def glow(document, entry, radiance):
 def _medium(surface, metres):
     """Coefficients (1/m) of OpenPBR's scattering inside: extinction by the colour left after the depth, of which
     `scatter` over the depth scatters; where that is more than all, absorption is raised to none below zero."""
-    import math
     depth = surface.depth * metres
     extinction = [-math.log(max(c, 1e-6)) / depth for c in surface.inside]
     scatter = [s / depth for s in surface.scatter]

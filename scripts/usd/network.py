@@ -72,7 +72,7 @@ class Reader:
             return self.read(shader, "value")
         if kind.startswith(_PASSING):
             return self._passed(shader, kind, output)
-        self.stage.losses.name(shader.GetPath(), f"a node {kind} is not carried: the input that it feeds has its default")
+        self.stage.losses.name(shader.GetPath(), f"a node {kind} is not carried: what it feeds has its default")
         return None
 
     def _passed(self, shader, kind, output):

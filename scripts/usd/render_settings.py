@@ -103,7 +103,7 @@ class Settings:
         left, low, right, high = window
         inside = [min(max(x, 0.0), 1.0) for x in (left, low, right, high)]
         if inside != [left, low, right, high]:
-            self._stage.losses.name(self.prim.GetPath(), "its dataWindowNDC reaches beyond the picture and is cut there")
+            self._stage.losses.name(self.prim.GetPath(), "its dataWindowNDC reaches beyond the picture: it is cut there")
         left, low, right, high = inside
         if right <= left or high <= low:
             raise Fault(self.prim.GetPath(), "its dataWindowNDC is empty", "it is xmin, ymin, xmax, ymax")
@@ -122,7 +122,7 @@ class Settings:
             if value is False:
                 continue
             if isinstance(value, dict):
-                self._stage.losses.name(self.prim.GetPath(), f"caustique:{key} has parts, and no option has: it is ignored")
+                self._stage.losses.name(self.prim.GetPath(), f"caustique:{key} has parts, which no option has")
                 continue
             text = ",".join(map(_number, value)) if isinstance(value, list) else _number(value)
             out.append(option if value is True else f"{option}={text}")

@@ -114,7 +114,10 @@ class Scene:
         places = instancer.ComputeInstanceTransformsAtTime(
             stage.time, stage.time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask)
         if len(places) != len(indices):
-            raise Fault(where, f"it has {len(indices)} protoIndices, and positions for {len(places)}", "export it again")
+            raise Fault(where, f"it has {len(indices)} protoIndices, and positions for {len(places)}",
+                        "export it again")
+        if any(primvar.HasAuthoredValue() for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvars()):
+            stage.losses.name(where, "primvars of its copies are not carried: all look alike")
         parts = {}
         for at, (index, place) in enumerate(zip(indices, places)):
             if mask and not mask[at]:
@@ -133,10 +136,17 @@ class Scene:
         material = self._materials.bound(prim)
         subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
         parts = [(s, self._materials.bound(s.GetPrim()) or material) for s in subsets]
-        key = (source.GetPath(), material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts))
+        key = (source.GetPath(), material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts),
+               self._inherited(prim) if prim.IsInstanceProxy() else ())
         if key not in self._meshes:
             self._meshes[key] = self._made(prim, material, parts)
         return self._meshes[key]
+
+    def _inherited(self, prim):
+        """Primvars that an instance gives its meshes from outside: their names and values."""
+        found = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
+        outside = [primvar for primvar in found if not primvar.GetAttr().GetPrim().IsInstanceProxy()]
+        return tuple((primvar.GetName(), str(primvar.Get(self._stage.time))) for primvar in outside)
 
     def _made(self, prim, material, parts):
         stage, where, holes = self._stage, prim.GetPath(), ()
@@ -210,8 +220,8 @@ class Scene:
         for at, name in enumerate(worn.sets):
             found = meshes.primvar(prim, name, stage)
             if found is None:
-                stage.losses.name(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they are "
-                                  "one colour on it")
+                stage.losses.name(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they "
+                                  "are one colour on it")
                 found = numpy.zeros((1, 2)), UsdGeom.Tokens.constant
             values = faces.spread(*found, name)[:, :2] * (1, -1) + (0, 1)
             names.append(f"TEXCOORD_{at}")

@@ -60,6 +60,12 @@ class Stage:
             return
         self.stage.SetEditTarget(self.stage.GetSessionLayer())
         moment = 0.0 if self.time.IsEarliestTime() else self.time.GetValue()
+        # What is baked is what has a sample at the moment.
+        for prim in Usd.PrimRange(self.stage.GetPseudoRoot()):
+            for attribute in prim.GetAttributes() if prim.IsA(UsdSkel.Animation) else ():
+                value = attribute.Get(self.time)
+                if attribute.ValueMightBeTimeVarying() and value is not None:
+                    attribute.Set(value, moment)
         for prim in roots:
             if prim.IsInstanceProxy():
                 self.losses.name(prim.GetPath(), "the skeleton of an instance is not carried: it stands as it is bound")

@@ -221,7 +221,7 @@ def _resized(values, shape):
 
 
 def _transform(scale, degrees, translation):
-    """KHR_texture_transform of a UsdTransform2d: v = 1 - t turns its picture upside down, and its turn the other way."""
+    """KHR_texture_transform of a UsdTransform2d: with v = 1 - t its matrix is mirrored."""
     turn = math.radians(degrees)
     offset = [translation[0] - math.sin(turn) * scale[1], 1 - math.cos(turn) * scale[1] - translation[1]]
     said = {}

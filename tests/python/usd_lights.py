@@ -23,8 +23,8 @@ class Irradiance(usd_support.Stages):
         """Irradiance of the middle, 3 numbers, and its standard error."""
         self.floor(ALBEDO)
         self.camera((1.5, 0.6, 0))
-        picture = self.render("--width", SIZE, "--height", SIZE, "--iterations", 256, "--method", "path", "--no-combine",
-                              *options).reshape(-1, 3)
+        picture = self.render("--width", SIZE, "--height", SIZE, "--iterations", 256, "--method", "path",
+                              "--no-combine", *options).reshape(-1, 3)
         scale = math.pi / ALBEDO
         return picture.mean(0) * scale, picture.std(0) * scale / math.sqrt(len(picture))
 
@@ -177,7 +177,8 @@ class Dome(usd_support.Stages):
         z_up = UsdGeom.GetStageUpAxis(self.stage) == "Z"
         found = []
         for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)):
-            up = next(u for u in ((0, 0, 1) if z_up else (0, 1, 0), (1, 0, 0)) if not any(a * b for a, b in zip(u, axis)))
+            up = (0, 0, 1) if z_up else (0, 1, 0)
+            up = (1, 0, 0) if any(a * b for a, b in zip(up, axis)) else up
             self.camera((0, 0, 0), axis, width=0.1, up=up)
             picture = self.render("--width", 2, "--height", 2, "--iterations", 1, "--method", "path", "--no-combine")
             found.append([round(float(c), 3) for c in picture.mean((0, 1))])

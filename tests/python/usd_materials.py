@@ -111,7 +111,8 @@ class Materials(usd_support.Stages):
         self.closed.GetPrim().CreateAttribute("caustique:visible:camera", Sdf.ValueTypeNames.Bool).Set(False)
         self.bind(self.closed, material)
         document, _, _ = self.convert()
-        self.assertEqual(document["materials"][0]["extras"]["caustique"], {"priority": 3, "medium": {"sigma_a": [1, 2, 3]}})
+        self.assertEqual(document["materials"][0]["extras"]["caustique"],
+                         {"priority": 3, "medium": {"sigma_a": [1, 2, 3]}})
         self.assertEqual(document["nodes"][0]["extras"]["caustique"], {"visible": {"camera": False}})
 
     def test_what_is_bound_is_not_there(self):
@@ -230,7 +231,8 @@ class Textures(usd_support.Stages):
         for s, t in ((0, 0), (1, 0), (0, 1), (0.3, 0.8)):
             u, v = matrix @ (s, 1 - t) + made["offset"]
             a = math.radians(30)
-            ours = (math.cos(a) * 0.5 * s - math.sin(a) * 2 * t + 0.1, math.sin(a) * 0.5 * s + math.cos(a) * 2 * t + 0.2)
+            ours = (math.cos(a) * 0.5 * s - math.sin(a) * 2 * t + 0.1,
+                    math.sin(a) * 0.5 * s + math.cos(a) * 2 * t + 0.2)
             numpy.testing.assert_allclose((u, 1 - v), ours, atol=1e-6)
 
     def test_displaycolor_by_a_primvar_reader(self):

@@ -4,11 +4,11 @@ import math
 import unittest
 
 import numpy
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 import usd_support
 from faults import Fault
-from usd_support import corners, values
+from usd_support import corners
 
 # Two squares beside each other, of points 0 to 5.
 POINTS = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)]
@@ -29,7 +29,8 @@ class Meshes(usd_support.Stages):
         return found["POSITION"], found["COLOR_0"][:, 0] * 16, found["COLOR_0"]
 
     def test_every_interpolation(self):
-        for interpolation, count in (("constant", 1), ("uniform", 2), ("vertex", 6), ("varying", 6), ("faceVarying", 8)):
+        counts = {"constant": 1, "uniform": 2, "vertex": 6, "varying": 6, "faceVarying": 8}
+        for interpolation, count in counts.items():
             with self.subTest(interpolation):
                 place, value, colour = self.colours(interpolation, count)
                 right = place.reshape(-1, 3, 3).mean(1)[:, 0] > 1
@@ -77,15 +78,18 @@ class Meshes(usd_support.Stages):
         # An arrow head, and a star of five: fans from their first corners would leave them.
         arrow = [(0, 0, 0), (2, -1, 0), (0.5, 0, 0), (2, 1, 0)]
         turns = [math.pi * k / 5 for k in range(10)]
-        star = [((1 if k % 2 else 0.4) * math.cos(t), 0, (1 if k % 2 else 0.4) * math.sin(t)) for k, t in enumerate(turns)]
+        reach = (0.4, 1)
+        star = [(reach[k % 2] * math.cos(t), 0, reach[k % 2] * math.sin(t)) for k, t in enumerate(turns)]
         self.mesh("/Arrow", arrow[1:] + arrow[:1], [4], range(4))
         self.mesh("/Star", star, [10], range(10))
         document, buffer, _ = self.convert()
+
         def area(mesh):
             at = corners(document, buffer, mesh)["POSITION"].reshape(-1, 3, 3)
             crosses = numpy.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
             self.assertTrue((crosses @ crosses.sum(0) > 0).all())
             return numpy.linalg.norm(crosses, axis=1).sum() / 2
+
         whole = [{m["name"]: i for i, m in enumerate(document["meshes"])}[n] for n in ("/Squares", "/Arrow", "/Star")]
         truth = (1, 0.5, 5 * 0.4 * math.sin(math.pi / 5))
         numpy.testing.assert_allclose([area(m) for m in whole], truth, rtol=1e-5)
@@ -186,6 +190,21 @@ class Places(usd_support.Stages):
         self.assertEqual(len(document["meshes"]), 1)
         self.assertEqual([found[f"/Copy{at}/Squares"][3, 0] for at in range(3)], [0, 1, 2])
 
+    def test_instances_of_other_colours_do_not_share(self):
+        self.stage.CreateClassPrim("/Kind")
+        self.mesh("/Kind/Squares", POINTS, COUNTS, INDICES)
+        for at in range(3):
+            copy = self.stage.DefinePrim(f"/Copy{at}", "Xform")
+            copy.GetReferences().AddInternalReference("/Kind")
+            copy.SetInstanceable(True)
+            colour = UsdGeom.PrimvarsAPI(copy).CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray)
+            colour.Set(Vt.Vec3fArray([Gf.Vec3f(float(at > 0), 0, 0)]))
+        document, buffer, _ = self.convert()
+        self.assertEqual(len(document["meshes"]), 2)
+        for node in document["nodes"]:
+            red = corners(document, buffer, node["mesh"])["COLOR_0"][0, 0]
+            self.assertEqual(red, float(node["name"] != "/Copy0/Squares"))
+
     def test_a_point_instancer(self):
         instancer = UsdGeom.PointInstancer.Define(self.stage, "/Many")
         for name in ("A", "B"):
@@ -253,6 +272,32 @@ class Places(usd_support.Stages):
         self.assertEqual(found, {})
         said = document["scenes"][0]["extras"]["caustique"]
         self.assertEqual((said["frame"], said["frame_rate"]), (3, [24, 1]))
+
+
+class Skins(usd_support.Stages):
+    def test_a_joint_moves_its_mesh(self):
+        root = UsdSkel.Root.Define(self.stage, "/Root")
+        skeleton = UsdSkel.Skeleton.Define(self.stage, "/Root/Skeleton")
+        animation = UsdSkel.Animation.Define(self.stage, "/Root/Animation")
+        still = Vt.Matrix4dArray([Gf.Matrix4d(1)] * 2)
+        skeleton.CreateJointsAttr(["A", "B"])
+        skeleton.CreateBindTransformsAttr(still)
+        skeleton.CreateRestTransformsAttr(still)
+        animation.CreateJointsAttr(["A", "B"])
+        for frame, height in ((1, 0), (3, 4)):
+            animation.CreateTranslationsAttr().Set(Vt.Vec3fArray([Gf.Vec3f(0), Gf.Vec3f(0, 0, height)]), frame)
+        animation.CreateRotationsAttr([Gf.Quatf(1)] * 2)
+        animation.CreateScalesAttr([Gf.Vec3h(1)] * 2)
+        UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(["/Root/Animation"])
+        mesh = self.mesh("/Root/Mesh", POINTS, COUNTS, INDICES)
+        binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+        binding.CreateSkeletonRel().SetTargets(["/Root/Skeleton"])
+        binding.CreateJointIndicesPrimvar(False, 1).Set([0, 0, 0, 1, 1, 1])
+        binding.CreateJointWeightsPrimvar(False, 1).Set([1.0] * 6)
+        self.assertTrue(root)
+        for frame, height in ((1, 0), (2, 2), (3, 4)):
+            at = corners(*self.convert(frame=frame)[:2])["POSITION"]
+            numpy.testing.assert_allclose(at[:, 2], height * at[:, 1], atol=1e-6)
 
 
 class Cameras(usd_support.Stages):
@@ -365,7 +410,8 @@ class Bad(usd_support.Stages):
         for kind in ("BasisCurves", "Points", "NurbsPatch", "Volume"):
             self.stage.DefinePrim("/" + kind, kind)
         _, _, lost = self.convert()
-        self.assertEqual(sorted(line.split(":")[0] for line in lost), ["/BasisCurves", "/NurbsPatch", "/Points", "/Volume"])
+        named = sorted(line.split(":")[0] for line in lost)
+        self.assertEqual(named, ["/BasisCurves", "/NurbsPatch", "/Points", "/Volume"])
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import sys
 import unittest
 
 import numpy
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender, UsdUtils, UsdValidation
 
 import support
 import usd_support
@@ -79,7 +79,7 @@ def RenderVar "Var" {
         shown = support.run(["info", self.out], check=0).stdout
         self.assertIn("12 x 6 pixels, 1 layers", shown)
         normals = usd_support.OpenEXR.File(str(self.out), separate_channels=True).channels()
-        self.assertAlmostEqual(float(normals["normal.Y"].pixels.mean()), 1, places=4)
+        self.assertAlmostEqual(float(normals["normal.Y"].pixels.max()), 1, places=4)
         self.run_on("render", "-o", self.out, "--progress", "none", "--layers", "beauty", "--width", 4, "--height", 4)
         self.assertIn("4 x 4 pixels", support.run(["info", self.out], check=0).stdout)
         self.save('def RenderSettings "Other" {\n custom int caustique:iterationz = 1\n}\n')
@@ -135,10 +135,8 @@ class Layer(usd_support.Stages):
         self.stage.GetRootLayer().Save()
         out, path = self.dir / 'a "quoted" name.exr', self.dir / "layer.usda"
         support.run(["render", self.path, "-o", out, "--usd-layer", path, *QUICK], check=0)
-        checker = UsdUtils.ComplianceChecker(arkit=False, skipARKitRootLayerCheck=True)
-        checker.CheckCompliance(str(path))
-        self.assertEqual((checker.GetErrors(), checker.GetFailedChecks()), ([], []))
         stage = Usd.Stage.Open(str(path))
+        self.assertEqual(_faults(stage), [])
         settings = UsdRender.Settings.GetStageRenderSettings(stage)
         product = UsdRender.Product.Get(stage, settings.GetProductsRel().GetTargets()[0])
         self.assertEqual(product.GetProductNameAttr().Get(), f"./{out.name}")
@@ -147,7 +145,11 @@ class Layer(usd_support.Stages):
                  for target in product.GetOrderedVarsRel().GetTargets()}
         channels = usd_support.OpenEXR.File(str(out), separate_channels=True).channels()
         self.assertEqual(names, {name.rpartition(".")[0] or "beauty" for name in channels})
-        self.assertIsInstance(stage.GetRootLayer(), Sdf.Layer)
+
+    def test_the_checker_finds_what_is_wrong(self):
+        path = self.dir / "bare.usda"
+        Sdf.Layer.CreateNew(str(path)).Save()
+        self.assertNotEqual(_faults(Usd.Stage.Open(str(path))), [])
 
     def test_it_needs_a_name_of_its_kind_and_a_file_to_tell_of(self):
         self.stage.GetRootLayer().Save()
@@ -155,6 +157,12 @@ class Layer(usd_support.Stages):
         self.assertIn("does not end in .usda", done.stderr)
         done = support.run(["render", self.path, "-o", "-", "--usd-layer", self.dir / "o.usda"], check=2)
         self.assertIn("--usd-layer", done.stderr)
+
+
+def _faults(stage):
+    """What usdchecker says of a stage: it runs all validators of USD."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    return [error.GetErrorAsString() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-//! Stages of USD (`.usd`, `.usda`, `.usdc`, `.usdz`), read by way of a .glb: a converter in Python (`scripts/usd`, which
-//! is part of the program) lets Pixar's own library compose the stage, and [`gltf`] reads what it writes, so that a
+//! Stages of USD (`.usd`, `.usda`, `.usdc`, `.usdz`), read by way of a .glb: a converter in Python (`scripts/usd`,
+//! which is part of the program) lets Pixar's own library compose the stage, and [`gltf`] reads what it writes, so that a
 //! scene means the same through either door.
 
 mod python;
