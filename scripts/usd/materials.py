@@ -83,6 +83,8 @@ class Materials:
         if kind in (materialx.OPEN_PBR, materialx.STANDARD):
             return materialx.surface(mtlx, self._reader, losses)
         plain = material.ComputeSurfaceSource()[0]
+        if kind and plain and plain.GetPath() != mtlx.GetPath():
+            losses.name(where, f"a surface {kind} is not read: its {plain.GetIdAttr().Get()} takes its place")
         id_ = plain.GetIdAttr().Get() if plain else None
         if id_ in ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader"):
             return preview.surface(plain, self._reader, losses)

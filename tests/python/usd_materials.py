@@ -103,6 +103,16 @@ class Materials(usd_support.Stages):
         self.assertIn("a surface ND_disney_principled is not read", lost[0])
         self.assertIn("/Material", lost[0])
 
+    def test_a_network_that_is_not_read_leaves_the_preview(self):
+        material = self.material(roughness=0.25)
+        other = UsdShade.Shader.Define(self.stage, "/Material/Other")
+        other.CreateIdAttr("ND_surface")
+        material.CreateSurfaceOutput("mtlx").ConnectToSource(other.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+        self.bind(self.closed, material)
+        document, _, lost = self.convert()
+        self.assertEqual(document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 0.25)
+        self.assertEqual(lost, ["/Material: a surface ND_surface is not read: its UsdPreviewSurface takes its place"])
+
     def test_keys_of_caustique(self):
         material = self.material(opacity=0.0)
         prim = material.GetPrim()
