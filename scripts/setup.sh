@@ -5,7 +5,8 @@
 #                              Open Image Denoise, where it can be had
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
 #   scripts/setup.sh wheel     render, and what builds and tests our own Python package in .venv-python
-#   scripts/setup.sh test      python and wheel, and Blender as a Python module in .venv-bpy
+#   scripts/setup.sh usd       render, and what reads stages of USD in .venv-usd
+#   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy
 #
 # Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
 # CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
@@ -245,9 +246,12 @@ need_bpy() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|wheel|test
+# setup render|python|wheel|usd|test
 setup() {
-    case $1 in render | python | wheel | test) ;; *) fail "unknown mode '$1'" "one of: render python wheel test" ;; esac
+    case $1 in
+    render | python | wheel | usd | test) ;;
+    *) fail "unknown mode '$1'" "one of: render python wheel usd test" ;;
+    esac
     need_rust
     need_linker
     need_python
@@ -257,8 +261,10 @@ setup() {
     say "Embree: $EMBREE; ONNX Runtime: $ONNXRUNTIME; Open Image Denoise: $OIDN"
     [ "$1" != render ] || return 0
     need_venv_module
-    [ "$1" = python ] || need_venv .venv-python "$PYTHON" requirements-python.txt
+    case $1 in wheel | test) need_venv .venv-python "$PYTHON" requirements-python.txt ;; esac
     [ "$1" != wheel ] || return 0
+    case $1 in usd | test) need_venv .venv-usd "$PYTHON" requirements-usd.txt ;; esac
+    [ "$1" != usd ] || return 0
     need_venv .venv "$PYTHON" requirements-test.txt
     [ "$1" != python ] || return 0
     need_bpy

@@ -88,4 +88,5 @@ tests 'cargo test' cargo test --release --workspace --no-fail-fast
 tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
 part 'Python wheel' scripts/python.sh
 tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning -m unittest discover -s tests/python/package
+tests 'Python with USD' .venv-usd/bin/python -m unittest discover -s tests/python -p 'usd_*.py'
 tests 'Python with Blender' .venv-bpy/bin/python -m unittest discover -s tests/python -p 'blender_*.py'

@@ -1,13 +1,14 @@
-//! `caustique doctor`: the libraries that are loaded when the program runs.
+//! `caustique doctor`: the libraries that are loaded when the program runs, and the Python that reads USD.
 
 use super::{print, print_json};
 use caustique::error::{Error, Kind, Result};
+use caustique::scene::usd::Interpreter;
 use caustique_embree as embree;
 use caustique_oidn as oidn;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Say which Embree, ONNX Runtime and Open Image Denoise are found, where, which versions, and what to install if not
+/// Say which Embree, ONNX Runtime, Open Image Denoise and USD are found, where, which versions, and what to install if not
 #[derive(clap::Args)]
 pub struct DoctorArgs {
     /// Print one JSON object
@@ -20,12 +21,14 @@ struct Finding {
     name: &'static str,
     key: &'static str,
     needed_for: &'static str,
+    /// Scenes in glTF do without.
+    optional: bool,
     found: std::result::Result<(String, String), (String, Option<String>)>,
 }
 
 /// Looks for the libraries and reports; an error if one is missing.
 pub fn run(args: &DoctorArgs) -> Result<()> {
-    let findings = [embree(), onnxruntime(), oidn()];
+    let findings = [embree(), onnxruntime(), oidn(), usd()];
     if args.json {
         let mut object = serde_json::Map::new();
         object.insert("version".into(), env!("CARGO_PKG_VERSION").into());
@@ -37,7 +40,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
         let lines: String = findings.iter().map(Finding::text).collect();
         print(&format!("caustique {}\n{lines}", env!("CARGO_PKG_VERSION")))?;
     }
-    let missing: Vec<&Finding> = findings.iter().filter(|f| f.found.is_err()).collect();
+    let missing: Vec<&Finding> = findings.iter().filter(|f| f.found.is_err() && !f.optional).collect();
     match missing.first() {
         None => Ok(()),
         Some(first) => {
@@ -54,7 +57,7 @@ fn embree() -> Finding {
         Ok(library) => Ok((library.version().to_string(), show(library.path()))),
         Err(error) => Err((error.to_string(), error.hint())),
     };
-    Finding { name: "Embree", key: "embree", needed_for: "render", found }
+    Finding { name: "Embree", key: "embree", needed_for: "render", optional: false, found }
 }
 
 fn onnxruntime() -> Finding {
@@ -62,7 +65,7 @@ fn onnxruntime() -> Finding {
         Ok(runtime) => Ok((runtime.version().unwrap_or("1.17 or later").to_string(), show(runtime.path()))),
         Err(error) => Err((error.to_string(), error.hint)),
     };
-    Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", found }
+    Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", optional: false, found }
 }
 
 fn oidn() -> Finding {
@@ -70,7 +73,13 @@ fn oidn() -> Finding {
         Ok(library) => Ok((library.version().to_string(), show(library.path()))),
         Err(error) => Err((error.to_string(), error.hint())),
     };
-    Finding { name: "Open Image Denoise", key: "oidn", needed_for: "denoise", found }
+    Finding { name: "Open Image Denoise", key: "oidn", needed_for: "denoise", optional: false, found }
+}
+
+fn usd() -> Finding {
+    let found = Interpreter::find().and_then(|python| Ok((python.version()?, show(python.path()))));
+    let found = found.map_err(|error| (error.to_string(), error.hint));
+    Finding { name: "USD", key: "usd", needed_for: "read .usd files", optional: true, found }
 }
 
 fn show(path: &Path) -> String {

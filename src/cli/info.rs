@@ -19,7 +19,7 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Say what a scene or an EXR holds
 #[derive(clap::Args)]
 pub struct InfoArgs {
-    /// Scene (.glb, .gltf) or EXR
+    /// Scene (.glb, .gltf, .usd, .usda, .usdc, .usdz) or EXR
     file: PathBuf,
     /// Let a scene name files (buffers, textures, its environment) outside its own folder
     #[arg(long)]

@@ -18,6 +18,7 @@ mod render;
 mod scene;
 mod shell;
 mod signals;
+mod stage;
 mod usage;
 
 use caustique::error::{Error, Kind, Result};
@@ -54,7 +55,7 @@ enum Command {
     Converge(Box<converge::ConvergeArgs>),
     /// Say what a scene or an EXR holds
     Info(info::InfoArgs),
-    /// Say which Embree, ONNX Runtime and Open Image Denoise are found, and what to install if not
+    /// Say which Embree, ONNX Runtime, Open Image Denoise and USD are found, and what to install if not
     Doctor(doctor::DoctorArgs),
     /// Print what completes commands and options in a shell
     Completions(shell::CompletionsArgs),
@@ -95,7 +96,11 @@ pub fn main() -> ExitCode {
             }
         },
     };
-    let result = match cli.command {
+    let command = match stage::defaults(cli.command, &mut line) {
+        Ok(command) => command,
+        Err(error) => return fail(&error),
+    };
+    let result = match command {
         Command::Render(args) => render::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Combine(args) => combine::run(&args),

@@ -3,6 +3,7 @@
 use super::number::threads;
 use super::progress::{Form, percent};
 use super::render::{Job, Method};
+use super::scene::SceneArgs;
 use super::{print, print_json, scene};
 use caustique::error::Result;
 use caustique::pipeline::{Loaded, check, plan};
@@ -27,6 +28,13 @@ pub struct PlanArgs {
     /// Print one JSON object
     #[arg(long, help_heading = "Running")]
     json: bool,
+}
+
+impl PlanArgs {
+    /// The scene that is looked at.
+    pub fn scene(&self) -> &SceneArgs {
+        &self.job.scene
+    }
 }
 
 /// Plans without rendering.

@@ -19,7 +19,7 @@ use std::str::FromStr;
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Light and glass")]
 pub struct SceneArgs {
-    /// Scene: .glb or .gltf, as Blender exports it
+    /// Scene: .glb or .gltf, as Blender exports it, or a stage of USD (.usd, .usda, .usdc, .usdz)
     #[arg(value_name = "SCENE", help_heading = None::<&str>)]
     #[serde(rename = "scene")]
     pub path: PathBuf,

@@ -7,5 +7,6 @@ pub mod heat;
 pub mod metrics;
 pub mod png;
 pub mod tonemap;
+pub mod usd_layer;
 
 pub use metrics::{Comparison, Errors, Floor, compare, compare_above, errors, relative_squared_error};

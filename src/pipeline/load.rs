@@ -6,7 +6,7 @@ use crate::memory;
 use crate::plan::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
-use crate::scene::{Scene, environment_file, gltf};
+use crate::scene::{Scene, environment_file, gltf, usd};
 use std::path::PathBuf;
 
 /// Room for Embree's library, and for each of its threads: it ends the process where they get none. A bound found by
@@ -54,7 +54,8 @@ pub struct Loaded {
 /// The file or what it names, by place; an environment that is changed and is not there.
 pub fn load(order: &Order, threads: usize) -> Result<Loaded> {
     check_memory(order, threads)?;
-    build(gltf::read(&order.path, &order.options)?, order, threads)
+    let read = if usd::is_stage(&order.path) { usd::read } else { gltf::read };
+    build(read(&order.path, &order.options)?, order, threads)
 }
 
 /// Like [`load`], from the bytes of a file that would stand at the order's path.

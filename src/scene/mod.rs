@@ -9,6 +9,7 @@ mod folder;
 pub mod gltf;
 mod nesting;
 mod survey;
+pub mod usd;
 mod view;
 
 pub use contacts::Contacts;

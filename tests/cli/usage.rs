@@ -323,6 +323,7 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
         "--kernel",
         "--cppm-plus",
         "--exr-naming",
+        "--usd-layer",
         "--target-error",
         "--strict",
         "--effects",
@@ -461,16 +462,19 @@ fn missing_libraries() {
     }
     let well = folder.run("doctor");
     assert_eq!((well.code, well.stderr.as_str()), (Some(0), ""));
-    let names = ["caustique ", "Embree ", "ONNX Runtime ", "Open Image Denoise "];
+    // Whether USD is found does not matter to the exit code.
+    let names = ["caustique ", "Embree ", "ONNX Runtime ", "Open Image Denoise ", "USD "];
     let lines: Vec<&str> = well.stdout.lines().collect();
-    assert!(lines.len() == 4 && lines.iter().zip(names).all(|(line, name)| line.starts_with(name)), "{lines:?}");
+    assert!(lines.len() >= 5 && lines.iter().zip(names).all(|(line, name)| line.starts_with(name)), "{lines:?}");
     let unwell = missing("CAUSTIQUE_OIDN", "doctor");
     let indent = " ".repeat(18);
     let text = format!(
         "Open Image Denoise not usable, needed to denoise: CAUSTIQUE_OIDN=/no/such/library.so: no such file\n\
          {indent} run scripts/setup.sh, or set CAUSTIQUE_OIDN to libOpenImageDenoise.so\n"
     );
-    assert!(unwell.stdout.ends_with(&text), "{}", unwell.stdout);
+    assert!(unwell.stdout.contains(&text), "{}", unwell.stdout);
+    let without = missing("CAUSTIQUE_USD_PYTHON", "doctor --json");
+    assert_eq!((without.code, &without.json()["usd"]["found"]), (Some(0), &serde_json::json!(false)));
 }
 
 /// Methods that gather photons on surfaces alone, or those of caustics alone, would show no light that media scatter,

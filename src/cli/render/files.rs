@@ -1,10 +1,12 @@
-//! The EXR of a render: to its file, or to standard output, and if neither takes it among the temporary files.
+//! The EXR of a render: to its file, or to standard output, and if neither takes it among the temporary files; and the
+//! layer of USD that tells of it.
 
 use super::options::RenderArgs;
 use crate::cli::{output, print_file};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
 use caustique::image::exr::{self, Attributes};
+use caustique::image::usd_layer;
 use caustique::pipeline::shard::Tail;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -31,6 +33,27 @@ pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: O
         Ok(kept) => kept.told(error),
         Err(_) => error,
     })
+}
+
+/// Checks that the layer of USD can be written, and has a file to tell of.
+///
+/// # Errors
+/// See [`output::check`]; the EXR goes to standard output.
+pub fn check_usd_layer(args: &RenderArgs) -> Result<()> {
+    let Some(path) = &args.usd_layer else { return Ok(()) };
+    if output::is_stdout(&args.output) {
+        let error = Error::new(Kind::Usage, "command line", "--usd-layer: the EXR is no file that it could point to");
+        return Err(error.hint("give -o a file, or leave --usd-layer out"));
+    }
+    output::check(path, "usda")
+}
+
+/// Writes the layer of USD, if one is asked for.
+///
+/// # Errors
+/// It could not be written.
+pub fn write_usd_layer(args: &RenderArgs, set: &LayerSet) -> Result<()> {
+    args.usd_layer.as_ref().map_or(Ok(()), |path| usd_layer::write(path, &args.output, set))
 }
 
 /// The EXR among the temporary files, in a folder of its own: a file of that name may be there.

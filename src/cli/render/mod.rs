@@ -53,6 +53,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     layers::selection(&args.layers, &shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
     output::check_render(&args.output)?;
     args.picture.check()?;
+    files::check_usd_layer(args)?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
     techniques::prepare(args)?;
@@ -192,6 +193,7 @@ impl Telling<'_> {
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
         let written = files::write(args, &set, &attributes, tail.as_ref());
+        let described = files::write_usd_layer(args, &set);
         let pictured = args.picture.write_png(&set, &made_for);
         let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
         if let Some(mut preview) = preview {
@@ -206,6 +208,7 @@ impl Telling<'_> {
         summary.tell_full();
         summary.tell_rejected(&args.output);
         written?;
+        described?;
         pictured?;
         debugged?;
         if talk {

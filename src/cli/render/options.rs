@@ -49,6 +49,10 @@ pub struct RenderArgs {
     #[command(flatten)]
     #[serde(flatten)]
     pub picture: PictureArgs,
+    /// Also write a layer of USD: a RenderProduct that points to the EXR, and a RenderVar for each of its layers
+    #[arg(long, value_name = "OUT.usda", help_heading = "Output")]
+    #[serde(skip)]
+    pub usd_layer: Option<PathBuf>,
 
     /// Show the picture while it renders, denoised: a file that is rewritten every few seconds (.png: under --exposure
     /// and --tonemap; .exr: linear light and alpha), or 'tev', that viewer on this machine
@@ -120,6 +124,7 @@ impl RenderArgs {
             output: named(&self.output),
             job: Job { scene: self.job.scene.at(frame), ..self.job.clone() },
             picture: PictureArgs { png: self.picture.png.as_ref().map(named), ..self.picture.clone() },
+            usd_layer: self.usd_layer.as_ref().map(named),
             checkpoint: self.checkpoint.as_ref().map(named),
             resume: self.resume.as_ref().map(named),
             debug_techniques: self.debug_techniques.as_ref().map(named),
@@ -132,6 +137,7 @@ impl RenderArgs {
         let files = [
             ("--output", Some(&self.output)),
             ("--png", self.picture.png.as_ref()),
+            ("--usd-layer", self.usd_layer.as_ref()),
             ("--checkpoint", self.checkpoint.as_ref()),
             ("--resume", self.resume.as_ref()),
             ("--debug-techniques", self.debug_techniques.as_ref()),

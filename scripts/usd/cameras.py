@@ -1,0 +1,67 @@
+"""Cameras: lens, frame and focus (UsdGeomCamera), fitted to the shape of the picture as UsdRender asks."""
+
+import math
+
+from pxr import UsdGeom
+
+from faults import Fault
+from stage import said
+
+
+def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True):
+    """What a glTF node says to be this camera; `aspect`: width by height of the picture, if it is known."""
+    camera, where, get = UsdGeom.Camera(prim), prim.GetPath(), stage.get
+    # Tenths of the stage's unit.
+    width, height = (float(get(a)) for a in (camera.GetHorizontalApertureAttr(), camera.GetVerticalApertureAttr()))
+    focal = float(get(camera.GetFocalLengthAttr()))
+    if not all(math.isfinite(x) and x > 0 for x in (width, height, focal)):
+        raise Fault(where, f"its apertures are {width:g} and {height:g}, its focal length {focal:g}",
+                    "they have to be above zero")
+    offsets = [float(get(a, 0.0)) for a in (camera.GetHorizontalApertureOffsetAttr(),
+                                            camera.GetVerticalApertureOffsetAttr())]
+    if aspect is not None:
+        width, height = _fitted(width, height, aspect, policy)
+    if aspect is None:
+        aspect = width / height
+    unit = stage.metres / 10
+    if get(camera.GetProjectionAttr()) == UsdGeom.Tokens.orthographic:
+        entry = {"type": "orthographic", "orthographic": {"xmag": width * unit / 2, "ymag": height * unit / 2,
+                                                          "znear": 0.0, "zfar": 1e6}}
+    else:
+        entry = {"type": "perspective", "perspective": {"yfov": 2 * math.atan(height / (2 * focal)),
+                                                        "aspectRatio": width / height, "znear": 1e-3}}
+    keys = {}
+    if any(offsets):
+        keys["shift"] = [offsets[0] / width, offsets[1] / height]
+    stop, focus = get(camera.GetFStopAttr(), 0.0), get(camera.GetFocusDistanceAttr(), 0.0)
+    if stop > 0 and focus > 0 and lens:
+        keys.update(aperture_radius=focal * unit / (2 * stop), focus_distance=focus * stage.metres)
+    elif stop > 0 and lens:
+        stage.losses.name(where, "it has an fStop and no focusDistance: everything is sharp")
+    if get(camera.GetClippingPlanesAttr()):
+        stage.losses.name(where, "clippingPlanes are not carried: nothing is cut away")
+    if get(camera.GetShutterCloseAttr(), 0.0) > get(camera.GetShutterOpenAttr(), 0.0):
+        stage.losses.name(where, "motion blur is not carried: everything stands still")
+    role = get(camera.GetStereoRoleAttr())
+    if role in ("left", "right"):
+        stage.losses.name(where, f"it is the {role} one of a pair, of which each is rendered by itself")
+    keys.update(said(prim, stage))
+    if keys:
+        entry["extras"] = {"caustique": keys}
+    return {"camera": document.add("cameras", {"name": str(where), **entry})}
+
+
+def _fitted(width, height, aspect, policy):
+    """The aperture for a picture of another shape (UsdRenderSettingsBase, aspectRatioConformPolicy)."""
+    wide = aspect > width / height
+    by_width = {"adjustApertureWidth": True, "expandAperture": wide, "cropAperture": not wide}
+    if by_width.get(policy, False):
+        return height * aspect, height
+    return width, width / aspect
+
+
+def exposure(prim, stage):
+    """Stops by which a camera brightens its picture."""
+    camera = UsdGeom.Camera(prim)
+    scale = camera.ComputeLinearExposureScale(stage.time)
+    return math.log2(scale) if scale > 0 and scale != 1 else 0.0

@@ -1,0 +1,71 @@
+"""Turn a stage of USD (.usd, .usda, .usdc, .usdz) into a .glb that caustique renders.
+
+    python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]
+    python3 scripts/usd/convert.py STAGE --arguments     the options of `render` that its RenderSettings stand for
+
+It needs `usd-core`, which composes the stage, and what else scripts/requirements-usd.txt lists. `caustique render
+STAGE` runs it by itself. What glTF cannot say stands in `extras.caustique` (docs/scene-format.md); an environment image
+lies beside OUT.glb. Whatever is ignored or approximated is named in the file's `losses`. An error is a line of JSON on
+stderr, {"prim": where, "fault": what, "hint": remedy or null}, and exit code 1.
+"""
+
+import argparse
+import json
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+from faults import Fault  # noqa: E402, from this folder
+
+
+def write(path, out, frame=None, allow_outside=False):
+    """Converts the stage at `path` at a time code to the .glb `out`; what is lost, texts."""
+    from scene import Scene
+    from stage import Stage
+    stage = Stage(path, frame, allow_outside)
+    scene = Scene(stage, os.path.dirname(os.path.abspath(out)))
+    scene.fill()
+    scene.document.write(out)
+    return stage.losses.lines
+
+
+def arguments(path, allow_outside=False):
+    """Options of `caustique render` by the RenderSettings of the stage at `path`, texts."""
+    from render_settings import Settings
+    from stage import Stage
+    return Settings(Stage(path, None, allow_outside)).arguments()
+
+
+def main(given):
+    """Command line; the exit code."""
+    parser = argparse.ArgumentParser(prog="convert.py")
+    parser.add_argument("stage", help=".usd, .usda, .usdc or .usdz")
+    parser.add_argument("-o", "--output", metavar="OUT.glb")
+    parser.add_argument("--arguments", action="store_true", help="print options of caustique render as JSON")
+    parser.add_argument("--frame", type=float, metavar="N", help="time code [default: the stage's first]")
+    parser.add_argument("--allow-outside", action="store_true",
+                        help="let the stage name files outside its own folder")
+    given = parser.parse_args(given)
+    if given.arguments == bool(given.output):
+        parser.error("give either -o OUT.glb or --arguments")
+    try:
+        if given.arguments:
+            print(json.dumps(arguments(given.stage, given.allow_outside)))
+        else:
+            write(given.stage, given.output, given.frame, given.allow_outside)
+        return 0
+    except Fault as fault:
+        where, what, hint = fault.where, fault.fault, fault.hint
+    except ImportError as error:
+        where, what = "", f"{sys.executable} lacks a module: {error}"
+        hint = ("run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip install usd-core "
+                "numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
+    except Exception as error:  # whatever USD raises about stages that come from anywhere
+        where, what, hint = "", f"USD says: {' '.join(str(error).split()) or type(error).__name__}", None
+    print(json.dumps({"prim": where, "fault": what, "hint": hint}), file=sys.stderr)
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,240 @@
+"""UsdLux: what a light emits, by the reference implementation of OpenUSD (hdEmbree), in terms of glTF.
+
+The radiance of a light is color * intensity * 2^exposure, times the colour of its temperature, and with `normalize`
+over its area in units of the stage (a distant light: over pi sin^2 of half its angle). One nit is taken for one
+W/(sr m2), of lights, domes and glowing surfaces alike.
+"""
+
+import math
+
+import numpy
+from pxr import Gf, UsdLux
+
+import shapes
+from faults import Fault
+from materials import glow
+from stage import said
+
+_SIDES = 64
+
+
+class Light:
+    """What all kinds of light have in common."""
+
+    def __init__(self, prim, stage):
+        self.prim, self.stage, self.api = prim, stage, UsdLux.LightAPI(prim)
+        self.where = prim.GetPath()
+        for name, what in (("diffuse", 1.0), ("specular", 1.0)):
+            if self.get(name, 1.0) != what:
+                self.lose(f"inputs:{name} is not carried: it lights all lobes alike")
+        shadow = stage.get(UsdLux.ShadowAPI(prim).GetShadowEnableAttr(), True)
+        if not shadow:
+            self.lose("inputs:shadow:enable = false is not carried: it casts shadows")
+        if self.api.GetFiltersRel().GetTargets():
+            self.lose("light filters are not carried")
+        for collection in (self.api.GetLightLinkCollectionAPI(), self.api.GetShadowLinkCollectionAPI()):
+            if collection.GetIncludesRel().GetTargets() or collection.GetExcludesRel().GetTargets():
+                self.lose(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
+
+    def get(self, name, default):
+        """The value of an input of this name."""
+        return self.stage.get(self.prim.GetAttribute("inputs:" + name), default)
+
+    def lose(self, what):
+        """Names a loss of this light."""
+        self.stage.losses.name(self.where, what)
+
+    @property
+    def normalized(self):
+        """Whether its power does not depend on its size."""
+        return self.get("normalize", False)
+
+    def emitted(self):
+        """Colour times intensity, 3 numbers, before `normalize`."""
+        default = 50000.0 if self.prim.GetTypeName() == "DistantLight" else 1.0
+        power = self.get("intensity", default) * 2.0 ** self.get("exposure", 0.0)
+        color = Gf.Vec3f(self.get("color", Gf.Vec3f(1)))
+        # Blender writes white lamps as 6500 K, which the reference tints.
+        white = self.stage.by_blender and self.get("colorTemperature", 6500.0) == 6500.0
+        if self.get("enableColorTemperature", False) and not white:
+            color = Gf.CompMult(color, UsdLux.BlackbodyTemperatureAsRgb(self.get("colorTemperature", 6500.0)))
+        emitted = tuple(float(c) * power for c in color)
+        if not all(math.isfinite(c) for c in emitted):
+            raise Fault(self.where, "its colour or intensity is not finite", "give it numbers")
+        return emitted
+
+    def radiance(self, area):
+        """Radiance of an emitter of an area in units of the stage."""
+        share = area if self.normalized and area > 0 else 1.0
+        return tuple(c / share for c in self.emitted())
+
+    def cone(self):
+        """Half the cone (radians) and softness of UsdLuxShapingAPI; None without. What else it says is named."""
+        if not self.prim.HasAPI(UsdLux.ShapingAPI):
+            return None
+        if self.get("shaping:focus", 0.0) > 0:
+            self.lose("shaping:focus is not carried: it shines alike within its cone")
+        ies = self.get("shaping:ies:file", None)
+        if ies is not None and ies.path:
+            self.lose(f"its IES profile {ies.path} is not carried: it shines alike in all directions")
+        angle = self.get("shaping:cone:angle", 90.0)
+        softness = min(max(self.get("shaping:cone:softness", 0.0), 0.0), 1.0)
+        if angle >= 180:
+            return None
+        return math.radians(angle), softness
+
+
+def node(prim, stage, document, matrix):
+    """What a glTF node says to be the light of a prim that stands at `matrix` (in the stage's own units)."""
+    light = Light(prim, stage)
+    kind = prim.GetTypeName()
+    makers = {"SphereLight": _sphere, "RectLight": _rect, "DiskLight": _disk, "CylinderLight": _cylinder,
+              "DistantLight": _distant}
+    if kind not in makers:
+        light.lose(f"a {kind} is not carried: it gives no light")
+        return None
+    made = makers[kind](light, document, matrix)
+    keys = {**made.pop("caustique", {}), **said(prim, stage)}
+    if keys:
+        made["extras"] = {"caustique": keys}
+    return made
+
+
+def _lengths(matrix):
+    """Lengths of the axes after the transform."""
+    return [matrix.TransformDir(Gf.Vec3d(*axis)).GetLength() for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+
+
+def _sphere(light, document, matrix):
+    as_point = light.stage.get(light.prim.GetAttribute("treatAsPoint"), False)
+    radius = 0.0 if as_point and light.normalized else float(light.get("radius", 0.5))
+    a, b, c = (radius * length for length in _lengths(matrix))
+    if radius < 0 or not math.isfinite(a + b + c):
+        raise Fault(light.where, f"its radius is {radius}", "give it a number that is not negative")
+    if radius > 0 and max(a, b, c) > 1.001 * min(a, b, c):
+        return _ellipsoid(light, document, radius, (a, b, c))
+    if as_point and not light.normalized:
+        light.lose("treatAsPoint counts with normalize alone: it stays a sphere")
+    if a == 0 and not light.normalized:
+        light.lose("a sphere of radius 0 has no light unless it is normalized: its intensity is taken as if it were")
+    emitted = light.emitted()
+    # A sphere of radiance L shines with L pi r^2 in every direction, and has an area of 4 pi r^2.
+    intensity = [e * (0.25 if light.normalized or a == 0 else math.pi * a * a) * light.stage.metres ** 2
+                 for e in emitted]
+    entry = {"name": str(light.where), "type": "point", **_strength(intensity)}
+    keys, cone = {"radius": a * light.stage.metres}, light.cone()
+    if cone is not None:
+        entry["type"] = "spot"
+        angle, softness = cone
+        if angle > math.pi / 2:
+            light.lose(f"its cone of {math.degrees(angle):g} degrees is taken as 90: beyond there is no light")
+            angle = math.pi / 2
+        entry["spot"] = {"outerConeAngle": angle, "innerConeAngle": 0.0}
+        keys["blend"] = 1 - (1 - math.cos((1 - softness) * angle)) / (1 - math.cos(angle)) if softness > 0 else 0.0
+        if softness > 0:
+            light.lose("the edge of its cone falls off by the cosine of the angle, not by the angle")
+        if a > 0:
+            light.lose("its bulb shines as a disc across its axis, and cannot itself be seen")
+    return {"extensions": document.light(entry), "caustique": keys}
+
+
+def _strength(values):
+    strongest = max(max(values), 1e-30)
+    return {"color": [max(v, 0.0) / strongest for v in values], "intensity": strongest}
+
+
+def _ellipsoid(light, document, radius, axes):
+    faces, normals = shapes.of_sphere(light.where, radius)
+    # Knud Thomsen's formula, as the reference has it.
+    a, b, c = axes
+    mean = (((a * b) ** 1.6 + (a * c) ** 1.6 + (b * c) ** 1.6) / 3) ** (1 / 1.6)
+    if light.cone() is not None:
+        light.lose("shaping of a stretched sphere is not carried: it shines in all directions")
+    return _glowing(light, document, faces, light.radiance(4 * math.pi * mean), normals)
+
+
+def _rect(light, document, matrix):
+    x, y = light.get("width", 1.0) / 2, light.get("height", 1.0) / 2
+    u, v = (matrix.TransformDir(Gf.Vec3d(*axis)) for axis in ((2 * x, 0, 0), (0, 2 * y, 0)))
+    image = light.get("texture:file", None)
+    if image is not None and image.path:
+        light.lose(f"its texture {image.path} is not carried: it shines with its colour alone")
+    # Clockwise seen from +Z: it shines along -Z.
+    return _flat(light, document, [(-x, -y), (-x, y), (x, y), (x, -y)], Gf.Cross(u, v).GetLength())
+
+
+def _disk(light, document, matrix):
+    radius = light.get("radius", 0.5)
+    # A polygon of the circle's area.
+    reach = radius * math.sqrt(2 * math.pi / _SIDES / math.sin(2 * math.pi / _SIDES))
+    turns = [-2 * math.pi * k / _SIDES for k in range(_SIDES)]
+    u, v = (matrix.TransformDir(Gf.Vec3d(*axis)) for axis in ((radius, 0, 0), (0, radius, 0)))
+    corners = [(reach * math.cos(t), reach * math.sin(t)) for t in turns]
+    return _flat(light, document, corners, math.pi * Gf.Cross(u, v).GetLength())
+
+
+def _flat(light, document, corners, area):
+    faces = shapes.polygon(light.where, corners)
+    radiance, keys, cone = light.radiance(area), {}, light.cone()
+    if cone is not None and (cone[0] < math.pi / 2 or cone[1] > 0):
+        angle, softness = min(cone[0], math.pi / 2), cone[1]
+        light.lose("its cone is taken for a spread of the same flux, which falls off towards its edge")
+        keys["spread_deg"] = math.degrees(2 * angle)
+        share = _cone_flux(angle, softness)
+        radiance = tuple(r * share for r in radiance)
+    return _glowing(light, document, faces, radiance, None, keys)
+
+
+def _cone_flux(angle, softness):
+    """Flux that a cone leaves of a Lambertian emitter's, by Simpson's rule: smoothstep in the angle at its edge."""
+    theta = numpy.linspace(0, angle, 2001)
+    soft = (1 - softness) * angle
+    t = numpy.clip((theta - soft) / max(angle - soft, 1e-12), 0, 1) if softness > 0 else numpy.zeros_like(theta)
+    values = (1 - t * t * (3 - 2 * t)) * numpy.sin(2 * theta)
+    return float((values[0] + 4 * values[1:-1:2].sum() + 2 * values[2:-1:2].sum() + values[-1]) * (angle / 2000) / 3)
+
+
+def _cylinder(light, document, matrix):
+    radius, half = light.get("radius", 0.5), light.get("length", 1.0) / 2
+    if light.stage.get(light.prim.GetAttribute("treatAsLine"), False):
+        light.lose("treatAsLine is not carried: it stays a cylinder")
+    if light.cone() is not None:
+        light.lose("shaping of a cylinder is not carried: it shines in all directions")
+    a, b, c = (length * size for length, size in zip(_lengths(matrix), (2 * half, radius, radius)))
+    # Ramanujan's perimeter of an ellipse, as the reference has it; ends do not shine.
+    perimeter = math.pi * (3 * (b + c) - math.sqrt((3 * b + c) * (b + 3 * c)))
+    reach = radius * math.pi / (_SIDES * math.sin(math.pi / _SIDES))
+    faces, normals = shapes.revolved(light.where, [(reach, -half, 1.0, 0.0), (reach, half, 1.0, 0.0)], "X", _SIDES)
+    return _glowing(light, document, faces, light.radiance(perimeter * a), normals)
+
+
+def _distant(light, document, _matrix):
+    angle = light.get("angle", 0.53)
+    if not 0 <= angle <= 180:
+        light.lose(f"its angle of {angle:g} degrees is taken as 180")
+        angle = min(max(angle, 0.0), 180.0)
+    if light.cone() is not None:
+        light.lose("shaping of a distant light is not carried: it shines everywhere")
+    irradiance = light.emitted()
+    if light.stage.by_blender:
+        light.lose("Blender 4 writes suns with a quarter of their strength and half their angle: both are taken back")
+        irradiance, angle = tuple(4 * e for e in irradiance), min(2 * angle, 180.0)
+    if angle > 0 and not light.normalized:
+        share = math.pi * math.sin(math.radians(angle / 2)) ** 2
+        irradiance = tuple(e * share for e in irradiance)
+    entry = {"name": str(light.where), "type": "directional", **_strength(irradiance)}
+    return {"extensions": document.light(entry), "caustique": {"angle_deg": angle}}
+
+
+def _glowing(light, document, faces, radiance, normals, keys=None):
+    """A mesh that shines from its front and takes no light away."""
+    triangles, _ = faces.triangles()
+    entry = {"name": str(light.where), "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
+             "extras": {"caustique": {"null_bsdf": True, **(keys or {})}}}
+    glow(document, entry, radiance)
+    attributes = {"POSITION": document.floats(faces.points[faces.corners[triangles.reshape(-1)]], bounds=True)}
+    if normals is not None:
+        attributes["NORMAL"] = document.floats(normals[triangles.reshape(-1)])
+    mesh = {"name": str(light.where), "primitives": [{"attributes": attributes,
+                                                      "material": document.add("materials", entry)}]}
+    return {"mesh": document.add("meshes", mesh)}

@@ -1,0 +1,250 @@
+"""Bound materials as glTF materials, with `extras.caustique` for what that cannot say."""
+
+import copy
+import math
+
+import materialx
+import preview
+from network import Primvar, Reader, Texture, finite
+from pxr import UsdShade
+from stage import said
+from surface import Surface
+from faults import Fault
+from textures import Textures
+
+
+class Worn:
+    """A glTF material (`index`), and what its meshes bring: primvars of texture coordinates and of colour."""
+
+    def __init__(self, index, sets, color):
+        self.index, self.sets, self.color = index, sets, color
+
+
+class Materials:
+    """Materials as meshes call for them; solid ones apart from those that open meshes wear."""
+
+    def __init__(self, stage, document):
+        self._stage, self._document = stage, document
+        self._reader, self._textures = Reader(stage), Textures(stage, document)
+        self._worn, self._surfaces = {}, {}
+
+    def bound(self, prim):
+        """The material that a prim or subset wears (UsdShade.Material), or None."""
+        material, relationship = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)
+        if not material and relationship and relationship.GetTargets():
+            self._stage.losses.name(prim.GetPath(), f"the material {relationship.GetTargets()[0]} is not there")
+        return material if material else None
+
+    def wear(self, material, closed, glow=None, fades=False):
+        """The `Worn` of a material, None for that of displayColor, on a mesh that is `closed` or not; `glow`: radiance
+        (3 numbers) that a light lends it; `fades`: displayOpacity counts."""
+        where = material.GetPath() if material else None
+        try:
+            closed = closed or self._surface(material).transmission == 0
+            key = (where, closed, glow, fades)
+            if key not in self._worn:
+                self._worn[key] = self._made(material, closed, glow, fades)
+        except Fault as fault:
+            raise fault if fault.where else Fault(where, fault.fault, fault.hint)
+        return self._worn[key]
+
+    def _made(self, material, closed, glow, fades):
+        name = str(material.GetPath()) if material else "displayColor"
+        surface = self._surface(material)
+        if glow is not None:
+            surface = copy.copy(surface)
+            surface.emission = glow
+        entry, sets = {"name": name}, []
+        color = surface.base.name if isinstance(surface.base, Primvar) else None
+        self._core(surface, entry, sets)
+        self._normal(surface, entry, sets)
+        self._emission(surface, entry, sets)
+        keys = said(material.GetPrim(), self._stage) if material else {}
+        self._extensions(surface, entry, sets, closed, keys, name)
+        if keys:
+            entry["extras"] = {"caustique": keys}
+        if color == "displayColor" and fades:
+            entry["alphaMode"] = "BLEND"
+        entry["doubleSided"] = glow is None
+        return Worn(self._document.add("materials", entry), sets, color)
+
+    def _surface(self, material):
+        if material is None:
+            return Surface(base=Primvar("displayColor"), roughness=1.0, specular=0.0)
+        key = material.GetPath()
+        if key not in self._surfaces:
+            self._surfaces[key] = self._read(material)
+        return self._surfaces[key]
+
+    def _read(self, material):
+        losses, where = self._stage.losses, material.GetPath()
+        mtlx = material.ComputeSurfaceSource("mtlx")[0]
+        kind = mtlx.GetIdAttr().Get() if mtlx else None
+        if kind in (materialx.OPEN_PBR, materialx.STANDARD):
+            return materialx.surface(mtlx, self._reader, losses)
+        plain = material.ComputeSurfaceSource()[0]
+        if kind and plain and plain.GetPath() != mtlx.GetPath():
+            losses.name(where, f"a surface {kind} is not read: its {plain.GetIdAttr().Get()} takes its place")
+        id_ = plain.GetIdAttr().Get() if plain else None
+        if id_ in ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader"):
+            return preview.surface(plain, self._reader, losses)
+        if id_ in (materialx.OPEN_PBR, materialx.STANDARD):
+            return materialx.surface(plain, self._reader, losses)
+        found = kind or id_
+        what = f"a surface {found} is not read" if found else "it has no surface that is read"
+        losses.name(where, f"{what} (UsdPreviewSurface, OpenPBR, Standard Surface are): displayColor takes its place")
+        return Surface(base=Primvar("displayColor"), roughness=1.0, specular=0.0)
+
+    def _core(self, surface, entry, sets):
+        core = entry.setdefault("pbrMetallicRoughness", {})
+        alpha = 1.0
+        if isinstance(surface.presence, Texture):
+            base = (1.0,) * 3 if isinstance(surface.base, Primvar) else surface.base
+            image, factor = self._textures.with_alpha(base, surface.presence)
+            shown = base if isinstance(base, Texture) else surface.presence
+            core["baseColorTexture"] = self._textures.reference(shown, sets, image)
+        elif isinstance(surface.base, Texture):
+            image, factor = self._textures.color(surface.base)
+            core["baseColorTexture"] = self._textures.reference(surface.base, sets, image)
+            alpha = surface.presence
+        else:
+            factor = (1.0,) * 3 if isinstance(surface.base, Primvar) else surface.base
+            alpha = surface.presence
+        if not isinstance(alpha, (int, float)):
+            self._lost(entry, "what feeds its opacity is not carried: it is opaque")
+            alpha = 1.0
+        self._check(entry, "colour", tuple(factor))
+        core["baseColorFactor"] = [*self._unit(entry, "base colour", factor), alpha]
+        if isinstance(surface.presence, Texture) or alpha < 1:
+            entry["alphaMode"] = "MASK" if surface.threshold > 0 else "BLEND"
+            if surface.threshold > 0:
+                entry["alphaCutoff"] = surface.threshold
+        self._metal(surface, entry, core, sets)
+
+    def _metal(self, surface, entry, core, sets):
+        """Roughness and metalness, which share an image in glTF (green and blue)."""
+        parts = {1: surface.roughness, 2: surface.metallic}
+        for at, value in parts.items():
+            if not isinstance(value, (int, float, Texture)):
+                self._lost(entry, "what feeds its roughness or metalness is not carried")
+                parts[at] = {1: 0.5, 2: 0.0}[at]
+        names = {1: "roughnessFactor", 2: "metallicFactor"}
+        textured = {at: part for at, part in parts.items() if isinstance(part, Texture)}
+        for at, part in parts.items():
+            core[names[at]] = 1.0 if at in textured else self._unit(entry, names[at], (part,))[0]
+        if not textured:
+            return
+        placed = {(t.uv, t.transform, t.wraps) for t in textured.values()}
+        if len(placed) > 1:
+            self._lost(entry, "roughness and metalness are placed by different coordinates: roughness's place both")
+        first = textured[min(textured)]
+        images = {at: self._textures.data_as_is(part, at) for at, part in textured.items()}
+        # An image of roughness alone may hold anything in blue where nothing is metal, and one of metalness in green not.
+        fits = len(textured) == 2 or (1 in textured and core["metallicFactor"] == 0)
+        image = images[min(images)] if fits and len(set(images.values())) == 1 else None
+        if image is None:
+            image = self._textures.packed(textured)
+        core["metallicRoughnessTexture"] = self._textures.reference(first, sets, image)
+
+    def _normal(self, surface, entry, sets):
+        if not isinstance(surface.normal, Texture):
+            return
+        image, strength = self._textures.normals(surface.normal)
+        entry["normalTexture"] = self._textures.reference(surface.normal, sets, image)
+        if strength != 1:
+            entry["normalTexture"]["scale"] = strength
+
+    def _emission(self, surface, entry, sets):
+        radiance = surface.emission
+        if isinstance(radiance, Texture):
+            image, radiance = self._textures.emission(radiance)
+            entry["emissiveTexture"] = self._textures.reference(surface.emission, sets, image)
+        elif isinstance(radiance, Primvar):
+            return self._lost(entry, "emission by a primvar is not carried: it does not glow")
+        self._check(entry, "emission", tuple(radiance))
+        glow(self._document, entry, radiance)
+
+    def _extensions(self, surface, entry, sets, closed, keys, name):
+        def add(extension, value):
+            entry.setdefault("extensions", {})[self._document.use(extension)] = value
+
+        if surface.ior != 1.5:
+            add("KHR_materials_ior", {"ior": max(surface.ior, 1.0)})
+        if surface.specular != 1 or surface.specular_color != (1.0,) * 3:
+            add("KHR_materials_specular", {"specularFactor": self._unit(entry, "specular", (surface.specular,))[0],
+                                           "specularColorFactor": list(surface.specular_color)})
+        if surface.anisotropy:
+            add("KHR_materials_anisotropy", {"anisotropyStrength": surface.anisotropy})
+        if surface.coat != 0:
+            add("KHR_materials_clearcoat", self._textured(entry, sets, {
+                "clearcoat": (surface.coat, 0), "clearcoatRoughness": (surface.coat_roughness, 1)}))
+        if any(surface.sheen):
+            add("KHR_materials_sheen", {"sheenColorFactor": list(surface.sheen),
+                                        "sheenRoughnessFactor": surface.sheen_roughness})
+        if surface.transmission == 0:
+            return
+        add("KHR_materials_transmission", self._textured(entry, sets, {"transmission": (surface.transmission, 0)}))
+        thin = surface.thin or not closed
+        if not closed and surface.thin is not True:
+            self._stage.losses.name(name, "it is worn by a mesh with holes, which has no inside: a thin pane there")
+        volume = {"thicknessFactor": 0.0 if thin else 1.0}
+        if surface.depth > 0 and not thin:
+            volume.update(attenuationColor=list(surface.inside), attenuationDistance=surface.depth * self._stage.metres)
+        add("KHR_materials_volume", volume)
+        if surface.dispersion and not thin:
+            add("KHR_materials_dispersion", {"dispersion": surface.dispersion})
+        if any(surface.scatter) and not thin and "medium" not in keys:
+            keys["medium"] = _medium(surface, self._stage.metres)
+
+    def _textured(self, entry, sets, parts):
+        """`NAMEFactor`, and `NAMETexture` where a texture gives it in that channel of an image."""
+        out = {}
+        for name, (value, at) in parts.items():
+            if isinstance(value, Texture):
+                image = self._textures.data_as_is(value, at)
+                image = self._textures.packed({at: value}) if image is None else image
+                out[name + "Texture"] = self._textures.reference(value, sets, image)
+                value = 1.0
+            elif not isinstance(value, (int, float)):
+                self._lost(entry, f"what feeds {name} is not carried")
+                value = 0.0
+            out[name + "Factor"] = self._unit(entry, name, (value,))[0]
+        return out
+
+    def _unit(self, entry, what, values):
+        """Numbers within 0 and 1, with a loss where they are not."""
+        if any(not 0 <= x <= 1 for x in values):
+            self._lost(entry, f"{what} {', '.join(f'{x:g}' for x in values)} is clipped to 0 to 1")
+        return [min(max(float(x), 0.0), 1.0) for x in values]
+
+    def _check(self, entry, what, values):
+        if not finite(values):
+            raise Fault(entry["name"], f"its {what} is not finite", "give it numbers")
+
+    def _lost(self, entry, what):
+        self._stage.losses.name(entry["name"], what)
+
+
+def glow(document, entry, radiance):
+    """Lets a material emit (W/(sr m2)): glTF's factor is at most 1, and its strength tells the rest."""
+    strongest = max(radiance)
+    if strongest <= 0:
+        return
+    entry["emissiveFactor"] = [max(c, 0.0) / strongest for c in radiance] if strongest > 1 else \
+        [max(c, 0.0) for c in radiance]
+    if strongest > 1:
+        name = document.use("KHR_materials_emissive_strength")
+        entry.setdefault("extensions", {})[name] = {"emissiveStrength": strongest}
+
+
+def _medium(surface, metres):
+    """Coefficients (1/m) of OpenPBR's scattering inside: extinction by the colour left after the depth, of which
+    `scatter` over the depth scatters; where that is more than all, absorption is raised to none below zero."""
+    depth = surface.depth * metres
+    extinction = [-math.log(max(c, 1e-6)) / depth for c in surface.inside]
+    scatter = [s / depth for s in surface.scatter]
+    absorbed = [e - s for e, s in zip(extinction, scatter)]
+    least = min(absorbed)
+    if least < 0:
+        absorbed = [a - least for a in absorbed]
+    return {"sigma_a": absorbed, "sigma_s": scatter, "g": surface.scatter_g}

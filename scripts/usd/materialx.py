@@ -1,0 +1,118 @@
+"""OpenPBR and Autodesk's Standard Surface, as MaterialX nodes in a stage, as a `Surface` where they are simple."""
+
+from network import Primvar, Texture
+from surface import Surface
+
+OPEN_PBR = "ND_open_pbr_surface_surfaceshader"
+STANDARD = "ND_standard_surface_surfaceshader"
+
+# Name of each input, and its default, by model.
+_NAMES = {
+    OPEN_PBR: {
+        "base": ("base_color", (0.8,) * 3), "base_weight": ("base_weight", 1.0), "metal": ("base_metalness", 0.0),
+        "roughness": ("specular_roughness", 0.3), "specular": ("specular_weight", 1.0),
+        "specular_color": ("specular_color", (1.0,) * 3), "ior": ("specular_ior", 1.5),
+        "anisotropy": ("specular_roughness_anisotropy", 0.0), "transmission": ("transmission_weight", 0.0),
+        "inside": ("transmission_color", (1.0,) * 3), "depth": ("transmission_depth", 0.0),
+        "scatter": ("transmission_scatter", (0.0,) * 3), "scatter_g": ("transmission_scatter_anisotropy", 0.0),
+        "abbe": ("transmission_dispersion_abbe_number", 20.0), "dispersed": ("transmission_dispersion_scale", 0.0),
+        "coat": ("coat_weight", 0.0), "coat_roughness": ("coat_roughness", 0.0),
+        "coat_color": ("coat_color", (1.0,) * 3), "sheen": ("fuzz_weight", 0.0),
+        "sheen_color": ("fuzz_color", (1.0,) * 3), "sheen_roughness": ("fuzz_roughness", 0.5),
+        "emission": ("emission_luminance", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
+        "presence": ("geometry_opacity", 1.0), "thin": ("geometry_thin_walled", False),
+        "normal": ("geometry_normal", None), "subsurface": ("subsurface_weight", 0.0),
+        "film": ("thin_film_weight", 0.0), "diffuse_roughness": ("base_diffuse_roughness", 0.0),
+    },
+    STANDARD: {
+        "base": ("base_color", (0.8,) * 3), "base_weight": ("base", 1.0), "metal": ("metalness", 0.0),
+        "roughness": ("specular_roughness", 0.2), "specular": ("specular", 1.0),
+        "specular_color": ("specular_color", (1.0,) * 3), "ior": ("specular_IOR", 1.5),
+        "anisotropy": ("specular_anisotropy", 0.0), "transmission": ("transmission", 0.0),
+        "inside": ("transmission_color", (1.0,) * 3), "depth": ("transmission_depth", 0.0),
+        "scatter": ("transmission_scatter", (0.0,) * 3), "scatter_g": ("transmission_scatter_anisotropy", 0.0),
+        "abbe": ("transmission_dispersion", 0.0), "dispersed": (None, 1.0),
+        "coat": ("coat", 0.0), "coat_roughness": ("coat_roughness", 0.1),
+        "coat_color": ("coat_color", (1.0,) * 3), "sheen": ("sheen", 0.0),
+        "sheen_color": ("sheen_color", (1.0,) * 3), "sheen_roughness": ("sheen_roughness", 0.3),
+        "emission": ("emission", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
+        "presence": ("opacity", (1.0,) * 3), "thin": ("thin_walled", False), "normal": ("normal", None),
+        "subsurface": ("subsurface", 0.0), "film": ("thin_film_thickness", 0.0),
+        "diffuse_roughness": ("diffuse_roughness", 0.0),
+    },
+}
+_LOST = {
+    "subsurface": "subsurface scattering is not carried: the surface is diffuse",
+    "film": "a thin film is not carried",
+    "diffuse_roughness": "diffuse roughness is not carried: the surface is Lambertian",
+}
+# What counts only where something else is not 0.
+_OF = {"inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
+       "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
+       "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission"}
+_TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
+             "transmission"}
+
+
+def surface(shader, reader, losses):
+    """The surface of a shader of either model."""
+    where = shader.GetPath()
+    given, names = {}, _NAMES[shader.GetIdAttr().Get()]
+    for key, (name, default) in sorted(names.items(), key=lambda item: item[0] in _OF):
+        if not given.get(_OF.get(key), True):
+            given[key] = default
+            continue
+        value = reader.read(shader, name, default) if name else default
+        if isinstance(value, (Texture, Primvar)) and (key not in _TEXTURED or (
+                isinstance(value, Primvar) and key != "base")):
+            losses.name(where, f"what feeds {name} is not carried: it has its default")
+            value = default
+        given[key] = value
+    for key, what in _LOST.items():
+        if given[key]:
+            losses.name(where, what)
+    if given["coat"] and given["coat_color"] != (1.0,) * 3:
+        losses.name(where, "the colour of its coat is not carried: the coat is clear")
+    presence = given["presence"]
+    if isinstance(presence, tuple):
+        presence = sum(presence) / 3
+    out = Surface(base=_scaled(given["base"], given["base_weight"]), metallic=given["metal"],
+                  roughness=given["roughness"], normal=None if isinstance(given["normal"], tuple) else given["normal"],
+                  presence=presence, ior=given["ior"], specular=given["specular"],
+                  specular_color=given["specular_color"], anisotropy=given["anisotropy"], coat=given["coat"],
+                  coat_roughness=given["coat_roughness"], thin=bool(given["thin"]))
+    out.emission = _scaled(given["emission_color"], given["emission"])
+    if given["sheen"]:
+        losses.name(where, "its fuzz is taken for the sheen of glTF, whose lobe differs a little")
+        out.sheen = _scaled(given["sheen_color"], given["sheen"])
+        out.sheen_roughness = given["sheen_roughness"]
+    _transmit(out, given, where, losses)
+    return out
+
+
+def _transmit(out, given, where, losses):
+    """What light meets inside."""
+    out.transmission = given["transmission"]
+    if not out.transmission:
+        return
+    out.depth, out.inside, out.scatter = given["depth"], given["inside"], given["scatter"]
+    out.scatter_g = given["scatter_g"]
+    if given["dispersed"] and given["abbe"]:
+        out.dispersion = 20 * given["dispersed"] / given["abbe"]
+    if isinstance(out.transmission, Texture) or isinstance(out.base, (Texture, Primvar)) or out.transmission < 1:
+        if out.depth == 0 and out.inside != out.base:
+            losses.name(where, "its transmission has the colour of its base")
+    else:
+        out.base = out.inside if out.depth == 0 else (1.0,) * 3
+    if any(out.scatter) and out.depth == 0:
+        losses.name(where, "transmission_scatter without a depth is not carried")
+        out.scatter = (0.0,) * 3
+
+
+def _scaled(value, factor):
+    """A colour or a texture times a number."""
+    if isinstance(value, Texture):
+        value.scale = tuple(s * factor for s in value.scale[:3]) + (value.scale[3],)
+        value.bias = tuple(b * factor for b in value.bias[:3]) + (value.bias[3],)
+        return value
+    return value if isinstance(value, Primvar) else tuple(c * factor for c in value)

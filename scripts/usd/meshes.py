@@ -1,0 +1,180 @@
+"""Meshes: faces of any number of corners and primvars of any interpolation become triangles with vertices."""
+
+import mapbox_earcut
+import numpy
+from pxr import UsdGeom
+
+from faults import Fault
+
+_GREY = (0.18, 0.18, 0.18)
+
+
+class Faces:
+    """The polygons of a mesh.
+
+    `points`: (n, 3). `corners`: of each corner of each face the point it stands on. `counts`: corners of each face.
+    """
+
+    def __init__(self, where, points, counts, corners, mirrored=False):
+        self.where = where
+        self.points = numpy.asarray(points, numpy.float64).reshape(-1, 3)
+        self.counts = numpy.asarray(counts, numpy.int64)
+        self.corners = numpy.asarray(corners, numpy.int64)
+        if self.counts.sum() != len(self.corners) or (self.counts < 0).any():
+            raise Fault(where, f"faceVertexCounts adds up to {self.counts.sum()}, and faceVertexIndices has "
+                        f"{len(self.corners)} numbers", "export the mesh again")
+        if len(self.corners) and not 0 <= self.corners.min() <= self.corners.max() < len(self.points):
+            raise Fault(where, f"faceVertexIndices names a point beyond its {len(self.points)} points",
+                        "export the mesh again")
+        if not numpy.isfinite(self.points).all():
+            raise Fault(where, "points has a coordinate that is not finite", "export the mesh again")
+        self.face_of_corner = numpy.repeat(numpy.arange(len(self.counts)), self.counts)
+        self._mirrored = mirrored
+
+    def spread(self, values, interpolation, name):
+        """The values (count, width) of a primvar at each corner."""
+        sources = {
+            UsdGeom.Tokens.constant: (1, lambda: numpy.zeros(len(self.corners), numpy.int64)),
+            UsdGeom.Tokens.uniform: (len(self.counts), lambda: self.face_of_corner),
+            UsdGeom.Tokens.vertex: (len(self.points), lambda: self.corners),
+            UsdGeom.Tokens.varying: (len(self.points), lambda: self.corners),
+            UsdGeom.Tokens.faceVarying: (len(self.corners), lambda: numpy.arange(len(self.corners))),
+        }
+        expected, index = sources[interpolation]
+        if len(values) != expected:
+            raise Fault(self.where, f"{name} has {len(values)} values, and {interpolation} interpolation takes "
+                        f"{expected}", "export the mesh again")
+        return values[index()]
+
+    def triangles(self, hidden=()):
+        """Corners of each triangle, (n, 3), and the face of each; faces in `hidden` have none."""
+        starts = numpy.cumsum(self.counts) - self.counts
+        shown = numpy.ones(len(self.counts), bool)
+        shown[list(hidden)] = False
+        made, faces = [], []
+        for count in numpy.unique(self.counts[shown & (self.counts >= 3)]):
+            these = numpy.flatnonzero(shown & (self.counts == count))
+            cut = self._cut(starts[these], count)
+            made.append(cut.reshape(-1, 3))
+            faces.append(numpy.repeat(these, count - 2))
+        if not made:
+            return numpy.empty((0, 3), numpy.int64), numpy.empty(0, numpy.int64)
+        made, faces = numpy.concatenate(made), numpy.concatenate(faces)
+        order = numpy.argsort(faces, kind="stable")
+        made = made[order, ::-1] if self._mirrored else made[order]
+        return made, faces[order]
+
+    def _cut(self, starts, count):
+        """Triangles (faces, count - 2, 3) of faces that begin at `starts` and have `count` corners: fans, and where a
+        face is not convex what earcut finds."""
+        fan = numpy.stack([numpy.zeros(count - 2, numpy.int64), numpy.arange(1, count - 1),
+                           numpy.arange(2, count)], axis=1)
+        cut = numpy.repeat(fan[None], len(starts), axis=0)
+        if count > 3:
+            at = self.points[self.corners[starts[:, None] + numpy.arange(count)]]
+            normals = numpy.cross(at[:, fan[:, 1]] - at[:, :1], at[:, fan[:, 2]] - at[:, :1])
+            total = normals.sum(axis=1, keepdims=True)
+            for face in numpy.flatnonzero(((normals * total).sum(axis=2) <= 0).any(axis=1)):
+                found = _ears(at[face], total[face, 0])
+                if len(found) == count - 2:
+                    cut[face] = found
+        return cut + starts[:, None, None]
+
+    def smooth_normals(self, triangles):
+        """Normals at each corner: those of the triangles around its point, weighed by area."""
+        at = self.points[self.corners[triangles]]
+        normals = numpy.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+        sums = numpy.zeros_like(self.points)
+        for k in range(3):
+            numpy.add.at(sums, self.corners[triangles[:, k]], normals)
+        return sums[self.corners]
+
+    def closed(self, triangles):
+        """Whether every edge has as many triangles on it one way as the other, points in one place counted as one."""
+        if not len(triangles):
+            return False
+        size = numpy.abs(self.points).max() or 1.0
+        _, merged = numpy.unique(numpy.rint(self.points / size * 1e7), axis=0, return_inverse=True)
+        ends = merged.reshape(-1)[self.corners[triangles]]
+        edges = numpy.concatenate([ends[:, [0, 1]], ends[:, [1, 2]], ends[:, [2, 0]]])
+        edges = numpy.sort(edges[edges[:, 0] != edges[:, 1]], axis=1)
+        _, uses = numpy.unique(edges, axis=0, return_counts=True)
+        return bool((uses % 2 == 0).all())
+
+
+def _ears(at, normal):
+    """Triangles of one polygon, in the plane across its normal; corners in its own order."""
+    axis = int(numpy.argmax(numpy.abs(normal)))
+    flat = numpy.ascontiguousarray(numpy.delete(at, axis, axis=1))
+    cut = mapbox_earcut.triangulate_float64(flat, numpy.array([len(flat)], numpy.uint32)).reshape(-1, 3).astype(int)
+    a, b, c = (at[cut[:, k]] for k in range(3))
+    turned = (numpy.cross(b - a, c - a) @ normal) < 0
+    cut[turned] = cut[turned][:, ::-1]
+    return cut
+
+
+def of_prim(prim, stage):
+    """The faces of a Mesh prim, its holes, and whether its normals count."""
+    mesh, where = UsdGeom.Mesh(prim), prim.GetPath()
+    get = stage.get
+    points = get(mesh.GetPointsAttr())
+    if points is None or not len(points):
+        return None
+    mirrored = get(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
+    faces = Faces(where, points, get(mesh.GetFaceVertexCountsAttr(), ()), get(mesh.GetFaceVertexIndicesAttr(), ()),
+                  mirrored)
+    if (faces.counts < 3).any():
+        stage.losses.name(where, f"{(faces.counts < 3).sum()} faces with fewer than 3 corners are left out")
+    holes = [h for h in get(mesh.GetHoleIndicesAttr(), ()) if 0 <= h < len(faces.counts)]
+    return faces, holes
+
+
+def primvar(prim, name, stage):
+    """Values (count, width) of a primvar with its indices resolved, and its interpolation; None if it has none."""
+    found = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    values = found.ComputeFlattened(stage.time) if found and found.HasValue() else None
+    if values is None:
+        return None
+    try:
+        values = numpy.asarray(values, numpy.float64)
+    except (TypeError, ValueError):
+        return None
+    return values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1), found.GetInterpolation()
+
+
+def authored_normals(prim, faces, stage):
+    """Normals at each corner as the prim gives them; primvars:normals before normals."""
+    found = primvar(prim, "normals", stage)
+    if found is None:
+        mesh = UsdGeom.PointBased(prim)
+        values = stage.get(mesh.GetNormalsAttr()) if mesh else None
+        if values is None or not len(values):
+            return None
+        found = numpy.asarray(values, numpy.float64), mesh.GetNormalsInterpolation()
+    return faces.spread(*found, "normals")
+
+
+def colours(prim, name, faces, stage):
+    """Red, green, blue and opacity at each corner by a primvar of colour; grey where there is none."""
+    found = primvar(prim, name, stage)
+    if found is not None and found[0].shape[1] < 3:
+        found = numpy.repeat(found[0][:, :1], 3, axis=1), found[1]
+    rgb = numpy.tile(_GREY, (len(faces.corners), 1)) if found is None else faces.spread(*found, name)[:, :3]
+    opacity = primvar(prim, "displayOpacity", stage) if name == "displayColor" else None
+    alpha = numpy.ones((len(rgb), 1)) if opacity is None else faces.spread(*opacity, "displayOpacity")[:, :1]
+    return numpy.concatenate([rgb, alpha], axis=1)
+
+
+def welded(faces, corners, attributes):
+    """Vertices for corners (of triangles, flat): those alike in all become one.
+
+    `attributes`: arrays (corners of the mesh, width). Returns positions, the attributes of the vertices, and the
+    vertex of each corner, all in single precision.
+    """
+    rows = [faces.corners[corners].astype(numpy.float64)[:, None]]
+    rows += [array[corners].astype(numpy.float32).astype(numpy.float64) for array in attributes]
+    rows = numpy.concatenate(rows, axis=1)
+    _, first, index = numpy.unique(rows, axis=0, return_index=True, return_inverse=True)
+    vertices = corners[first]
+    positions = faces.points[faces.corners[vertices]].astype(numpy.float32)
+    return positions, [array[vertices].astype(numpy.float32) for array in attributes], index.reshape(-1)

@@ -1,0 +1,49 @@
+"""UsdPreviewSurface, by its specification 2.6, as a `Surface`."""
+
+from network import Texture
+from surface import Surface
+
+
+def surface(shader, reader, losses):
+    """The surface of a shader UsdPreviewSurface."""
+    where, read = shader.GetPath(), reader.read
+    out = Surface(base=read(shader, "diffuseColor", (0.18, 0.18, 0.18)), metallic=read(shader, "metallic", 0.0),
+                  roughness=read(shader, "roughness", 0.5), normal=read(shader, "normal"),
+                  emission=read(shader, "emissiveColor", (0.0,) * 3), ior=read(shader, "ior", 1.5),
+                  coat=read(shader, "clearcoat", 0.0), coat_roughness=read(shader, "clearcoatRoughness", 0.01),
+                  threshold=read(shader, "opacityThreshold", 0.0))
+    if isinstance(out.normal, tuple):
+        out.normal = None
+    if read(shader, "useSpecularWorkflow", 0):
+        _by_specular(out, read(shader, "specularColor", (0.0,) * 3), where, losses)
+    displacement = read(shader, "displacement", 0.0)
+    if displacement != 0:
+        losses.name(where, "displacement is not carried: displace the mesh before it is exported")
+    opacity = read(shader, "opacity", 1.0)
+    if isinstance(opacity, Texture) or out.threshold > 0 or read(shader, "opacityMode", "transparent") == "presence":
+        out.presence = opacity
+        if isinstance(opacity, Texture) and out.threshold == 0 and opacity.channel != "a":
+            losses.name(where, "its opacity texture is taken for presence: where it is 0 there is nothing, no glass")
+    elif opacity != 1:
+        out.transmission = 1 - opacity
+        if opacity == 0:
+            out.base = (1.0,) * 3
+        else:
+            losses.name(where, f"opacity {opacity:g} is taken for glass that its diffuseColor tints")
+    return out
+
+
+def _by_specular(out, color, where, losses):
+    """The specular workflow: `color` is the reflectance at normal incidence, and there is no metal."""
+    out.metallic = 0.0
+    if isinstance(color, Texture):
+        losses.name(where, "a texture of specularColor is not carried: use the metallic workflow")
+        return
+    strongest = max(color)
+    if strongest <= 0:
+        out.specular = 0.0
+        return
+    # The index of refraction whose reflectance at normal incidence is the strongest of the three.
+    root = min(strongest, 0.999) ** 0.5
+    out.ior = (1 + root) / (1 - root)
+    out.specular_color = tuple(c / strongest for c in color)

@@ -1,0 +1,161 @@
+"""UsdRender: the picture that a stage asks for, and what `caustique:*` says about the way to it."""
+
+import fractions
+
+from pxr import UsdGeom, UsdRender
+
+from faults import Fault
+from stage import said
+
+# Keys of `extras.caustique` of a scene: what else stands in `caustique:` of the settings is an option of `render`.
+SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate"}
+# Layers by what a RenderVar's sourceName may say.
+LAYERS = {
+    "ci": "beauty", "color": "beauty", "rgba": "beauty", "beauty": "beauty", "lpe:c.*[<l.>o]": "beauty",
+    "albedo": "albedo", "diffusealbedo": "albedo", "n": "normal", "normal": "normal", "nn": "normal",
+    "depth": "depth", "z": "Z", "cameradepth": "Z", "p": "P", "position": "P",
+}
+OUR_LAYERS = {
+    "CombinedDirect", "CombinedIndirect", "CombinedCaustic", "CombinedEmission", "CombinedVolume", "Noisy", "Direct",
+    "Indirect", "Caustic", "Emission", "Volume", "Error", "albedo", "normal", "depth", "Z", "P", "CryptoObject",
+    "CryptoMaterial",
+}
+
+
+class Settings:
+    """The RenderSettings of a stage: the stage's own, or the only one that it has, and its first product."""
+
+    def __init__(self, stage):
+        self._stage, self.prim, self.product = stage, None, None
+        named = UsdRender.Settings.GetStageRenderSettings(stage.stage)
+        found = [named.GetPrim()] if named else [p for p in stage.stage.Traverse() if p.IsA(UsdRender.Settings)]
+        if not found:
+            return
+        self.prim = found[0]
+        if len(found) > 1:
+            stage.losses.name(self.prim.GetPath(), "the stage has several RenderSettings and names none as its own: "
+                              "these are taken")
+        products = [stage.stage.GetPrimAtPath(p) for p in UsdRender.Settings(self.prim).GetProductsRel().GetTargets()]
+        products = [p for p in products if p and p.IsA(UsdRender.Product)]
+        self.product = products[0] if products else None
+        for other in products[1:]:
+            stage.losses.name(other.GetPath(), "only the first product is rendered: render once for each")
+        self._warn()
+
+    def get(self, name, default=None):
+        """A value of the product, else of the settings."""
+        for prim in (self.product, self.prim):
+            attribute = prim.GetAttribute(name) if prim else None
+            if attribute and attribute.HasAuthoredValue():
+                return self._stage.get(attribute, default)
+        return default
+
+    def camera(self):
+        """The path of the camera, or None."""
+        for prim in (self.product, self.prim):
+            targets = prim.GetRelationship("camera").GetForwardedTargets() if prim else ()
+            if targets:
+                found = self._stage.stage.GetPrimAtPath(targets[0])
+                if not (found and found.IsA(UsdGeom.Camera)):
+                    raise Fault(prim.GetPath(), f"its camera {targets[0]} is not there", "name a Camera of the stage")
+                return targets[0]
+        return None
+
+    def purposes(self):
+        """The purposes that are rendered."""
+        found = self.get("includedPurposes")
+        return {"default", "render"} if found is None else {"default", *found}
+
+    def lens(self):
+        """Whether cameras have depth of field."""
+        return not self.get("disableDepthOfField", False)
+
+    def aspect(self):
+        """Width by height of the picture as it is seen, or None."""
+        resolution = self.get("resolution")
+        return None if resolution is None else resolution[0] / resolution[1] * self.get("pixelAspectRatio", 1.0)
+
+    def policy(self):
+        """How a camera is fitted to the picture."""
+        return self.get("aspectRatioConformPolicy", "expandAperture")
+
+    def keys(self):
+        """Keys of `extras.caustique` of the scene."""
+        out = {"light_units": "radiometric"}
+        resolution = self.get("resolution")
+        if resolution is not None:
+            if min(resolution) < 1:
+                raise Fault(self.prim.GetPath(), f"its resolution is {resolution}", "give it two numbers above zero")
+            out["resolution"] = [int(resolution[0]), int(resolution[1])]
+        window = self.get("dataWindowNDC")
+        if window is not None and tuple(window) != (0, 0, 1, 1):
+            out["crop"] = self._crop(window)
+        rate = fractions.Fraction(f"{self._stage.stage.GetTimeCodesPerSecond():.6g}")
+        if rate > 0:
+            out["frame_rate"] = [rate.numerator, rate.denominator]
+        if not self._stage.time.IsEarliestTime() and not self._stage.time.IsDefault():
+            out["frame"] = round(self._stage.time.GetValue())
+        out.update((key, value) for key, value in self._said().items() if key in SCENE_KEYS)
+        return out
+
+    def _crop(self, window):
+        """Left, top, width and height of (xmin, ymin, xmax, ymax) from the bottom left."""
+        left, low, right, high = window
+        inside = [min(max(x, 0.0), 1.0) for x in (left, low, right, high)]
+        if inside != [left, low, right, high]:
+            self._stage.losses.name(self.prim.GetPath(), "its dataWindowNDC reaches beyond the picture: it is cut there")
+        left, low, right, high = inside
+        if right <= left or high <= low:
+            raise Fault(self.prim.GetPath(), "its dataWindowNDC is empty", "it is xmin, ymin, xmax, ymax")
+        return [left, 1 - high, right - left, high - low]
+
+    def arguments(self):
+        """Options of `caustique render` that the settings stand for, those of its RenderVars first."""
+        out = []
+        layers = self._layers()
+        if layers:
+            out.append("--layers=" + ",".join(layers))
+        for key, value in self._said().items():
+            if key in SCENE_KEYS:
+                continue
+            option = "--" + key.replace("_", "-")
+            if value is False:
+                continue
+            if isinstance(value, dict):
+                self._stage.losses.name(self.prim.GetPath(), f"caustique:{key} has parts, which no option has")
+                continue
+            text = ",".join(map(_number, value)) if isinstance(value, list) else _number(value)
+            out.append(option if value is True else f"{option}={text}")
+        return out
+
+    def _said(self):
+        return said(self.prim, self._stage) if self.prim else {}
+
+    def _layers(self):
+        """Layers of the product's RenderVars, without what is not known, which is named."""
+        targets = UsdRender.Product(self.product).GetOrderedVarsRel().GetTargets() if self.product else ()
+        found = []
+        for target in targets:
+            var = self._stage.stage.GetPrimAtPath(target)
+            name = self._stage.get(var.GetAttribute("sourceName"), "") if var else ""
+            layer = LAYERS.get(name.lower(), name if name in OUR_LAYERS or name.startswith(("LightGroup_", "Caustic_"))
+                               else None)
+            if layer is None:
+                self._stage.losses.name(target, f'there is no layer for the RenderVar\'s sourceName "{name}"')
+            elif layer not in found:
+                found.append(layer)
+        return found
+
+    def _warn(self):
+        where, lose = self.prim.GetPath(), self._stage.losses.name
+        if self.get("pixelAspectRatio", 1.0) != 1.0:
+            lose(where, "pixels that are not square are not carried")
+        space = self.get("renderingColorSpace")
+        if space and space not in ("lin_rec709", "lin_rec709_scene"):
+            lose(where, f"renderingColorSpace {space} is not carried: colours are linear Rec. 709")
+        if self.product and self.get("productType", "raster") != "raster":
+            lose(self.product.GetPath(), "a product that is no raster is rendered as one")
+
+
+def _number(value):
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,239 @@
+"""From a stage to a document: the walk over its prims, and what stands on each."""
+
+import numpy
+from pxr import Gf, UsdGeom, UsdLux, UsdShade
+
+import cameras
+import lights
+import meshes
+import shapes
+from document import Document
+from dome import Dome, is_dome
+from faults import Fault
+from materials import Materials
+from render_settings import Settings
+from stage import PREDICATE, said
+
+_UNSEEN = {"BasisCurves": "curves are", "NurbsCurves": "curves are", "HermiteCurves": "curves are",
+           "Points": "points are", "NurbsPatch": "a NURBS patch is", "TetMesh": "a tetrahedral mesh is",
+           "Volume": "a volume is", "GeometryLight": "a GeometryLight is"}
+
+
+class Scene:
+    """Fills a `Document` with what a stage shows at its moment."""
+
+    def __init__(self, stage, folder):
+        self._stage, self.document = stage, Document()
+        self._settings = Settings(stage)
+        self._materials = Materials(stage, self.document)
+        self._dome = Dome(stage, folder)
+        self._meshes = {}
+        self._cameras = []
+
+    def fill(self):
+        """Visits the whole stage."""
+        purposes = self._settings.purposes()
+        for child in self._stage.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE):
+            for make, matrix in self._walk(child, Gf.Matrix4d(1), True, "default", purposes):
+                self._place(make, matrix)
+        keys = self._settings.keys()
+        self._place_cameras(keys)
+        self._settings.arguments()  # they are the program's: here, what they lose is named
+        if self._dome.keys is not None:
+            keys["environment"] = self._dome.keys
+        keys.setdefault("environment", {"color": [0.0] * 3})
+        keys["losses"] = self._stage.losses.lines
+        self.document.json["scenes"][0]["extras"] = {"caustique": keys}
+
+    def _place(self, make, matrix):
+        made = make(matrix)
+        if made is not None:
+            world = matrix * self._stage.to_world
+            self.document.node({**made, "matrix": [float(x) for row in world for x in row]})
+
+    def _place_cameras(self, keys):
+        """The camera that is asked for comes first: readers take the first."""
+        asked, settings = self._settings.camera(), self._settings
+        self._cameras.sort(key=lambda seen: seen[0].GetPath() != asked)
+        for at, (prim, matrix) in enumerate(self._cameras):
+            node = cameras.node(prim, self._stage, self.document, settings.aspect(), settings.policy(), settings.lens())
+            self._place(lambda _, node=node, prim=prim: {"name": str(prim.GetPath()), **node}, matrix)
+            stops = cameras.exposure(prim, self._stage)
+            if at == 0 and stops:
+                keys.setdefault("exposure", stops)
+
+    def _walk(self, prim, above, shown, purpose, purposes, own_transform=True):
+        """Yields for everything that is seen what makes its node of its matrix, and that matrix (the stage's units)."""
+        matrix, get = above, self._stage.get
+        if own_transform and prim.IsA(UsdGeom.Xformable):
+            xformable = UsdGeom.Xformable(prim)
+            local = xformable.GetLocalTransformation(self._stage.time)
+            matrix = local if xformable.GetResetXformStack() else local * above
+            if not numpy.isfinite(numpy.array(matrix)).all():
+                raise Fault(prim.GetPath(), "its transform is not finite", "look at its xformOps")
+        if prim.IsA(UsdGeom.Imageable):
+            imageable = UsdGeom.Imageable(prim)
+            shown = shown and get(imageable.GetVisibilityAttr()) != UsdGeom.Tokens.invisible
+            if imageable.GetPurposeAttr().HasAuthoredValue():
+                purpose = get(imageable.GetPurposeAttr())
+        if prim.IsA(UsdGeom.Camera):
+            self._cameras.append((prim, matrix))
+        elif shown and purpose in purposes:
+            yield from self._seen(prim, matrix, purposes)
+        if prim.IsA(UsdGeom.PointInstancer):
+            return
+        for child in prim.GetFilteredChildren(PREDICATE):
+            yield from self._walk(child, matrix, shown, purpose, purposes)
+
+    def _seen(self, prim, matrix, purposes):
+        name, kind = str(prim.GetPath()), prim.GetTypeName()
+        if prim.IsA(UsdGeom.PointInstancer):
+            yield from self._instances(prim, matrix, purposes)
+        elif is_dome(prim):
+            self._dome.take(prim, matrix * self._stage.to_world)
+        elif prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdGeom.Gprim):
+            if kind != "PortalLight":
+                yield (lambda at: _named(name, lights.node(prim, self._stage, self.document, at))), matrix
+        elif prim.IsA(UsdGeom.Mesh) or shapes.is_shape(prim) and kind not in _UNSEEN:
+            mesh = self._mesh(prim)
+            if mesh is not None:
+                keys = said(prim, self._stage)
+                extras = {"extras": {"caustique": keys}} if keys else {}
+                yield (lambda _: {"name": name, "mesh": mesh, **extras}), matrix
+        elif kind in _UNSEEN:
+            self._stage.losses.name(name, f"{_UNSEEN[kind]} not carried: convert to a mesh")
+
+    def _instances(self, prim, matrix, purposes):
+        """Copies of a PointInstancer's prototypes: meshes are shared, and each copy is a node."""
+        instancer, where, stage = UsdGeom.PointInstancer(prim), prim.GetPath(), self._stage
+        targets = instancer.GetPrototypesRel().GetForwardedTargets()
+        indices = stage.get(instancer.GetProtoIndicesAttr(), ())
+        if len(indices) and not 0 <= min(indices) <= max(indices) < len(targets):
+            raise Fault(where, f"protoIndices names a prototype beyond its {len(targets)}", "export it again")
+        mask = instancer.ComputeMaskAtTime(stage.time)
+        places = instancer.ComputeInstanceTransformsAtTime(
+            stage.time, stage.time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask)
+        if len(places) != len(indices):
+            raise Fault(where, f"it has {len(indices)} protoIndices, and positions for {len(places)}",
+                        "export it again")
+        if any(primvar.HasAuthoredValue() for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvars()):
+            stage.losses.name(where, "primvars of its copies are not carried: all look alike")
+        parts = {}
+        for at, (index, place) in enumerate(zip(indices, places)):
+            if mask and not mask[at]:
+                continue
+            if index not in parts:
+                prototype = stage.stage.GetPrimAtPath(targets[index])
+                if not prototype:
+                    raise Fault(where, f"its prototype {targets[index]} is not there", "name a prim of the stage")
+                parts[index] = list(self._walk(prototype, Gf.Matrix4d(1), True, "default", purposes, False))
+            for make, within in parts[index]:
+                yield make, within * place * matrix
+
+    def _mesh(self, prim):
+        """The glTF mesh of a Mesh or another shape: one for all instances that wear the same; None if it is empty."""
+        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        material = self._materials.bound(prim)
+        subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
+        parts = [(s, self._materials.bound(s.GetPrim()) or material) for s in subsets]
+        key = (source.GetPath(), material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts),
+               self._inherited(prim) if prim.IsInstanceProxy() else ())
+        if key not in self._meshes:
+            self._meshes[key] = self._made(prim, material, parts)
+        return self._meshes[key]
+
+    def _inherited(self, prim):
+        """Primvars that an instance gives its meshes from outside: their names and values."""
+        found = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
+        outside = [primvar for primvar in found if not primvar.GetAttr().GetPrim().IsInstanceProxy()]
+        return tuple((primvar.GetName(), str(primvar.Get(self._stage.time))) for primvar in outside)
+
+    def _made(self, prim, material, parts):
+        stage, where, holes = self._stage, prim.GetPath(), ()
+        if prim.IsA(UsdGeom.Mesh):
+            found = meshes.of_prim(prim, stage)
+            if found is None:
+                stage.losses.name(where, "it has no points")
+                return None
+            faces, holes = found
+            normals = self._normals(prim, faces)
+        else:
+            found = shapes.of_prim(prim, stage)
+            if found is None:
+                stage.losses.name(where, f"a {prim.GetTypeName()} is not carried")
+                return None
+            faces, normals = found
+        triangles, of_face = faces.triangles(holes)
+        closed = faces.closed(triangles)
+        glow = self._glow(prim, faces, triangles)
+        if isinstance(normals, str):
+            normals = faces.smooth_normals(triangles)
+        primitives, rest = [], numpy.ones(len(faces.counts), bool)
+        for subset, worn in parts:
+            chosen = self._chosen(subset, len(faces.counts))
+            taken = numpy.zeros(len(faces.counts), bool)
+            taken[chosen] = True
+            primitives.append((triangles[taken[of_face]], worn))
+            rest[chosen] = False
+        primitives.append((triangles[rest[of_face]], material))
+        fades = meshes.primvar(prim, "displayOpacity", stage) is not None
+        made = [self._primitive(prim, faces, normals, corners.reshape(-1),
+                                self._materials.wear(worn, closed, glow, fades))
+                for corners, worn in primitives if len(corners)]
+        return self.document.add("meshes", {"name": str(where), "primitives": made}) if made else None
+
+    def _chosen(self, subset, count):
+        """The faces of a GeomSubset."""
+        where = subset.GetPrim().GetPath()
+        if self._stage.get(subset.GetElementTypeAttr(), "face") != "face":
+            self._stage.losses.name(where, "a subset of anything but faces is not carried")
+            return []
+        chosen = numpy.asarray(self._stage.get(subset.GetIndicesAttr(), ()), numpy.int64)
+        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < count:
+            raise Fault(where, f"its indices name a face beyond the mesh's {count}", "export the mesh again")
+        return chosen
+
+    def _normals(self, prim, faces):
+        """Normals at each corner; None for flat faces; "smooth" where the mesh stands for a smooth surface."""
+        scheme = self._stage.get(UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr(), "catmullClark")
+        if scheme == "none":
+            return meshes.authored_normals(prim, faces, self._stage)
+        self._stage.losses.name(prim.GetPath(), f"subdivision ({scheme}) is not carried: its control mesh is shown, "
+                                "shaded smoothly (subdivide it before it is exported)")
+        return "smooth"
+
+    def _glow(self, prim, faces, triangles):
+        """Radiance that UsdLuxMeshLightAPI lets a mesh emit, or None."""
+        if not prim.HasAPI(UsdLux.LightAPI):
+            return None
+        light = lights.Light(prim, self._stage)
+        at = faces.points[faces.corners[triangles]]
+        matrix = numpy.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(self._stage.time))[:3, :3]
+        across = numpy.cross((at[:, 1] - at[:, 0]) @ matrix, (at[:, 2] - at[:, 0]) @ matrix)
+        return light.radiance(float(numpy.linalg.norm(across, axis=1).sum() / 2))
+
+    def _primitive(self, prim, faces, normals, corners, worn):
+        stage, names, arrays = self._stage, [], []
+        if normals is not None:
+            names.append("NORMAL")
+            arrays.append(normals)
+        for at, name in enumerate(worn.sets):
+            found = meshes.primvar(prim, name, stage)
+            if found is None:
+                stage.losses.name(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they "
+                                  "are one colour on it")
+                found = numpy.zeros((1, 2)), UsdGeom.Tokens.constant
+            values = faces.spread(*found, name)[:, :2] * (1, -1) + (0, 1)
+            names.append(f"TEXCOORD_{at}")
+            arrays.append(values)
+        if worn.color:
+            names.append("COLOR_0")
+            arrays.append(meshes.colours(prim, worn.color, faces, stage))
+        positions, values, index = meshes.welded(faces, corners, arrays)
+        attributes = {"POSITION": self.document.floats(positions, bounds=True)}
+        attributes.update((name, self.document.floats(array)) for name, array in zip(names, values))
+        return {"attributes": attributes, "indices": self.document.indices(index), "material": worn.index}
+
+
+def _named(name, made):
+    return None if made is None else {"name": name, **made}

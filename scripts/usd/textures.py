@@ -1,0 +1,238 @@
+"""Images: as they are where glTF can say so, otherwise baked."""
+
+import dataclasses
+import io
+import math
+import os
+import tempfile
+
+import numpy
+import OpenEXR
+from PIL import Image
+
+from faults import Fault
+
+_MIMES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3, "x": 0, "y": 1, "z": 2, "w": 3}
+
+
+class Textures:
+    """Puts the textures of materials into a document."""
+
+    def __init__(self, stage, document):
+        self._stage, self._document = stage, document
+        self._data, self._texels = {}, {}
+
+    def reference(self, texture, sets, image):
+        """What a glTF material says of an image; `sets`: the primvars that the mesh has for coordinates, added to."""
+        sampler = self._document.share("samplers", {"wrapS": texture.wraps[0], "wrapT": texture.wraps[1]})
+        entry = {"index": self._document.share("textures", {"source": image, "sampler": sampler})}
+        if texture.uv not in sets:
+            if len(sets) == 2:
+                self._stage.losses.name(texture.prim.GetPath(), f"more than two sets of texture coordinates: {sets[0]} "
+                                        f"takes the place of {texture.uv}")
+            else:
+                sets.append(texture.uv)
+        at = sets.index(texture.uv) if texture.uv in sets else 0
+        if at:
+            entry["texCoord"] = at
+        said = _transform(*texture.transform)
+        if said:
+            entry["extensions"] = {self._document.use("KHR_texture_transform"): said}
+        return entry
+
+    def color(self, texture):
+        """An image (index) that glTF decodes from sRGB, and the factor to it (3 numbers)."""
+        data, name = self._file(texture)
+        scale, bias = texture.scale[:3], texture.bias[:3]
+        texels, srgb = self._load(texture)
+        if texture.channel == "rgb" and not any(bias) and max(scale) <= 1 and srgb and _mime(data):
+            return self._document.image(data, _mime(data), name), list(scale)
+        values = self._linear(texels, srgb, texture)
+        if texture.channel != "rgb":
+            values = numpy.repeat(self._channel(texture, values), 3, axis=2)
+        else:
+            values = values[:, :, :3] * scale + bias
+        self._clip(texture, values)
+        return self._png(_to_srgb(values), name), [1.0] * 3
+
+    def emission(self, texture):
+        """An image as of `color`, and the radiance (3 numbers) to it."""
+        scale = texture.scale[:3]
+        most = max(max(scale), 1e-30)
+        image, factor = self.color(dataclasses.replace(texture, scale=tuple(s / most for s in scale) + (1.0,),
+                                                       bias=tuple(b / most for b in texture.bias)))
+        return image, [f * most for f in factor]
+
+    def normals(self, texture):
+        """An image of normals, and their strength."""
+        data, name = self._file(texture)
+        texels, _ = self._load(texture)
+        standard = texture.scale[:3] in ((1.0,) * 3, (2.0,) * 3)
+        if texture.channel == "rgb" and _mime(data) and standard:
+            return self._document.image(data, _mime(data), name), 1.0
+        scale, bias = texture.scale[:3], texture.bias[:3]
+        if scale[0] == scale[1] and scale[2] == 2.0 and bias == (-1.0,) * 3 and _mime(data):
+            return self._document.image(data, _mime(data), name), scale[0] / 2
+        values = texels[:, :, :3] * scale + bias
+        return self._png(values * 0.5 + 0.5, name), 1.0
+
+    def packed(self, parts):
+        """An image whose channels are given: {channel of glTF: texture or number}; the others are 1."""
+        arrays = {at: self.values(part) for at, part in parts.items() if not isinstance(part, (int, float))}
+        shape = max((array.shape for array in arrays.values()), key=lambda s: s[0] * s[1])
+        texels = numpy.ones((*shape, 4 if 3 in parts else 3))
+        for at, part in parts.items():
+            texels[:, :, at] = _resized(arrays[at], shape) if at in arrays else part
+        name = next(part for part in parts.values() if not isinstance(part, (int, float)))
+        return self._png(texels, self._file(name)[1])
+
+    def with_alpha(self, base, alpha):
+        """An image of colour (a texture, or 3 numbers) with a presence; the factor to its colour."""
+        data, name = self._file(alpha)
+        texels, srgb = self._load(alpha)
+        same = not isinstance(base, tuple) and base.asset == alpha.asset and alpha.channel == "a"
+        if same and srgb and _mime(data) == "image/png" and base.channel == "rgb" and not any(base.bias) \
+                and max(base.scale) <= 1 and alpha.scale[3] == 1 and not alpha.bias[3]:
+            return self._document.image(data, "image/png", name), list(base.scale[:3])
+        presence = self.values(alpha)
+        if isinstance(base, tuple):
+            color, factor = numpy.ones((*presence.shape, 3)), list(base)
+        else:
+            texels, srgb = self._load(base)
+            values = self._linear(texels, srgb, base)
+            values = (values[:, :, :3] * base.scale[:3] + base.bias[:3] if base.channel == "rgb" else
+                      numpy.repeat(self._channel(base, values), 3, axis=2))
+            color, factor = _to_srgb(values), [1.0] * 3
+        shape = max(presence.shape, color.shape[:2], key=lambda s: s[0] * s[1])
+        planes = [_resized(color[:, :, k], shape) for k in range(3)] + [_resized(presence, shape)]
+        return self._png(numpy.stack(planes, axis=2), name), factor
+
+    def values(self, texture):
+        """The numbers (height, width) of one channel of a texture."""
+        texels, srgb = self._load(texture)
+        values = self._channel(texture, self._linear(texels, srgb, texture))[:, :, 0]
+        self._clip(texture, values)
+        return values
+
+    def data_as_is(self, texture, at):
+        """The image itself where its channel `at` (glTF's) holds what the texture gives; else None."""
+        data, name = self._file(texture)
+        texels, srgb = self._load(texture)
+        channel = 0 if texture.channel == "rgb" else _CHANNELS[texture.channel]
+        grey = texels.shape[2] < 3 or (channel < 3 and (texels[:, :, :3] == texels[:, :, :1]).all())
+        plain = texture.scale[channel] == 1 and texture.bias[channel] == 0 and not srgb
+        if plain and _mime(data) and (channel == at or grey):
+            return self._document.image(data, _mime(data), name)
+        return None
+
+    def _channel(self, texture, values):
+        at = 0 if texture.channel == "rgb" else _CHANNELS[texture.channel]
+        if at >= values.shape[2]:
+            at, values = 0, values if at < 3 else numpy.ones_like(values)
+        return values[:, :, at:at + 1] * texture.scale[at] + texture.bias[at]
+
+    def _clip(self, texture, values):
+        if values.min() < -1e-4 or values.max() > 1 + 1e-4:
+            self._stage.losses.name(texture.prim.GetPath(), "texels outside 0 to 1 are clipped")
+
+    def _file(self, texture):
+        path = texture.asset.resolvedPath or texture.asset.path
+        if path not in self._data:
+            if "<UDIM>" in texture.asset.path:
+                raise Fault(texture.prim.GetPath(), "UDIM tiles are not read", "bake the tiles into one image")
+            self._data[path] = self._stage.asset(texture.prim, texture.asset)
+        return self._data[path]
+
+    def _load(self, texture):
+        """Texels (height, width, channels) as the file has them, 0 to 1 of integers; whether they are sRGB."""
+        data, name = self._file(texture)
+        if name not in self._texels:
+            self._texels[name] = read(data, name, texture.prim.GetPath())
+        texels, bits = self._texels[name]
+        # The specification: images of 8 bits and three channels or more are sRGB unless they are said to be raw.
+        srgb = texture.space == "sRGB" or (texture.space == "auto" and bits == 8 and texels.shape[2] >= 3)
+        return texels, srgb
+
+    def _linear(self, texels, srgb, texture):
+        if not srgb:
+            return texels
+        colors = min(texels.shape[2], 3)
+        return numpy.concatenate([from_srgb(texels[:, :, :colors]), texels[:, :, colors:]], axis=2)
+
+    def _png(self, values, name):
+        """An image of 8 bits of values (height, width, 3 or 4)."""
+        bytes_ = numpy.rint(numpy.clip(values, 0, 1) * 255).astype(numpy.uint8)
+        file = io.BytesIO()
+        Image.fromarray(bytes_).save(file, "PNG")
+        return self._document.image(file.getvalue(), "image/png", name)
+
+
+def read(data, name, where):
+    """Texels (height, width, channels; grey, grey and alpha, or colours) of the bytes of a file, and bits a channel."""
+    if data[:4] == b"\x76\x2f\x31\x01":
+        return _read_exr(data, where), 32
+    try:
+        image = Image.open(io.BytesIO(data))
+        if image.mode in ("P", "CMYK", "YCbCr", "1"):
+            image = image.convert("RGBA" if "transparency" in image.info else "RGB")
+        texels = numpy.asarray(image)
+    except Exception as error:  # whatever Pillow raises about bytes that come from anywhere
+        raise Fault(where, f"the image {os.path.basename(name)} cannot be read: {error}",
+                    "save it as PNG, JPEG or OpenEXR")
+    bits = 8 if texels.dtype == numpy.uint8 else 16
+    if texels.dtype.kind not in "ui" and texels.dtype != numpy.float32:
+        raise Fault(where, f"the image {os.path.basename(name)} has texels of {texels.dtype}", "save it with 8 bits")
+    scale = 1.0 if texels.dtype == numpy.float32 else 2.0 ** bits - 1
+    texels = texels.astype(numpy.float64) / scale
+    return (texels[:, :, None] if texels.ndim == 2 else texels), bits
+
+
+def _read_exr(data, where):
+    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
+        file.write(data)
+        file.flush()
+        try:
+            channels = OpenEXR.File(file.name).channels()
+        except Exception as error:  # whatever OpenEXR raises about bytes that come from anywhere
+            raise Fault(where, f"the OpenEXR image cannot be read: {error}", "write it again")
+        for name in ("RGBA", "RGB", "Y"):
+            if name in channels:
+                texels = channels[name].pixels.astype(numpy.float64)
+                return texels[:, :, None] if texels.ndim == 2 else texels
+    raise Fault(where, "the OpenEXR image has neither RGB nor Y", "write it with channels R, G and B")
+
+
+def from_srgb(values):
+    """Linear values of encoded ones (IEC 61966-2-1)."""
+    return numpy.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def _to_srgb(values):
+    values = numpy.clip(values, 0, 1)
+    return numpy.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055)
+
+
+def _resized(values, shape):
+    if values.shape[:2] == tuple(shape):
+        return values
+    image = Image.fromarray(values.astype(numpy.float32))
+    return numpy.asarray(image.resize((shape[1], shape[0]), Image.Resampling.BILINEAR), numpy.float64)
+
+
+def _transform(scale, degrees, translation):
+    """KHR_texture_transform of a UsdTransform2d: with v = 1 - t its matrix is mirrored."""
+    turn = math.radians(degrees)
+    offset = [translation[0] - math.sin(turn) * scale[1], 1 - math.cos(turn) * scale[1] - translation[1]]
+    said = {}
+    if any(abs(x) > 1e-7 for x in offset):
+        said["offset"] = offset
+    if turn:
+        said["rotation"] = turn
+    if tuple(scale) != (1.0, 1.0):
+        said["scale"] = list(scale)
+    return said
+
+
+def _mime(data):
+    return next((mime for start, mime in _MIMES.items() if data.startswith(start)), None)

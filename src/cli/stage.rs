@@ -1,0 +1,51 @@
+//! What a stage of USD says about its own render: options that hold where the command line does not give them.
+
+use super::scene::SceneArgs;
+use super::{Cli, Command, usage};
+use caustique::error::Result;
+use caustique::scene::usd;
+use clap::FromArgMatches;
+use std::ffi::OsString;
+
+/// The command with the options of the stage that it reads, each before those of the command line: of an option that is
+/// given twice the last one holds. `plan` takes those that it knows.
+///
+/// # Errors
+/// The stage cannot be read, or says options that do not exist or contradict those of the command line.
+pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
+    let (scene, known) = match &command {
+        Command::Render(args) => (&args.job.scene, None),
+        Command::Plan(args) => (args.scene(), line.find_subcommand("plan")),
+        _ => return Ok(command),
+    };
+    let path = first_file(scene);
+    if !usd::is_stage(&path.path) || !path.path.is_file() {
+        return Ok(command);
+    }
+    let knows = |word: &String| {
+        let name = word.trim_start_matches("--").split('=').next();
+        known.is_none_or(|known| known.get_arguments().any(|argument| argument.get_long() == name))
+    };
+    let said: Vec<String> = usd::arguments(&path.path, path.allow_outside)?.into_iter().filter(knows).collect();
+    if said.is_empty() {
+        return Ok(command);
+    }
+    let mut words: Vec<OsString> = std::env::args_os().collect();
+    let at = words.len().min(2);
+    words.splice(at..at, said.into_iter().map(OsString::from));
+    let name = words.get(1).cloned().unwrap_or_default();
+    let parsed = line.try_get_matches_from_mut(words).and_then(|matches| Cli::from_arg_matches(&matches));
+    match parsed {
+        Ok(cli) => Ok(cli.command),
+        Err(error) => match usage::explain(&error, line.find_subcommand(name)) {
+            Some(error) => Err(error.within(format!("{}: RenderSettings", path.path.display()))),
+            None => Ok(command),
+        },
+    }
+}
+
+/// The scene, or its first frame's file where its name is a pattern.
+fn first_file(scene: &SceneArgs) -> SceneArgs {
+    let first = scene.frames.and_then(|frames| frames.iter().next());
+    first.map_or_else(|| scene.clone(), |frame| scene.at(frame))
+}

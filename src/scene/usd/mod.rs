@@ -1,0 +1,135 @@
+//! Stages of USD (`.usd`, `.usda`, `.usdc`, `.usdz`), read by way of a .glb: a converter in Python (`scripts/usd`,
+//! which is part of the program) lets Pixar's own library compose the stage, and [`gltf`] reads what it writes, so that a
+//! scene means the same through either door.
+
+mod python;
+
+pub use python::Interpreter;
+
+use super::description::Description;
+use super::gltf::{self, Frame, ReadOptions};
+use crate::error::{Error, Kind, Result};
+use serde::Deserialize;
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::Output;
+
+/// Extensions of stages.
+const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
+
+/// The converter's files.
+const SOURCES: [(&str, &str); 17] = [
+    ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
+    ("convert.py", include_str!("../../../scripts/usd/convert.py")),
+    ("document.py", include_str!("../../../scripts/usd/document.py")),
+    ("dome.py", include_str!("../../../scripts/usd/dome.py")),
+    ("faults.py", include_str!("../../../scripts/usd/faults.py")),
+    ("lights.py", include_str!("../../../scripts/usd/lights.py")),
+    ("materials.py", include_str!("../../../scripts/usd/materials.py")),
+    ("materialx.py", include_str!("../../../scripts/usd/materialx.py")),
+    ("meshes.py", include_str!("../../../scripts/usd/meshes.py")),
+    ("network.py", include_str!("../../../scripts/usd/network.py")),
+    ("preview.py", include_str!("../../../scripts/usd/preview.py")),
+    ("render_settings.py", include_str!("../../../scripts/usd/render_settings.py")),
+    ("scene.py", include_str!("../../../scripts/usd/scene.py")),
+    ("shapes.py", include_str!("../../../scripts/usd/shapes.py")),
+    ("stage.py", include_str!("../../../scripts/usd/stage.py")),
+    ("surface.py", include_str!("../../../scripts/usd/surface.py")),
+    ("textures.py", include_str!("../../../scripts/usd/textures.py")),
+];
+
+/// Whether a path is called as stages are.
+pub fn is_stage(path: &Path) -> bool {
+    path.extension().is_some_and(|own| EXTENSIONS.iter().any(|known| own.eq_ignore_ascii_case(known)))
+}
+
+/// Reads the stage at `path`, at the frame that `options` ask for (a time code), else at its first.
+///
+/// # Errors
+/// No Python with `usd-core`; what the stage has wrong, by prim; [`gltf::read`] of what becomes of it.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
+    let converter = Converter::new(path)?;
+    let glb = converter.folder.path().join("stage.glb");
+    let mut words: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
+    if let Some(frame) = options.frame {
+        words.extend(["--frame".into(), frame.number.to_string().into()]);
+    }
+    converter.run(&words, options.allow_outside)?;
+    // The converter has looked at the frame, and put beside the .glb what it names.
+    let frame = options.frame.map(|frame| Frame { of_sequence: true, ..frame });
+    let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
+    let mut description = read.map_err(|mut error| {
+        error.place = error.place.replace(&glb.display().to_string(), &path.display().to_string());
+        error
+    })?;
+    description.source = path.to_owned();
+    Ok(description)
+}
+
+/// Options of `caustique render` that the stage's RenderSettings stand for.
+///
+/// # Errors
+/// Those of the converter, as for [`read`].
+pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
+    let output = Converter::new(path)?.run(&["--arguments".into()], allow_outside)?;
+    serde_json::from_slice(&output.stdout).map_err(|cause| {
+        Error::new(Kind::Scene, path.display(), format!("the converter does not say options: {cause}"))
+    })
+}
+
+/// What the converter says of an error.
+#[derive(Deserialize)]
+struct Fault {
+    prim: String,
+    fault: String,
+    hint: Option<String>,
+}
+
+/// The converter, laid out in a folder that ends with it.
+struct Converter<'p> {
+    stage: &'p Path,
+    interpreter: Interpreter,
+    folder: tempfile::TempDir,
+}
+
+impl<'p> Converter<'p> {
+    fn new(stage: &'p Path) -> Result<Converter<'p>> {
+        std::fs::File::open(stage)
+            .map_err(|e| Error::io(stage, &e).hint("check the path of the scene file and your right to read it"))?;
+        let interpreter = Interpreter::find()?;
+        let folder = tempfile::Builder::new().prefix("caustique-usd-").tempdir();
+        let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))?;
+        for (name, source) in SOURCES {
+            let path = folder.path().join(name);
+            std::fs::write(&path, source).map_err(|cause| Error::io(&path, &cause))?;
+        }
+        Ok(Converter { stage, interpreter, folder })
+    }
+
+    /// Runs the converter on the stage.
+    fn run(&self, words: &[OsString], allow_outside: bool) -> Result<Output> {
+        let mut command = self.interpreter.command();
+        command.arg("-B").arg(self.folder.path().join("convert.py")).arg(self.stage).args(words);
+        if allow_outside {
+            command.arg("--allow-outside");
+        }
+        let output = command
+            .output()
+            .map_err(|cause| Error::new(Kind::Library, self.interpreter.path().display(), cause).hint(python::HINT))?;
+        if output.status.success() {
+            return Ok(output);
+        }
+        let told = String::from_utf8_lossy(&output.stderr);
+        let fault = told.lines().rev().find_map(|line| serde_json::from_str::<Fault>(line).ok());
+        Err(self.error(fault, &told))
+    }
+
+    fn error(&self, fault: Option<Fault>, told: &str) -> Error {
+        let Some(Fault { prim, fault, hint }) = fault else {
+            let last = told.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
+            let cause = format!("the converter (scripts/usd) failed: {}", last.trim());
+            return Error::new(Kind::Scene, self.stage.display(), cause).hint("'caustique doctor' says what is found");
+        };
+        Error { hint, ..Error::new(Kind::Scene, prim, fault).within(self.stage.display()) }
+    }
+}

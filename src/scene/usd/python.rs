@@ -1,0 +1,72 @@
+//! Finding a Python that has `usd-core`.
+
+use crate::error::{Error, Kind, Result};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Environment variable that names the Python.
+pub const VARIABLE: &str = "CAUSTIQUE_USD_PYTHON";
+
+/// Where `scripts/setup.sh` installs, below the project's folder.
+const ENVIRONMENT: &str = ".venv-usd/bin/python";
+
+/// What to do where there is none.
+pub(super) const HINT: &str = "run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip \
+                               install usd-core numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to \
+                               that Python";
+
+/// Imports all that the converter needs, and prints USD's version.
+const PROBE: &str = "import mapbox_earcut, numpy, OpenEXR, PIL\nfrom pxr import Usd, UsdLux, UsdShade\n\
+                     print('.'.join(map(str, Usd.GetVersion()[1:])))";
+
+/// A Python that runs the converter.
+#[derive(Clone, Debug)]
+pub struct Interpreter {
+    path: PathBuf,
+}
+
+impl Interpreter {
+    /// The Python that `CAUSTIQUE_USD_PYTHON` names, and then no other; `.venv-usd` of the current directory or of a
+    /// folder above the executable (where `scripts/setup.sh usd` puts it); `python3`.
+    ///
+    /// # Errors
+    /// [`Kind::Library`] where the variable names no file.
+    pub fn find() -> Result<Interpreter> {
+        if let Some(path) = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from) {
+            return if path.is_file() {
+                Ok(Interpreter { path })
+            } else {
+                Err(Error::new(Kind::Library, format!("{VARIABLE}={}", path.display()), "no such file").hint(HINT))
+            };
+        }
+        let executable = std::env::current_exe().ok();
+        let above = executable.iter().flat_map(|path| path.ancestors().skip(1)).map(Path::to_path_buf);
+        let mut folders = std::env::current_dir().ok().into_iter().chain(above);
+        let found = folders.find_map(|folder| Some(folder.join(ENVIRONMENT)).filter(|path| path.is_file()));
+        Ok(Interpreter { path: found.unwrap_or_else(|| "python3".into()) })
+    }
+
+    /// The file, or the name that the system looks up.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A command that runs this Python.
+    pub(super) fn command(&self) -> Command {
+        Command::new(&self.path)
+    }
+
+    /// The version of USD, once all that the converter needs is there.
+    ///
+    /// # Errors
+    /// [`Kind::Library`]: it does not run, or lacks a module.
+    pub fn version(&self) -> Result<String> {
+        let error = |cause: String| Error::new(Kind::Library, self.path.display(), cause).hint(HINT);
+        let output = self.command().args(["-c", PROBE]).output().map_err(|cause| error(cause.to_string()))?;
+        if output.status.success() {
+            return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
+        }
+        let told = String::from_utf8_lossy(&output.stderr);
+        Err(error(told.lines().last().unwrap_or("it does not run").trim().to_owned()))
+    }
+}

@@ -1,0 +1,279 @@
+"""Materials of stages: what becomes of UsdPreviewSurface, OpenPBR and Standard Surface, and of their textures."""
+
+import io
+import math
+import unittest
+
+import numpy
+from PIL import Image
+from pxr import Gf, Sdf, UsdGeom, UsdShade, Vt
+
+import usd_support
+from faults import Fault
+from usd_support import corners
+
+OPEN_PBR, STANDARD = "ND_open_pbr_surface_surfaceshader", "ND_standard_surface_surfaceshader"
+
+
+class Materials(usd_support.Stages):
+    def setUp(self):
+        super().setUp()
+        self.closed = UsdGeom.Cube.Define(self.stage, "/Cube")
+
+    def worn(self, kind="UsdPreviewSurface", context="", prim=None, **inputs):
+        """The glTF material of a shader with these inputs, and what is lost."""
+        self.bind(prim or self.closed, self.material(kind=kind, context=context, **inputs))
+        document, _, lost = self.convert()
+        return document["materials"][0], lost
+
+    def test_preview_surface(self):
+        found, lost = self.worn(diffuseColor=(0.1, 0.2, 0.3), metallic=0.25, roughness=0.75, ior=1.4, clearcoat=0.5,
+                                clearcoatRoughness=0.2, emissiveColor=(4.0, 2.0, 0.0))
+        core, extensions = found["pbrMetallicRoughness"], found["extensions"]
+        numpy.testing.assert_allclose(core["baseColorFactor"], [0.1, 0.2, 0.3, 1], rtol=1e-6)
+        self.assertEqual((core["metallicFactor"], core["roughnessFactor"]), (0.25, 0.75))
+        self.assertAlmostEqual(extensions["KHR_materials_ior"]["ior"], 1.4, places=6)
+        self.assertEqual(extensions["KHR_materials_clearcoat"]["clearcoatFactor"], 0.5)
+        self.assertEqual(found["emissiveFactor"], [1, 0.5, 0])
+        self.assertEqual(extensions["KHR_materials_emissive_strength"]["emissiveStrength"], 4)
+        self.assertEqual(lost, [])
+
+    def test_the_specular_workflow_keeps_the_reflectance(self):
+        found, _ = self.worn(useSpecularWorkflow=1, specularColor=(0.2, 0.1, 0.0), metallic=0.5)
+        ior = found["extensions"]["KHR_materials_ior"]["ior"]
+        reflectance = ((ior - 1) / (ior + 1)) ** 2 * numpy.array(
+            found["extensions"]["KHR_materials_specular"]["specularColorFactor"])
+        numpy.testing.assert_allclose(reflectance, [0.2, 0.1, 0], atol=1e-6)
+        self.assertEqual(found["pbrMetallicRoughness"]["metallicFactor"], 0)
+
+    def test_opacity_is_glass_presence_or_a_cut_out(self):
+        found, lost = self.worn(opacity=0.0, roughness=0.0, ior=1.45)
+        self.assertEqual(found["extensions"]["KHR_materials_transmission"]["transmissionFactor"], 1)
+        self.assertEqual(found["extensions"]["KHR_materials_volume"]["thicknessFactor"], 1)
+        self.assertEqual((found["pbrMetallicRoughness"]["baseColorFactor"], lost), ([1, 1, 1, 1], []))
+        found, _ = self.worn(opacity=0.5, opacityThreshold=0.25)
+        self.assertEqual((found["alphaMode"], found["alphaCutoff"]), ("MASK", 0.25))
+        self.assertNotIn("KHR_materials_transmission", found["extensions"])
+        shader = UsdShade.Shader.Get(self.stage, "/Material/Shader")
+        shader.GetInput("opacityThreshold").Set(0.0)
+        shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set("presence")
+        self.assertEqual(self.convert()[0]["materials"][0]["alphaMode"], "BLEND")
+
+    def test_glass_on_a_mesh_with_holes_is_a_pane(self):
+        pane = self.mesh("/Pane", [(0, 0, 0), (1, 0, 0), (1, 1, 0)], [3], [0, 1, 2])
+        self.stage.RemovePrim("/Cube")
+        found, lost = self.worn(prim=pane, opacity=0.0)
+        self.assertEqual(found["extensions"]["KHR_materials_volume"]["thicknessFactor"], 0)
+        self.assertIn("/Material: it is worn by a mesh with holes", lost[0])
+
+    def test_glass_of_either_model_of_materialx(self):
+        UsdGeom.SetStageMetersPerUnit(self.stage, 0.01)
+        cases = {
+            OPEN_PBR: dict(transmission_weight=1.0, transmission_color=(0.5, 0.25, 1.0), transmission_depth=2.0,
+                           specular_ior=1.6, specular_roughness=0.0, transmission_dispersion_scale=1.0,
+                           transmission_dispersion_abbe_number=40.0),
+            STANDARD: dict(transmission=1.0, transmission_color=(0.5, 0.25, 1.0), transmission_depth=2.0,
+                           specular_IOR=1.6, specular_roughness=0.0, transmission_dispersion=40.0),
+        }
+        for kind, inputs in cases.items():
+            found, lost = self.worn(kind, "mtlx", **inputs)
+            extensions = found["extensions"]
+            self.assertEqual(extensions["KHR_materials_transmission"]["transmissionFactor"], 1)
+            self.assertAlmostEqual(extensions["KHR_materials_ior"]["ior"], 1.6, places=6)
+            self.assertEqual(extensions["KHR_materials_volume"], {
+                "thicknessFactor": 1, "attenuationColor": [0.5, 0.25, 1], "attenuationDistance": 0.02})
+            self.assertEqual(extensions["KHR_materials_dispersion"]["dispersion"], 0.5)
+            self.assertEqual(found["pbrMetallicRoughness"]["baseColorFactor"], [1, 1, 1, 1])
+            self.assertEqual(lost, [])
+            self.stage.RemovePrim("/Material")
+
+    def test_scattering_inside_is_a_medium(self):
+        found, _ = self.worn(OPEN_PBR, "mtlx", transmission_weight=1.0, transmission_color=(0.5, 0.5, 0.5),
+                             transmission_depth=0.5, transmission_scatter=(0.1, 0.2, 0.3))
+        medium = found["extras"]["caustique"]["medium"]
+        numpy.testing.assert_allclose(medium["sigma_s"], [0.2, 0.4, 0.6], rtol=1e-6)
+        numpy.testing.assert_allclose(numpy.add(medium["sigma_a"], medium["sigma_s"]), [2 * math.log(2)] * 3, rtol=1e-6)
+
+    def test_what_materialx_loses_is_named(self):
+        _, lost = self.worn(OPEN_PBR, "mtlx", subsurface_weight=0.5, thin_film_weight=1.0)
+        self.assertEqual([line.split(": ")[1].split(" is ")[0] for line in lost],
+                         ["subsurface scattering", "a thin film"])
+        self.stage.RemovePrim("/Material")
+        found, lost = self.worn("ND_disney_principled", "mtlx")
+        self.assertIn("a surface ND_disney_principled is not read", lost[0])
+        self.assertIn("/Material", lost[0])
+
+    def test_a_network_that_is_not_read_leaves_the_preview(self):
+        material = self.material(roughness=0.25)
+        other = UsdShade.Shader.Define(self.stage, "/Material/Other")
+        other.CreateIdAttr("ND_surface")
+        material.CreateSurfaceOutput("mtlx").ConnectToSource(other.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+        self.bind(self.closed, material)
+        document, _, lost = self.convert()
+        self.assertEqual(document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 0.25)
+        self.assertEqual(lost, ["/Material: a surface ND_surface is not read: its UsdPreviewSurface takes its place"])
+
+    def test_keys_of_caustique(self):
+        material = self.material(opacity=0.0)
+        prim = material.GetPrim()
+        prim.CreateAttribute("caustique:priority", Sdf.ValueTypeNames.Int).Set(3)
+        prim.CreateAttribute("caustique:medium:sigma_a", Sdf.ValueTypeNames.Float3).Set(Gf.Vec3f(1, 2, 3))
+        self.closed.GetPrim().CreateAttribute("caustique:visible:camera", Sdf.ValueTypeNames.Bool).Set(False)
+        self.bind(self.closed, material)
+        document, _, _ = self.convert()
+        self.assertEqual(document["materials"][0]["extras"]["caustique"],
+                         {"priority": 3, "medium": {"sigma_a": [1, 2, 3]}})
+        self.assertEqual(document["nodes"][0]["extras"]["caustique"], {"visible": {"camera": False}})
+
+    def test_what_is_bound_is_not_there(self):
+        UsdShade.MaterialBindingAPI.Apply(self.closed.GetPrim()).GetPrim().CreateRelationship(
+            "material:binding").SetTargets(["/Nothing"])
+        self.assertIn("/Cube: the material /Nothing is not there", self.convert()[2])
+
+
+class Textures(usd_support.Stages):
+    """A square with coordinates `st` of its own places, and images of 2 by 2 texels, upper row first."""
+
+    def setUp(self):
+        super().setUp()
+        self.square = self.mesh("/Square", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [4], [0, 1, 2, 3])
+        st = UsdGeom.PrimvarsAPI(self.square).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "vertex")
+        st.Set(Vt.Vec2fArray([(0, 0), (1, 0), (1, 1), (0, 1)]))
+        self.surface = self.material()
+        self.shader = UsdShade.Shader.Get(self.stage, "/Material/Shader")
+        self.bind(self.square, self.surface)
+
+    def texture(self, name, texels, to, output="rgb", transform=None, **inputs):
+        """Feeds an input `to` with an image; `transform`: inputs of a UsdTransform2d."""
+        Image.fromarray(numpy.array(texels, numpy.uint8)).save(self.dir / f"{name}.png")
+        image = UsdShade.Shader.Define(self.stage, f"/Material/{name}")
+        image.CreateIdAttr("UsdUVTexture")
+        image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"{name}.png")
+        reader = UsdShade.Shader.Define(self.stage, f"/Material/{name}_st")
+        reader.CreateIdAttr("UsdPrimvarReader_float2")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+        last = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        if transform:
+            turn = UsdShade.Shader.Define(self.stage, f"/Material/{name}_transform")
+            turn.CreateIdAttr("UsdTransform2d")
+            turn.CreateInput("in", Sdf.ValueTypeNames.Float2).ConnectToSource(last)
+            for key, value in transform.items():
+                kind = Sdf.ValueTypeNames.Float if key == "rotation" else Sdf.ValueTypeNames.Float2
+                turn.CreateInput(key, kind).Set(value)
+            last = turn.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(last)
+        for key, value in inputs.items():
+            kind = Sdf.ValueTypeNames.Token if isinstance(value, str) else Sdf.ValueTypeNames.Float4
+            image.CreateInput(key, kind).Set(value if isinstance(value, str) else Gf.Vec4f(*value))
+        kind = Sdf.ValueTypeNames.Float if len(output) == 1 else Sdf.ValueTypeNames.Float3
+        given = self.shader.CreateInput(to, Sdf.ValueTypeNames.Color3f if kind == Sdf.ValueTypeNames.Float3 else kind)
+        given.ConnectToSource(image.CreateOutput(output, kind))
+
+    def made(self):
+        """The material, its images (arrays of bytes), and what is lost."""
+        document, buffer, lost = self.convert()
+        views = [document["bufferViews"][image["bufferView"]] for image in document.get("images", ())]
+        images = [numpy.asarray(Image.open(io.BytesIO(buffer[v["byteOffset"]:v["byteOffset"] + v["byteLength"]])))
+                  for v in views]
+        return document["materials"][0], images, lost
+
+    COLOURS = [[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [128, 128, 128]]]
+
+    def test_a_colour_is_carried_as_it_is_and_upright(self):
+        self.texture("colour", self.COLOURS, "diffuseColor", sourceColorSpace="sRGB", scale=(0.5, 0.5, 0.5, 1))
+        found, images, lost = self.made()
+        numpy.testing.assert_array_equal(images[0], self.COLOURS)
+        self.assertEqual(found["pbrMetallicRoughness"]["baseColorFactor"][:3], [0.5] * 3)
+        self.assertEqual(lost, [])
+        document, buffer, _ = self.convert()
+        at = corners(document, buffer)
+        numpy.testing.assert_allclose(at["TEXCOORD_0"], numpy.stack(
+            [at["POSITION"][:, 0], 1 - at["POSITION"][:, 1]], axis=1))
+
+    def test_a_raw_colour_and_one_with_a_bias_are_baked(self):
+        self.texture("colour", self.COLOURS, "diffuseColor", sourceColorSpace="raw", scale=(0.5,) * 4, bias=(0.25,) * 4)
+        _, images, _ = self.made()
+        linear = numpy.array(self.COLOURS) / 255 * 0.5 + 0.25
+        encoded = 1.055 * linear ** (1 / 2.4) - 0.055
+        numpy.testing.assert_allclose(images[0], encoded * 255, atol=0.51)
+
+    def test_roughness_and_metalness_share_an_image(self):
+        self.texture("rough", [[[10, 20, 30], [40, 50, 60]]] * 2, "roughness", "b", sourceColorSpace="raw")
+        self.texture("metal", [[[1, 2, 3], [4, 5, 6]]] * 2, "metallic", "r", sourceColorSpace="raw")
+        found, images, _ = self.made()
+        self.assertEqual(images[0][0].tolist(), [[255, 30, 1], [255, 60, 4]])
+        core = found["pbrMetallicRoughness"]
+        self.assertEqual((core["roughnessFactor"], core["metallicFactor"]), (1, 1))
+
+    def test_one_image_with_the_right_channels_is_taken_as_it_is(self):
+        texels = [[[10, 20, 30], [40, 50, 60]]] * 2
+        for to, output in (("roughness", "g"), ("metallic", "b")):
+            self.texture("orm", texels, to, output, sourceColorSpace="raw")
+        _, images, _ = self.made()
+        self.assertEqual(images[0].tolist(), texels)
+        self.assertEqual(len(images), 1)
+
+    def test_presence_by_another_image(self):
+        self.texture("colour", self.COLOURS, "diffuseColor", sourceColorSpace="sRGB")
+        self.texture("mask", [[0, 255], [128, 255]], "opacity", "r", sourceColorSpace="raw")
+        found, images, lost = self.made()
+        self.assertEqual(images[0][:, :, 3].tolist(), [[0, 255], [128, 255]])
+        numpy.testing.assert_allclose(images[0][:, :, :3], self.COLOURS, atol=1)
+        self.assertEqual(found["alphaMode"], "BLEND")
+        self.assertEqual(len(lost), 1)
+
+    def test_normals(self):
+        self.texture("normal", [[[128, 128, 255]]], "normal", sourceColorSpace="raw", scale=(2, 2, 2, 1),
+                     bias=(-1, -1, -1, 0))
+        found, images, lost = self.made()
+        self.assertEqual((images[0].tolist(), lost), ([[[128, 128, 255]]], []))
+        self.assertNotIn("scale", found["normalTexture"])
+
+    def test_a_transform_reads_the_same_texel(self):
+        said = {"scale": Gf.Vec2f(0.5, 2), "rotation": 30.0, "translation": Gf.Vec2f(0.1, 0.2)}
+        self.texture("colour", self.COLOURS, "diffuseColor", transform=said, sourceColorSpace="sRGB")
+        found, _, _ = self.made()
+        made = found["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"]
+        # The reader's matrix: counter-clockwise with v running down (src/scene/gltf/texture.rs).
+        cos, sin = math.cos(made["rotation"]), math.sin(made["rotation"])
+        x, y = made["scale"]
+        matrix = numpy.array([[cos * x, sin * y], [-sin * x, cos * y]])
+        for s, t in ((0, 0), (1, 0), (0, 1), (0.3, 0.8)):
+            u, v = matrix @ (s, 1 - t) + made["offset"]
+            a = math.radians(30)
+            ours = (math.cos(a) * 0.5 * s - math.sin(a) * 2 * t + 0.1,
+                    math.sin(a) * 0.5 * s + math.cos(a) * 2 * t + 0.2)
+            numpy.testing.assert_allclose((u, 1 - v), ours, atol=1e-6)
+
+    def test_displaycolor_by_a_primvar_reader(self):
+        self.square.CreateDisplayColorAttr([Gf.Vec3f(0.25, 0.5, 0.75)])
+        reader = UsdShade.Shader.Define(self.stage, "/Material/reader")
+        reader.CreateIdAttr("UsdPrimvarReader_float3")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+        self.shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(
+            reader.CreateOutput("result", Sdf.ValueTypeNames.Float3))
+        found = corners(*self.convert()[:2])
+        numpy.testing.assert_allclose(found["COLOR_0"], [[0.25, 0.5, 0.75, 1]] * 6)
+
+    def test_a_missing_and_a_damaged_file(self):
+        self.texture("colour", self.COLOURS, "diffuseColor")
+        (self.dir / "colour.png").write_bytes(b"\x89PNG no more")
+        with self.assertRaisesRegex(Fault, "/Material/colour: the image colour.png cannot be read"):
+            self.convert()
+        (self.dir / "colour.png").unlink()
+        with self.assertRaisesRegex(Fault, "/Material/colour: the file colour.png is not found"):
+            self.convert()
+
+    def test_textures_in_a_package(self):
+        from pxr import UsdUtils
+        self.texture("colour", self.COLOURS, "diffuseColor", sourceColorSpace="sRGB")
+        self.stage.GetRootLayer().Save()
+        package = self.dir / "packed.usdz"
+        self.assertTrue(UsdUtils.CreateNewUsdzPackage(str(self.path), str(package)))
+        (self.dir / "colour.png").unlink()
+        document, _, lost = self.convert(package)
+        self.assertEqual((len(document["images"]), lost), (1, []))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,171 @@
+"""The program on stages: render, plan, info and frames, faults as errors, and the layer that tells of an EXR."""
+
+import sys
+import unittest
+
+import numpy
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender, UsdUtils, UsdValidation
+
+import support
+import usd_support
+
+QUICK = ("--width", 8, "--height", 8, "--iterations", 2, "--method", "path", "--progress", "none", "--no-combine")
+
+
+class Program(usd_support.Stages):
+    def setUp(self):
+        super().setUp()
+        self.floor()
+        self.camera((0, 2, 2), width=1.0)
+        self.light("DomeLight", intensity=1.0)
+        self.out = self.dir / "out.exr"
+
+    def save(self, text=""):
+        """Saves the stage, with more in the words of its format."""
+        root = self.stage.GetRootLayer()
+        if text:
+            root.ImportFromString(root.ExportToString() + text)
+        root.Save()
+
+    def run_on(self, command, *options, check=0, env=None):
+        return support.run([command, self.path, *options], check=check, env=env)
+
+    def test_the_same_bytes_as_its_glb(self):
+        self.convert()
+        self.run_on("render", "-o", self.out, *QUICK)
+        ours = usd_support.read_exr(self.out)
+        support.run(["render", self.dir / "out.glb", "-o", self.out, *QUICK], check=0)
+        numpy.testing.assert_array_equal(ours, usd_support.read_exr(self.out))
+        self.assertGreater(ours.mean(), 0.4)
+
+    def test_every_container_and_command(self):
+        self.save()
+        for suffix in (".usdc", ".usd"):
+            self.stage.Export(str(self.dir / f"stage{suffix}"))
+        self.assertTrue(UsdUtils.CreateNewUsdzPackage(str(self.path), str(self.dir / "stage.usdz")))
+        for suffix in (".usda", ".usdc", ".usd", ".usdz"):
+            done = support.run(["info", self.dir / f"stage{suffix}"], check=0)
+            self.assertIn("environment 1", done.stdout)
+        self.assertIn("emission", self.run_on("plan", *QUICK[:4], "--method", "path", "--no-combine").stdout)
+
+    def test_frames(self):
+        floor = UsdGeom.Xformable.Get(self.stage, "/Floor")
+        floor.AddTranslateOp().Set((0, 0, 0), 1)
+        UsdGeom.Imageable.Get(self.stage, "/Floor").GetVisibilityAttr().Set("inherited", 1)
+        UsdGeom.Imageable.Get(self.stage, "/Floor").GetVisibilityAttr().Set("invisible", 2)
+        self.save()
+        self.run_on("render", "-o", self.dir / "out.##.exr", "--frames", "1-2", *QUICK)
+        first, second = (usd_support.read_exr(self.dir / f"out.0{k}.exr") for k in (1, 2))
+        self.assertLess(first.mean(), 0.9)
+        numpy.testing.assert_allclose(second, 1, atol=1e-5)
+
+    def test_what_the_stage_says_holds_until_the_command_line_says_otherwise(self):
+        self.save("""
+def RenderSettings "Settings" {
+    uniform int2 resolution = (12, 6)
+    rel products = </Product>
+    custom int caustique:iterations = 1
+    custom string caustique:method = "path"
+    custom bool caustique:no_combine = 1
+}
+def RenderProduct "Product" {
+    rel orderedVars = [</Var>]
+}
+def RenderVar "Var" {
+    uniform string sourceName = "normal"
+}
+""")
+        self.run_on("render", "-o", self.out, "--progress", "none")
+        shown = support.run(["info", self.out], check=0).stdout
+        self.assertIn("12 x 6 pixels, 1 layers", shown)
+        normals = usd_support.OpenEXR.File(str(self.out), separate_channels=True).channels()
+        self.assertAlmostEqual(float(normals["normal.Y"].pixels.max()), 1, places=4)
+        self.run_on("render", "-o", self.out, "--progress", "none", "--layers", "beauty", "--width", 4, "--height", 4)
+        self.assertIn("4 x 4 pixels", support.run(["info", self.out], check=0).stdout)
+        self.save('def RenderSettings "Other" {\n custom int caustique:iterationz = 1\n}\n')
+
+    def test_an_option_that_does_not_exist(self):
+        self.save('def RenderSettings "Settings" {\n custom int caustique:iterationz = 1\n}\n')
+        done = self.run_on("render", "-o", self.out, check=2)
+        self.assertIn("stage.usda: RenderSettings", done.stderr)
+        self.assertIn("--iterationz", done.stderr)
+
+    def test_losses_are_warnings_and_strict_stops_at_them(self):
+        self.stage.DefinePrim("/Hair", "BasisCurves")
+        self.save()
+        done = self.run_on("render", "-o", self.out, *QUICK)
+        self.assertIn("stage.usda: /Hair: curves are not carried", done.stderr)
+        done = self.run_on("render", "-o", self.out, "--strict", *QUICK, check=1)
+        self.assertIn("--strict", done.stderr)
+
+    def test_faults_are_errors_that_name_the_prim(self):
+        self.mesh("/World/Broken", [(0, 0, 0)], [3], [0, 0, 1])
+        self.save()
+        for command in (("render", "-o", self.out, *QUICK), ("info",), ("plan",)):
+            done = self.run_on(*command, check=1)
+            self.assertIn("stage.usda: /World/Broken: faceVertexIndices names a point beyond", done.stderr)
+            self.assertIn("hint: export the mesh again", done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+        self.path.write_text("#usda 1.0\ndef Mesh {")
+        done = self.run_on("info", check=1)
+        self.assertIn("USD cannot read it", done.stderr)
+        self.path.unlink()
+        self.assertIn("No such file", self.run_on("info", check=1).stderr)
+
+    def test_a_python_without_usd(self):
+        self.save()
+        done = self.run_on("info", check=1, env={"CAUSTIQUE_USD_PYTHON": self.dir / "none"})
+        self.assertIn("no such file", done.stderr)
+        bare = self.dir / "python"
+        bare.write_text(f'#!/bin/sh\nexec {sys.executable} -I -S "$@"\n')
+        bare.chmod(0o755)
+        done = self.run_on("info", check=1, env={"CAUSTIQUE_USD_PYTHON": bare})
+        self.assertIn("lacks a module", done.stderr)
+        self.assertIn("pip install usd-core", done.stderr)
+        done = support.run(["doctor"], env={"CAUSTIQUE_USD_PYTHON": bare})
+        self.assertIn("not usable, needed to read .usd files", done.stdout)
+        self.assertRegex(support.run(["doctor"]).stdout, r"USD +\d+\.\d+")
+
+
+class Layer(usd_support.Stages):
+    def test_usdchecker_passes_and_the_vars_are_the_layers(self):
+        self.floor()
+        self.camera((0, 2, 2), width=1.0)
+        self.light("DomeLight", intensity=1.0)
+        self.stage.GetRootLayer().Save()
+        out, path = self.dir / 'a "quoted" name.exr', self.dir / "layer.usda"
+        support.run(["render", self.path, "-o", out, "--usd-layer", path, *QUICK], check=0)
+        stage = Usd.Stage.Open(str(path))
+        self.assertEqual(_faults(stage), [])
+        settings = UsdRender.Settings.GetStageRenderSettings(stage)
+        product = UsdRender.Product.Get(stage, settings.GetProductsRel().GetTargets()[0])
+        self.assertEqual(product.GetProductNameAttr().Get(), f"./{out.name}")
+        self.assertEqual(product.GetResolutionAttr().Get(), Gf.Vec2i(8, 8))
+        names = {UsdRender.Var.Get(stage, target).GetSourceNameAttr().Get()
+                 for target in product.GetOrderedVarsRel().GetTargets()}
+        channels = usd_support.OpenEXR.File(str(out), separate_channels=True).channels()
+        # The picture and Z stand at the file's root.
+        of_root = {"R": "beauty", "G": "beauty", "B": "beauty", "A": "beauty", "Z": "Z"}
+        self.assertEqual(names, {name.rpartition(".")[0] or of_root[name] for name in channels})
+
+    def test_the_checker_finds_what_is_wrong(self):
+        path = self.dir / "bare.usda"
+        Sdf.Layer.CreateNew(str(path)).Save()
+        self.assertNotEqual(_faults(Usd.Stage.Open(str(path))), [])
+
+    def test_it_needs_a_name_of_its_kind_and_a_file_to_tell_of(self):
+        self.stage.GetRootLayer().Save()
+        done = support.run(["render", self.path, "-o", self.dir / "o.exr", "--usd-layer", self.dir / "o.txt"], check=2)
+        self.assertIn("does not end in .usda", done.stderr)
+        done = support.run(["render", self.path, "-o", "-", "--usd-layer", self.dir / "o.usda"], check=2)
+        self.assertIn("--usd-layer", done.stderr)
+
+
+def _faults(stage):
+    """What usdchecker says of a stage: it runs all validators of USD."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    return [error.GetErrorAsString() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
+
+
+if __name__ == "__main__":
+    unittest.main()
