@@ -9,6 +9,14 @@ from stage import said
 
 # Keys of `extras.caustique` of a scene: what else stands in `caustique:` of the settings is an option of `render`.
 SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate"}
+# Options that a stage may give: those about the picture. Files and permissions are the command line's alone, for a
+# stage may come from anywhere.
+OPTIONS = {
+    "method", "photons", "levels", "eye_paths", "initial_bandwidth", "knn", "alpha", "cppm_grid", "cppm_k", "cppm_beta",
+    "cppm_significance", "cppm_plus", "radius_rule", "kernel", "guide", "indirect", "max_depth", "seed", "frame_seed",
+    "time", "iterations", "target_error", "filter", "effects", "glass", "env_rotation", "env_strength", "no_combine",
+    "denoise", "layers", "exr_naming", "compression", "reproducible",
+}
 # Layers by what a RenderVar's sourceName may say.
 LAYERS = {
     "ci": "beauty", "color": "beauty", "rgba": "beauty", "beauty": "beauty", "lpe:c.*[<l.>o]": "beauty",
@@ -119,10 +127,10 @@ class Settings:
             if key in SCENE_KEYS:
                 continue
             option = "--" + key.replace("_", "-")
+            if key not in OPTIONS or isinstance(value, dict):
+                raise Fault(self.prim.GetPath(), f"caustique:{key} is nothing that a stage may say of its render",
+                            f"give {option} on the command line, if there is such an option")
             if value is False:
-                continue
-            if isinstance(value, dict):
-                self._stage.losses.name(self.prim.GetPath(), f"caustique:{key} has parts, which no option has")
                 continue
             text = ",".join(map(_number, value)) if isinstance(value, list) else _number(value)
             out.append(option if value is True else f"{option}={text}")

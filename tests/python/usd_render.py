@@ -8,6 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender, UsdUtils, UsdValidation
 
 import support
 import usd_support
+from faults import Fault
 
 QUICK = ("--width", 8, "--height", 8, "--iterations", 2, "--method", "path", "--progress", "none", "--no-combine")
 
@@ -82,13 +83,26 @@ def RenderVar "Var" {
         self.assertAlmostEqual(float(normals["normal.Y"].pixels.max()), 1, places=4)
         self.run_on("render", "-o", self.out, "--progress", "none", "--layers", "beauty", "--width", 4, "--height", 4)
         self.assertIn("4 x 4 pixels", support.run(["info", self.out], check=0).stdout)
-        self.save('def RenderSettings "Other" {\n custom int caustique:iterationz = 1\n}\n')
 
     def test_an_option_that_does_not_exist(self):
         self.save('def RenderSettings "Settings" {\n custom int caustique:iterationz = 1\n}\n')
+        done = self.run_on("render", "-o", self.out, check=1)
+        self.assertIn("stage.usda: /Settings: caustique:iterationz is nothing that a stage may say", done.stderr)
+
+    def test_a_value_that_an_option_does_not_take(self):
+        self.save('def RenderSettings "Settings" {\n custom string caustique:method = "scanline"\n}\n')
         done = self.run_on("render", "-o", self.out, check=2)
         self.assertIn("stage.usda: RenderSettings", done.stderr)
-        self.assertIn("--iterationz", done.stderr)
+        self.assertIn("scanline", done.stderr)
+
+    def test_files_and_permissions_are_no_stage_s_business(self):
+        for name in ("png", "output", "checkpoint", "usd_layer", "allow_outside", "env", "model", "preview"):
+            with self.subTest(name):
+                self.stage.RemovePrim("/Settings")
+                settings = UsdRender.Settings.Define(self.stage, "/Settings")
+                settings.GetPrim().CreateAttribute(f"caustique:{name}", Sdf.ValueTypeNames.String).Set("/tmp/a")
+                with self.assertRaisesRegex(Fault, f"/Settings: caustique:{name} is nothing"):
+                    self.convert()
 
     def test_losses_are_warnings_and_strict_stops_at_them(self):
         self.stage.DefinePrim("/Hair", "BasisCurves")
