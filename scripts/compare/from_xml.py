@@ -1,7 +1,7 @@
 """A simple Mitsuba 3 scene as our glTF.
 
-Read are meshes and plain shapes; matte, plastic, principled, glass and metal; area, point, spot, directional and constant
-light, and environment maps.
+Read are meshes and plain shapes; matte, plastic, principled, glass and metal; area, point, spot, directional and
+constant light, and environment maps.
 
 Meshes are read by Mitsuba itself. Whatever is left out or approximated is named in the file, and caustique warns of it.
 """
@@ -28,9 +28,9 @@ SHAPES = ("obj", "ply", "cube", "rectangle")
 WRAPPERS = ("twosided", "bumpmap", "normalmap", "mask")
 #: Indices of refraction by Mitsuba's names.
 INDICES = {
-    "vacuum": 1.0, "air": 1.000277, "water": 1.333, "water ice": 1.31, "ice": 1.31, "fused quartz": 1.458,
-    "pyrex": 1.47, "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544, "amber": 1.55, "pet": 1.575,
-    "diamond": 2.419,
+    "vacuum": 1.0, "air": 1.000277, "water ice": 1.31, "ice": 1.31, "water": 1.333, "fused quartz": 1.458,
+    "pyrex": 1.47, "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544,
+    "amber": 1.55, "pet": 1.575, "diamond": 2.419,
 }
 
 
