@@ -1,5 +1,7 @@
-"""A simple Mitsuba 3 scene as our glTF: meshes, spheres and other plain shapes; matte, plastic, principled, glass and metal;
-area, point, spot, directional and constant light, and environment maps.
+"""A simple Mitsuba 3 scene as our glTF.
+
+Read are meshes and plain shapes; matte, plastic, principled, glass and metal; area, point, spot, directional and
+constant light, and environment maps.
 
 Meshes are read by Mitsuba itself. Whatever is left out or approximated is named in the file, and caustique warns of it.
 """
@@ -25,9 +27,11 @@ STEPS = 64
 SHAPES = ("obj", "ply", "cube", "rectangle")
 WRAPPERS = ("twosided", "bumpmap", "normalmap", "mask")
 #: Indices of refraction by Mitsuba's names.
-INDICES = {"vacuum": 1.0, "air": 1.000277, "water": 1.333, "water ice": 1.31, "ice": 1.31, "fused quartz": 1.458, "pyrex": 1.47,
-           "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544, "amber": 1.55, "pet": 1.575,
-           "diamond": 2.419}
+INDICES = {
+    "vacuum": 1.0, "air": 1.000277, "water ice": 1.31, "ice": 1.31, "water": 1.333, "fused quartz": 1.458,
+    "pyrex": 1.47, "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544,
+    "amber": 1.55, "pet": 1.575, "diamond": 2.419,
+}
 
 
 def convert(path, output):
@@ -160,8 +164,8 @@ class Reader:
         elif step.tag == "rotate":
             made = transform.rotate(numbers or three, float(step.get("angle")))
         elif step.tag == "lookat":
-            point = {key: [float(x) for x in step.get(key, "0 1 0").replace(",", " ").split()] for key in ("origin", "target", "up")}
-            made = transform.look_at(**point)
+            words = {key: step.get(key, "0 1 0").replace(",", " ").split() for key in ("origin", "target", "up")}
+            made = transform.look_at(**{key: [float(x) for x in point] for key, point in words.items()})
         else:
             raise Unsupported(f"a transform by {step.tag}")
         return np.array(made.matrix)
@@ -176,8 +180,9 @@ class Reader:
         if kind in SHAPES:
             made = self.mesh(element, kind)
         elif kind == "sphere":
-            center = self.child(element, "center")
-            made = ball(self.number(element, "radius", 1.0), [float(center.get(a, 0)) for a in "xyz"] if center is not None else 0.0)
+            given = self.child(element, "center")
+            center = 0.0 if given is None else [float(given.get(axis, 0.0)) for axis in "xyz"]
+            made = ball(self.number(element, "radius", 1.0), center)
             self.lose(f"{place}: a ball of {2 * STEPS * STEPS} facets stands in for the sphere")
         elif kind == "disk":
             made = disk()
@@ -315,8 +320,8 @@ class Reader:
             if inner < outer:
                 self.lose(f"{name}: the edge of a spot falls off otherwise")
             self.lights.append(meshes.SpotLight(
-                name=name, position=position, target=position + matrix[:3, 2], inner=min(inner, outer - 1e-3), outer=outer,
-                intensity=self.colour(element, "intensity", 1.0, name)[0]))
+                name=name, position=position, target=position + matrix[:3, 2], inner=min(inner, outer - 1e-3),
+                outer=outer, intensity=self.colour(element, "intensity", 1.0, name)[0]))
         elif kind == "directional":
             given = self.child(element, "direction")
             direction = matrix[:3, 2] if given is None else np.array([float(given.get(a, 0)) for a in "xyz"])
@@ -344,7 +349,8 @@ class Reader:
         s, t = (column - left)[..., None], (row - top)[..., None]
         below = np.minimum(top + 1, height - 1)
         at = lambda i, j: texels[i, j % width]  # noqa: E731
-        picture = (at(top, left) * (1 - s) + at(top, left + 1) * s) * (1 - t) + (at(below, left) * (1 - s) + at(below, left + 1) * s) * t
+        picture = (at(top, left) * (1 - s) + at(top, left + 1) * s) * (1 - t)
+        picture += (at(below, left) * (1 - s) + at(below, left + 1) * s) * t
         file = self.output.with_suffix(".environment.exr")
         mi.Bitmap(picture.astype(np.float32)).write(str(file))
         self.said["environment"] = {"file": file.name, "strength": self.number(element, "scale", 1.0)}
@@ -395,7 +401,8 @@ def ball(radius, center):
     pole = np.zeros_like(index[0])
     triangles = [np.stack(t, -1).reshape(-1, 3) for t in (
         (pole, index[0], after[0]), (a, c, b), (b, c, d), (pole + last, after[-1], index[-1]))]
-    return {"vertices": normals * radius + center, "triangles": np.concatenate(triangles), "normals": normals, "uvs": None}
+    vertices = normals * radius + center
+    return {"vertices": vertices, "triangles": np.concatenate(triangles), "normals": normals, "uvs": None}
 
 
 def disk():

@@ -15,8 +15,10 @@ pub struct Progress {
     pub remaining: Option<f64>,
     /// Light paths emitted so far.
     pub light_paths: u64,
-    /// Estimated relative error of the estimate (the root of relMSE); None before the second iteration.
+    /// Estimated relative error (the root of relMSE), where it is known.
     pub error: Option<f64>,
+    /// What that is the error of: 'finished picture', or what of the estimate's own it knows.
+    pub error_of: &'static str,
 }
 
 #[pymethods]
@@ -29,8 +31,9 @@ impl Progress {
 
 impl From<&caustique::render::Progress> for Progress {
     fn from(progress: &caustique::render::Progress) -> Progress {
-        let caustique::render::Progress { iteration, iterations, seconds, remaining, light_paths, error, .. } =
-            *progress;
-        Progress { iteration, iterations, seconds, remaining, light_paths, error }
+        let caustique::render::Progress { iteration, iterations, seconds, remaining, light_paths, .. } = *progress;
+        let error = progress.finished.or(progress.error);
+        let error_of = if progress.finished.is_some() { "finished picture" } else { progress.told.name() };
+        Progress { iteration, iterations, seconds, remaining, light_paths, error, error_of }
     }
 }

@@ -1,4 +1,4 @@
-"""Scenes go to Mitsuba and come from it, and are the same there and here: the means of pictures agree within a hundredth."""
+"""Scenes go to Mitsuba and come from it: the means of pictures there and here agree within a hundredth."""
 
 import contextlib
 import io
@@ -37,9 +37,11 @@ SCENE = """<scene version="3.0.0">
         <ref id="grey"/>
     </shape>
     <shape type="cube">
-        <transform name="to_world"><scale value="0.6"/><rotate y="1" angle="30"/><translate x="-1.8" y="0.6"/></transform>
+        <transform name="to_world"><scale value="0.6"/><rotate y="1" angle="30"/>
+            <translate x="-1.8" y="0.6"/></transform>
         <bsdf type="principled">
-            <rgb name="base_color" value="0.9, 0.7, 0.3"/><float name="metallic" value="1"/><float name="roughness" value="0.2"/>
+            <rgb name="base_color" value="0.9, 0.7, 0.3"/>
+            <float name="metallic" value="1"/><float name="roughness" value="0.2"/>
         </bsdf>
     </shape>
     <shape type="sphere">
@@ -49,7 +51,8 @@ SCENE = """<scene version="3.0.0">
     <shape type="sphere">
         <transform name="to_world"><scale value="0.7"/><translate x="1.9" y="0.7"/></transform>
         <bsdf type="roughconductor">
-            <string name="material" value="Cu"/><string name="distribution" value="ggx"/><float name="alpha" value="0.05"/>
+            <string name="material" value="Cu"/>
+            <string name="distribution" value="ggx"/><float name="alpha" value="0.05"/>
         </bsdf>
     </shape>
     <shape type="disk">
