@@ -2,7 +2,7 @@
 //! `caustique/`.
 //!
 //! Work is done in threads of its own with the interpreter's lock released; what is to be done in Python meanwhile, the
-//! calling thread does ([`work`]).
+//! calling thread does (`work`).
 
 mod compare;
 mod converge;
