@@ -142,7 +142,7 @@ class Text(unittest.TestCase):
             self.assertIn(f"(docs/{page.name}", text)
 
     def test_options_that_are_named_exist(self):
-        names = ("render", "plan", "combine", "compare", "converge", "info", "doctor")
+        names = ("render", "plan", "combine", "merge", "compare", "converge", "info", "doctor")
         known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
         known += (support.ROOT / "scripts" / "blender" / "export.py").read_text(encoding="utf-8")
         known = set(re.findall(r"--[a-z][a-z-]*", known))
