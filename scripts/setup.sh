@@ -5,6 +5,7 @@
 #                              Open Image Denoise, where it can be had
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
 #   scripts/setup.sh test      python, and Blender as a Python module in .venv-bpy
+#   scripts/setup.sh farm      python, and what scripts/farm needs in .venv-farm: Ray, Open Job Description
 #
 # Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
 # CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
@@ -244,9 +245,9 @@ need_bpy() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|test
+# setup render|python|test|farm
 setup() {
-    case $1 in render | python | test) ;; *) fail "unknown mode '$1'" "one of: render python test" ;; esac
+    case $1 in render | python | test | farm) ;; *) fail "unknown mode '$1'" "one of: render python test farm" ;; esac
     need_rust
     need_linker
     need_python
@@ -257,8 +258,10 @@ setup() {
     [ "$1" != render ] || return 0
     need_venv_module
     need_venv .venv "$PYTHON" requirements-test.txt
-    [ "$1" != python ] || return 0
-    need_bpy
+    case $1 in
+    test) need_bpy ;;
+    farm) need_venv .venv-farm "$PYTHON" requirements-farm.txt ;;
+    esac
 }
 
 if [ "${BASH_SOURCE[0]}" = "$0" ]; then
