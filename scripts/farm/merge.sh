@@ -26,5 +26,5 @@ folder=$(shards_of "$out")
 # A merge that is run again after its shards are removed is done.
 [ -d "$folder" ] || [ ! -s "$out" ] || exit 0
 [ -e "$folder/render" ] || fail "$folder: there are no shards" 'shard.sh renders them'
-"$CAUSTIQUE" merge "$folder"/shard-*.exr -o "$out" "$@"
+"$CAUSTIQUE" merge "$folder"/shard-*.exr -o "$out" --layers all "$@"
 rm -r "$folder"

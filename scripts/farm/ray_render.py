@@ -28,7 +28,7 @@ import ray
 HERE = Path(__file__).resolve().parent
 # What is given once for all shards, or means nothing for one.
 OURS = ("--shard", "--resume", "--checkpoint", "--threads")
-PICTURES = ("--png", "--exposure", "--tonemap", "--preview")
+PICTURES = ("--png", "--exposure", "--tonemap", "--preview", "--layers")
 
 
 class Refused(Exception):

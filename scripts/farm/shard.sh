@@ -40,8 +40,10 @@ if [ -e "$part.checkpoint" ]; then
     echo "shard $shard goes on from $part.checkpoint" >&2
 fi
 
+# The picture of a shard alone is not looked at: few layers halve what is written, and the sums behind it are whole.
+words=("$scene" -o "$part" --shard "$shard" --layers beauty "${resume[@]}" "$@")
 # Where this shell is killed, the render is as well: its farm starts another.
-setpriv --pdeathsig KILL "$CAUSTIQUE" render "$scene" -o "$part" --shard "$shard" "${resume[@]}" "$@" &
+setpriv --pdeathsig KILL "$CAUSTIQUE" render "${words[@]}" &
 child=$!
 trap 'kill -TERM "$child" 2>/dev/null || true' TERM INT
 status=0
