@@ -32,6 +32,13 @@ def merge(shards, *options):
     return spent([BIN, "merge", *shards, "-o", OUT / "merged.exr", "--layers", "all", *options])
 
 
+def alone(method):
+    """What a shard with all layers takes, and a whole render of as many iterations with its finish."""
+    words = [BIN, "render", SCENE, "-o", OUT / "alone.exr", *SIZE, "--method", method, "--progress", "none", "--no-checkpoint"]
+    shard = spent([*words, "--iterations", 2 * SHARDS, "--shard", f"0/{SHARDS}"])
+    return {"layers": shard, "whole": spent([*words, "--iterations", 2])}
+
+
 def main():
     for method in METHODS:
         shutil.rmtree(OUT, ignore_errors=True)
@@ -43,6 +50,7 @@ def main():
         values["shard"]["file_mib"] = round(shards[0].stat().st_size / 2**20, 1)
         values["one"] = merge(shards[:1], "--partial")
         values["all"] = merge(shards)
+        values |= alone(method)
         values["picture_mib"] = round((OUT / "merged.exr").stat().st_size / 2**20, 1)
         print(values, flush=True)
         record("merge64", values)
