@@ -23,7 +23,7 @@ if [ "${1:-}" = --frame ]; then
     done
 fi
 folder=$(shards_of "$out")
-# A merge that is run again after its shards are removed is done.
+# A merge that is run again after its shards are removed is done, and so is that of a shard alone.
 [ -d "$folder" ] || [ ! -s "$out" ] || exit 0
 [ -e "$folder/render" ] || fail "$folder: there are no shards" 'shard.sh renders them'
 "$CAUSTIQUE" merge "$folder"/shard-*.exr -o "$out" --layers all "$@"

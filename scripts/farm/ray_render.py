@@ -227,6 +227,8 @@ def order_of(words):
     if known.frames is not None and "#" not in known.output.name:
         parser.error(f"{known.output}: all frames have the same name; put '####' where the frame's number belongs")
     places = {"scene": known.scene.resolve(), "output": known.output.resolve()}
+    # A shard alone is the picture.
+    render += merges if known.shards == 1 else []
     return Order(**{**vars(known), **places}, render=render, merge=merges)
 
 

@@ -6,7 +6,7 @@
 
 Costs are those that `scripts/figures.sh scale` has stored. The formula is `predict`; `simulate` plays the same farm task by
 task, and tests hold one to the other. What both take for granted: iterations of a picture cost alike, a task's own cores
-share iterations and pilots evenly but not loading and writing, and files pass through one store, one after the other.
+share all work evenly but for loading a scene and writing a shard, and files pass through one store, one after the other.
 """
 
 import argparse
@@ -26,7 +26,7 @@ class Costs:
     """What a picture costs: core-seconds, but for `file`, which is bytes.
 
     load: before the pilot, on one core. pilot: before the first iteration. iteration: one. write: a shard's file, on one
-    core. each: merging one shard. finish: what a merge costs besides, on one core. file: a shard's.
+    core. each: merging one shard. finish: what a merge costs besides. file: a shard's.
     """
 
     load: float
@@ -96,8 +96,8 @@ def merge_parts(costs, farm, job):
     queue = 0 if levels == 1 else (job.shards - job.fan) * transfer
     return {
         "start": levels * farm.start,
-        "merge": files * (costs.each + transfer) + between + queue,
-        "finish": costs.finish,
+        "merge": files * (costs.each / farm.threads + transfer) + between + queue,
+        "finish": costs.finish / farm.threads,
     }
 
 
@@ -164,7 +164,8 @@ def simulate(costs, farm, job):
             yield place
             yield world.timeout(farm.start)
             yield from pass_store(files)
-            yield world.timeout(files * costs.each + (costs.finish if last else costs.write))
+            work = files * costs.each + (costs.finish if last else 0.0)
+            yield world.timeout(work / farm.threads + (0.0 if last else costs.write))
             if not last:
                 yield from pass_store(1)
 
@@ -210,9 +211,10 @@ def costs_of(values):
     return Costs(**{name: values[name] for name in Costs.__dataclass_fields__})
 
 
-def report(costs, cores, frames, iterations):
+def report(costs, cores, frames, iterations, fan=0):
     """What to choose, what it takes, and where the time goes."""
     farm, job = best(costs, cores, frames, iterations)
+    job = replace(job, fan=fan)
     parts = predict(costs, farm, job)
     total = sum(parts.values())
     ideal = frames * iterations * costs.iteration / cores
@@ -263,6 +265,7 @@ def main():
     parser.add_argument("--frames", type=int, default=1)
     parser.add_argument("--iterations", type=int)
     parser.add_argument("--pilot", type=float, help="core-seconds of a pilot, in place of the measured one")
+    parser.add_argument("--fan", type=int, default=0, help="files that a merge takes at most, were there trees of them")
     parser.add_argument("--draw", type=Path, metavar="FILE.svg")
     arguments = parser.parse_args()
     values = stored()
@@ -273,7 +276,7 @@ def main():
         draw(arguments.draw, values)
         return
     for cores in arguments.cores:
-        print(report(costs, cores, arguments.frames, arguments.iterations or values["iterations"]))
+        print(report(costs, cores, arguments.frames, arguments.iterations or values["iterations"], arguments.fan))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 #
 # The shard is out/pool.shards/shard-I.exr where the picture is to be out/pool.exr, once it is whole; its checkpoint lies
 # beside it until then. A task that is run again goes on from the checkpoint, and does nothing where the shard is whole.
+# A shard alone, 0/1, is the finished picture out/pool.exr, and may have the options of the merge that it does without.
 # CAUSTIQUE_BIN is the program. Exit codes are the program's.
 
 set -euo pipefail
@@ -19,12 +20,12 @@ if [ "${1:-}" = --frame ]; then
     out=$(numbered "$out" "$2")
     set -- --frames "$2" "${@:3}"
 fi
-index=${shard%/*} folder=$(shards_of "$out")
+index=${shard%/*} count=${shard#*/} folder=$(shards_of "$out")
 part=$folder/part-$index.exr whole=$folder/shard-$index.exr
 mkdir -p "$folder"
 
 # All tasks of a folder belong to one render. The first one says which; `ln` has one winner.
-render=$(printf '%q ' "$(sha256sum <"$scene")" "${shard#*/}" "$@")
+render=$(printf '%q ' "$(sha256sum <"$scene")" "$count" "$@")
 draft=$(mktemp "$folder/render.XXXXXX")
 printf '%s\n' "$render" >"$draft"
 ln "$draft" "$folder/render" 2>/dev/null || true
@@ -41,9 +42,10 @@ if [ -e "$part.checkpoint" ]; then
 fi
 
 # The picture of a shard alone is not looked at: few layers halve what is written, and the sums behind it are whole.
-words=("$scene" -o "$part" --shard "$shard" --layers beauty "${resume[@]}" "$@")
+layers=(--layers beauty)
+[ "$count" -gt 1 ] || layers=()
 # Where this shell is killed, the render is as well: its farm starts another.
-setpriv --pdeathsig KILL "$CAUSTIQUE" render "${words[@]}" &
+setpriv --pdeathsig KILL "$CAUSTIQUE" render "$scene" -o "$part" --shard "$shard" "${layers[@]}" "${resume[@]}" "$@" &
 child=$!
 trap 'kill -TERM "$child" 2>/dev/null || true' TERM INT
 status=0
@@ -54,4 +56,9 @@ while kill -0 "$child" 2>/dev/null; do
     wait "$child" || status=$?
 done
 [ "$status" -eq 0 ] || exit "$status"
-mv "$part" "$whole"
+if [ "$count" -gt 1 ]; then
+    mv "$part" "$whole"
+else
+    mv "$part" "$out"
+    rm -r "$folder"
+fi

@@ -53,6 +53,8 @@ if [ -n "$frames" ]; then
 else
     numbers=('')
 fi
+# A shard alone is the picture.
+[ "$shards" -gt 1 ] || render+=("${merge[@]}")
 scene=$(realpath "$scene")
 out=$(realpath -m "$out")
 mkdir -p "$(dirname "$out")"
@@ -75,7 +77,7 @@ if [ "$CAUSTIQUE" != caustique ]; then
 fi
 merges=()
 for number in "${numbers[@]}"; do
-    of=() log=$(numbered "$out" "${number:-0}").%j.log
+    of=()
     [ -z "$number" ] || of=(--frame "$number")
     folder=$(shards_of "$(numbered "$out" "${number:-0}")")
     [ -n "$dry" ] || mkdir -p "$folder"
@@ -99,7 +101,8 @@ END
     # Not afterok: that of an array minds a try that was killed even where the next one ends well (Slurm 22.05). A merge
     # whose shards are not all there fails, and its log names them.
     merged=$(
-        submit --requeue --dependency="afterany:$array" --job-name="merge${number:+-$number}" --output="$log" <<END
+        submit --requeue --dependency="afterany:$array" --job-name="merge${number:+-$number}" \
+            --output="$folder/merge.log" <<END
 #!/bin/bash
 export CAUSTIQUE_BIN=$(printf %q "$CAUSTIQUE")
 exec$(words "$farm/merge.sh" "$out" "${of[@]}" --threads "$cores" "${merge[@]}")
@@ -112,5 +115,5 @@ if [ -n "$wait" ] && [ -z "$dry" ]; then
     # A job that waits for all merges is the one that is waited for.
     ids=$(IFS=: && echo "${merges[*]}")
     sbatch --parsable --wait --dependency="afterok:$ids" --kill-on-invalid-dep=yes --output=/dev/null --job-name=wait \
-        --wrap=true >/dev/null || fail 'not all pictures are made' "the logs beside $out say why"
+        --wrap=true >/dev/null || fail 'not all pictures are made' "the logs in $(shards_of "$out") say why"
 fi

@@ -3,9 +3,9 @@
 A function takes `Figures` and returns Markdown. What it asks `Figures` for stands above its table as the source.
 """
 
-from . import comparisons, finished, rules, speed
+from . import comparisons, farms, finished, rules, speed
 from .figures import Figures
 
-KINDS = {**speed.KINDS, **rules.KINDS, **comparisons.KINDS, **finished.KINDS}
+KINDS = {**speed.KINDS, **rules.KINDS, **comparisons.KINDS, **finished.KINDS, **farms.KINDS}
 
 __all__ = ["KINDS", "Figures"]
