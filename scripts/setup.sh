@@ -7,6 +7,7 @@
 #   scripts/setup.sh wheel     render, and what builds and tests our own Python package in .venv-python
 #   scripts/setup.sh usd       render, and what reads stages of USD in .venv-usd
 #   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy
+#   scripts/setup.sh farm      python, and what scripts/farm needs in .venv-farm: Ray, Open Job Description
 #
 # Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
 # CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
@@ -246,11 +247,11 @@ need_bpy() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|wheel|usd|test
+# setup render|python|wheel|usd|test|farm
 setup() {
     case $1 in
-    render | python | wheel | usd | test) ;;
-    *) fail "unknown mode '$1'" "one of: render python wheel usd test" ;;
+    render | python | wheel | usd | test | farm) ;;
+    *) fail "unknown mode '$1'" "one of: render python wheel usd test farm" ;;
     esac
     need_rust
     need_linker
@@ -266,8 +267,10 @@ setup() {
     case $1 in usd | test) need_venv .venv-usd "$PYTHON" requirements-usd.txt ;; esac
     [ "$1" != usd ] || return 0
     need_venv .venv "$PYTHON" requirements-test.txt
-    [ "$1" != python ] || return 0
-    need_bpy
+    case $1 in
+    test) need_bpy ;;
+    farm) need_venv .venv-farm "$PYTHON" requirements-farm.txt ;;
+    esac
 }
 
 if [ "${BASH_SOURCE[0]}" = "$0" ]; then

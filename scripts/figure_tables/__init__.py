@@ -3,9 +3,10 @@
 A function takes `Figures` and returns Markdown. What it asks `Figures` for stands above its table as the source.
 """
 
-from . import blender, comparisons, finished, rules, sizes, speed
+from . import blender, comparisons, farms, finished, rules, sizes, speed
 from .figures import Figures
 
-KINDS = {**blender.KINDS, **sizes.KINDS, **speed.KINDS, **rules.KINDS, **comparisons.KINDS, **finished.KINDS}
+_ROOMS = (blender, comparisons, farms, finished, rules, sizes, speed)
+KINDS = {name: table for room in _ROOMS for name, table in room.KINDS.items()}
 
 __all__ = ["KINDS", "Figures"]

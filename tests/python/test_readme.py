@@ -144,7 +144,8 @@ class Text(unittest.TestCase):
     def test_options_that_are_named_exist(self):
         names = ("render", "plan", "combine", "merge", "compare", "converge", "info", "doctor")
         known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
-        known += (support.ROOT / "scripts" / "blender" / "export.py").read_text(encoding="utf-8")
+        for script in ("blender/export.py", "farm/ray_render.py", "farm/slurm.sh"):
+            known += (support.ROOT / "scripts" / script).read_text(encoding="utf-8")
         known = set(re.findall(r"--[a-z][a-z-]*", known))
         for page in PAGES:
             if page.name in ("measurements.md", "architecture.md"):  # They name options of cargo and of scripts, too.

@@ -1,0 +1,252 @@
+#!/usr/bin/env python3
+"""Renders a picture, or the frames of an animation, on a Ray cluster: a task a shard, and one that merges them.
+
+  .venv-farm/bin/python scripts/farm/ray_render.py SCENE -o OUT.exr --shards N [--frames A-B[,STEP]] [--address A]
+                        [--cores C] [options of caustique render] [-- options of caustique merge]
+
+  .venv-farm/bin/python scripts/farm/ray_render.py scenes/pool.glb -o out/pool.exr --shards 16 --iterations 256
+
+`scripts/setup.sh farm` makes .venv-farm. Without --address this machine alone is the cluster. A shard whose worker dies
+or that fails is tried again and goes on from its checkpoint. Every --partial seconds the shards that are there make a
+picture so far, out/pool.partial.exr and .png. Frames come as a stream: at most twice as many shards as there is room for
+wait at a time, and a line of output tells of each picture when it is merged. Scene, output and program have to be where
+all nodes see them. The same command again goes on from what is there. CAUSTIQUE_BIN is the program.
+"""
+
+import argparse
+import math
+import os
+import re
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import ray
+
+HERE = Path(__file__).resolve().parent
+# What is given once for all shards, or means nothing for one.
+OURS = ("--shard", "--resume", "--checkpoint", "--threads")
+PICTURES = ("--png", "--exposure", "--tonemap", "--preview", "--layers")
+
+
+class Refused(Exception):
+    """The command line of a task is wrong: another try would end alike."""
+
+
+class Failed(Exception):
+    """A task ended with an error, or by a signal."""
+
+
+def run(words, log):
+    """Runs a script of this folder, which dies with the worker; what it says goes to a file."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("a", encoding="utf-8") as out:
+        done = subprocess.run(["setpriv", "--pdeathsig", "KILL", *map(str, words)], stdout=out, stderr=out, check=False)
+    if done.returncode:
+        last = " ".join(log.read_text(encoding="utf-8").splitlines()[-2:])
+        kind = Refused if done.returncode == 2 else Failed
+        raise kind(f"{log}: exit code {done.returncode}: {last}")
+
+
+# Tries are counted by Ray: those of a worker that died, and those of a render that failed.
+task = ray.remote(retry_exceptions=[Failed])
+
+
+@task
+def shard(order, picture, index):
+    """Renders a shard."""
+    words = [HERE / "shard.sh", order.scene, order.output, f"{index}/{order.shards}", *picture.frame_words]
+    run([*words, "--threads", order.cores, *order.render], picture.folder / f"{index}.log")
+
+
+@task
+def merge(order, picture):
+    """Merges the shards of a picture, which then are gone."""
+    words = [HERE / "merge.sh", order.output, *picture.frame_words, "--threads", order.cores, *order.merge]
+    run(words, picture.output.with_suffix(".log"))
+
+
+@task
+def partial(picture):
+    """Makes the picture so far."""
+    so_far = picture.partial
+    words = [program(), "merge", "--partial", *sorted(picture.folder.glob("shard-*.exr"))]
+    run([*words, "-o", so_far, "--png", so_far.with_suffix(".png")], picture.folder / "partial.log")
+
+
+def program():
+    """The program, as names.sh finds it."""
+    words = ["bash", "-c", f'. "{HERE / "names.sh"}"; printf %s "$CAUSTIQUE"']
+    return subprocess.run(words, stdout=subprocess.PIPE, check=True, text=True).stdout
+
+
+@dataclass
+class Picture:
+    """A picture and how far it is."""
+
+    output: Path
+    frame: int | None
+    left: int
+    done: int = 0
+    shown: int = 0
+    showing: object = field(default=None, repr=False)
+
+    @property
+    def folder(self):
+        """Where its shards are."""
+        return self.output.with_suffix(".shards")
+
+    @property
+    def partial(self):
+        """The picture so far."""
+        return self.output.with_suffix(".partial.exr")
+
+    @property
+    def frame_words(self):
+        """What says the frame to the scripts."""
+        return [] if self.frame is None else ["--frame", self.frame]
+
+
+def numbered(path, frame):
+    """The name with the frame's number in place of a run of '#', as names.sh has it."""
+    return path.with_name(re.sub("#+", lambda run: f"{frame:0{len(run[0])}}", path.name, count=1))
+
+
+def frames_of(text):
+    """The frames of A, A-B or A-B,STEP."""
+    match = re.fullmatch(r"(\d+)(?:-(\d+))?(?:,([1-9]\d*))?", text)
+    if not match or (match[2] and int(match[2]) < int(match[1])):
+        raise argparse.ArgumentTypeError(f"{text!r}: give A-B or A-B,STEP, such as 1-100")
+    return range(int(match[1]), int(match[2] or match[1]) + 1, int(match[3] or 1))
+
+
+def pictures(order):
+    """Renders; gives each picture when it is merged, and tells of its shards on the way."""
+    frames = [None] if order.frames is None else order.frames
+    tasks = shards_in_order(order, frames)
+    room = math.ceil(2 * ray.cluster_resources().get("CPU", 1) / order.cores)
+    running, told = {}, time.monotonic()
+    more = True
+    while more or running:
+        while more and len(running) < room:
+            ready = next(tasks, None)
+            more = ready is not None
+            if more:
+                running[ready[0]] = ready[1]
+        ended, _ = ray.wait(list(running), timeout=1)
+        for reference in ended:
+            picture = running.pop(reference)
+            ray.get(reference)
+            if picture.left == 0:
+                yield picture
+                continue
+            picture.left -= 1
+            picture.done += 1
+            if picture.left == 0:
+                running[merged(order, picture)] = picture
+        if order.partial and time.monotonic() - told > order.partial:
+            told = time.monotonic()
+            for picture in {id(of): of for of in running.values()}.values():
+                show(picture)
+
+
+def shards_in_order(order, frames):
+    """Submits shards, one each time that it is asked; gives what stands for them, and their picture."""
+    for frame in frames:
+        output = order.output if frame is None else numbered(order.output, frame)
+        picture = Picture(output, frame, order.shards)
+        for index in range(order.shards):
+            options = {"num_cpus": order.cores, "max_retries": order.retries, "scheduling_strategy": "SPREAD"}
+            yield shard.options(**options).remote(order, picture, index), picture
+
+
+def merged(order, picture):
+    """Has a picture merged, once nobody reads its shards any more."""
+    if picture.showing is not None:
+        ray.wait([picture.showing])
+        picture.showing = None
+    return merge.options(num_cpus=order.cores, max_retries=order.retries).remote(order, picture)
+
+
+def show(picture):
+    """Has the picture so far made, where there is more to see than before and no other is being made."""
+    busy = picture.showing is not None and not ray.wait([picture.showing], timeout=0)[0]
+    if picture.left and picture.done > picture.shown and not busy:
+        picture.shown = picture.done
+        # Beside the shards, and before those that wait.
+        picture.showing = partial.options(num_cpus=0, max_retries=0, retry_exceptions=False).remote(picture)
+
+
+@dataclass
+class Order:
+    """What is asked for."""
+
+    scene: Path
+    output: Path
+    shards: int
+    frames: range | None
+    cores: int
+    retries: int
+    partial: float
+    address: str | None
+    render: list
+    merge: list
+
+
+def count(text):
+    """A count of 1 or more."""
+    if not re.fullmatch(r"[1-9]\d*", text):
+        raise argparse.ArgumentTypeError(f"{text!r}: give 1 or more")
+    return int(text)
+
+
+def order_of(words):
+    """The command line, read."""
+    mine, merges = (words[: words.index("--")], words[words.index("--") + 1 :]) if "--" in words else (words, [])
+    parser = argparse.ArgumentParser(description="Renders on a Ray cluster.", allow_abbrev=False)
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.exr")
+    parser.add_argument("--shards", type=count, required=True, metavar="N")
+    parser.add_argument("--frames", type=frames_of, metavar="A-B[,STEP]")
+    parser.add_argument("--cores", type=count, default=1, help="cores of a task (1)")
+    parser.add_argument("--retries", type=int, default=3, help="tries after the first (3)")
+    parser.add_argument("--partial", type=float, default=60, help="seconds between pictures so far; 0: none (60)")
+    parser.add_argument("--address", help="the cluster, as ray.init takes it; else this machine alone")
+    known, render = parser.parse_known_args(mine)
+    for option in render:
+        if option in OURS:
+            parser.error(f"{option} is given by the farm")
+        if option in PICTURES:
+            parser.error(f"{option}: no shard is a picture; give what the merge is to do behind --")
+    if not known.scene.is_file():
+        parser.error(f"{known.scene}: no such scene")
+    if known.output.suffix != ".exr":
+        parser.error(f"{known.output} is no name of an EXR")
+    if known.frames is not None and "#" not in known.output.name:
+        parser.error(f"{known.output}: all frames have the same name; put '####' where the frame's number belongs")
+    places = {"scene": known.scene.resolve(), "output": known.output.resolve()}
+    # A shard alone is the picture.
+    render += merges if known.shards == 1 else []
+    return Order(**{**vars(known), **places}, render=render, merge=merges)
+
+
+def main():
+    order = order_of(sys.argv[1:])
+    os.environ["CAUSTIQUE_BIN"] = str(Path(program()).resolve()) if "/" in program() else program()
+    variables = {"CAUSTIQUE_BIN": os.environ["CAUSTIQUE_BIN"]}
+    ray.init(order.address, log_to_driver=False, include_dashboard=False, runtime_env={"env_vars": variables})
+    order.output.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        for picture in pictures(order):
+            for name in (picture.partial, picture.partial.with_suffix(".png"), picture.output.with_suffix(".log")):
+                name.unlink(missing_ok=True)
+            print(picture.output, flush=True)
+    except (ray.exceptions.RayTaskError, ray.exceptions.WorkerCrashedError) as error:
+        cause = getattr(error, "cause", None) or error
+        sys.exit(f"ray_render: error: {cause}\nhint: the same command again goes on from what is there")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+"""Farms: the scripts that their tasks run, what is submitted, the job template, and the model of scale. Slurm and Ray
+themselves run in scripts/figures/farms.py."""
+
+import contextlib
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+import unittest
+from dataclasses import replace
+
+import OpenEXR
+import support
+
+FARM = support.ROOT / "scripts" / "farm"
+sys.path.insert(0, str(FARM))
+import scale  # noqa: E402
+
+OPTIONS = ["--width", "24", "--method", "path"]
+
+
+def script(name, *words, check=0, env=None):
+    """Runs a script of farms; an AssertionError shows what it said where its exit code is another."""
+    variables = {**os.environ, "CAUSTIQUE_BIN": str(support.binary()), **(env or {})}
+    done = subprocess.run([FARM / name, *map(str, words)], capture_output=True, text=True, env=variables, check=False)
+    if check is not None and done.returncode != check:
+        raise AssertionError(f"{name}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    return done
+
+
+def channels(path):
+    """Name to bytes."""
+    found = OpenEXR.File(str(path), separate_channels=True).channels()
+    return {name: channel.pixels.tobytes() for name, channel in found.items()}
+
+
+class Tasks(support.Scratch):
+    def whole(self, *options):
+        """The channels of one render."""
+        file = self.dir / "whole.exr"
+        support.run(["render", support.scene("blocks"), "-o", file, *OPTIONS, *options], check=0)
+        return channels(file)
+
+    def test_shards_merge_to_the_render_and_are_removed(self):
+        out = self.dir / "a.exr"
+        for index in (2, 0, 1):
+            script("shard.sh", support.scene("blocks"), out, f"{index}/3", "--iterations", 6, *OPTIONS)
+        script("merge.sh", out, "--png", self.dir / "a.png")
+        self.assertEqual(channels(out), self.whole("--iterations", 6))
+        self.assertTrue((self.dir / "a.png").exists())
+        self.assertFalse((self.dir / "a.shards").exists())
+
+    def test_a_shard_alone_is_the_picture(self):
+        out = self.dir / "a.exr"
+        script("shard.sh", support.scene("blocks"), out, "0/1", "--iterations", 6, *OPTIONS, "--png", self.dir / "a.png")
+        script("merge.sh", out)
+        self.assertEqual(channels(out), self.whole("--iterations", 6))
+        self.assertEqual(sorted(file.name for file in self.dir.iterdir()), ["a.exr", "a.png", "whole.exr"])
+
+    def test_a_task_that_is_killed_takes_its_render_along_and_goes_on(self):
+        out, iterations = self.dir / "a.exr", 3000
+        words = [support.scene("blocks"), out, "0/2", "--iterations", iterations, *OPTIONS, "--checkpoint-every", "0.01"]
+        variables = {**os.environ, "CAUSTIQUE_BIN": str(support.binary())}
+        task = subprocess.Popen([FARM / "shard.sh", *map(str, words)], env=variables, stderr=subprocess.DEVNULL)
+        state = self.dir / "a.shards" / "part-0.exr.checkpoint"
+        self.wait(state.exists)
+        children = subprocess.run(["pgrep", "-P", str(task.pid)], capture_output=True, text=True, check=True).stdout.split()
+        task.send_signal(signal.SIGKILL)
+        task.wait()
+        for child in children:
+            self.wait(lambda child=child: not self.alive(child))
+        said = script("shard.sh", *words).stderr
+        self.assertIn("shard 0/2 goes on from", said)
+        script("shard.sh", *words[:2], "1/2", *words[3:])
+        script("merge.sh", out)
+        self.assertEqual(channels(out), self.whole("--iterations", iterations))
+
+    def test_a_task_that_is_told_to_end_saves_itself(self):
+        words = [support.scene("blocks"), self.dir / "a.exr", "0/1", "--iterations", 10**6, *OPTIONS]
+        variables = {**os.environ, "CAUSTIQUE_BIN": str(support.binary())}
+        task = subprocess.Popen(
+            [FARM / "shard.sh", *map(str, words), "--progress", "json"], env=variables, stderr=subprocess.PIPE, text=True
+        )
+        next(line for line in task.stderr if line.startswith("{"))
+        task.terminate()
+        task.stderr.read()
+        task.stderr.close()
+        self.assertEqual(task.wait(), 130)
+        self.assertTrue((self.dir / "a.shards" / "part-0.exr.checkpoint").exists())
+        self.assertFalse((self.dir / "a.shards" / "shard-0.exr").exists())
+
+    def test_shards_of_another_render_are_not_taken_for_this_one(self):
+        words = [support.scene("blocks"), self.dir / "a.exr", "0/2", "--iterations", 2, *OPTIONS]
+        script("shard.sh", *words)
+        for other in ([*words, "--seed", 1], [*words[:2], "0/3", *words[3:]], [support.scene("torus"), *words[1:]]):
+            self.assertIn("another scene", script("shard.sh", *other, check=2).stderr)
+        self.assertIn("shard 1 of 2 is missing", script("merge.sh", self.dir / "a.exr", check=2).stderr)
+        self.assertTrue((self.dir / "a.shards" / "shard-0.exr").exists())
+
+    def wait(self, what):
+        """Waits for something to be so."""
+        end = time.monotonic() + 60
+        while not what():
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.005)
+
+    @staticmethod
+    def alive(process):
+        """Whether a process runs."""
+        with contextlib.suppress(OSError), open(f"/proc/{process}/stat", encoding="utf-8") as stat:
+            return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
+        return False
+
+
+class Slurm(support.Scratch):
+    def submit(self, *words, check=0):
+        return script("slurm.sh", support.scene("blocks"), "-o", self.dir / "a.##.exr", "--dry-run", *words, check=check)
+
+    def test_every_frame_has_an_array_and_a_merge_that_waits_for_it(self):
+        done = self.submit("--shards", 4, "--frames", "8-10,2", "--iterations", 8, "--", "--png", "look ##.png")
+        self.assertEqual(done.stdout, "frame 8: shards 0, merge 0\nframe 10: shards 0, merge 0\n")
+        jobs = done.stderr.split("# sbatch ")[1:]
+        self.assertEqual(len(jobs), 4)
+        self.assertIn("--array=0-3", jobs[0])
+        self.assertIn("a.10.shards/%a.log", jobs[2])
+        self.assertIn("--frame 10 --threads 1 --iterations 8", jobs[2])
+        self.assertIn("--dependency=afterany:0", jobs[3])
+        self.assertIn("--frame 10 --threads 1 --png look\\ ##.png", jobs[3])
+        for job in jobs:
+            subprocess.run(["bash", "-n"], input=job.split("\n", 1)[1], text=True, check=True)
+
+    def test_what_means_nothing_is_refused(self):
+        for words, fault in (
+            (["--shards", "0"], "'0' is no count"),
+            (["--shards", "2", "--frames", "3"], None),
+            (["--shards", "2", "--frames", "b"], "--frames: 'b'"),
+            (["--shards", "2", "--png", "a.png"], "no shard is a picture"),
+            (["--shards", "2", "--resume", "a"], "given by the farm"),
+        ):
+            with self.subTest(words):
+                done = self.submit(*words, check=2 if fault else 0)
+                self.assertIn(fault or "", done.stderr)
+
+
+class OpenJobDescription(support.Scratch):
+    def test_the_template_runs_and_its_progress_is_understood(self):
+        from openjd.model import create_job, decode_job_template, document_string_to_object, DocumentType
+        from openjd.model import preprocess_job_parameters
+        from openjd.sessions import Session
+
+        text = (FARM / "template.yaml").read_text(encoding="utf-8")
+        document = document_string_to_object(document=text, document_type=DocumentType.YAML)
+        template = decode_job_template(template=document)
+        out = self.dir / "it's a.exr"
+        given = {"Scene": str(support.scene("blocks")), "Output": str(out), "Shards": "2", "Options": "--iterations 8 --width 24"}
+        given |= {"Caustique": str(support.binary())}
+        values = preprocess_job_parameters(
+            job_template=template, job_parameter_values=given, job_template_dir=FARM, current_working_dir=self.dir
+        )
+        job = create_job(job_template=template, job_parameter_values=values)
+        seen = []
+        with Session(
+            session_id="test", job_parameter_values=values, callback=lambda _, status: seen.append((status.progress, status.status_message))
+        ) as session:
+            for step, tasks in zip(job.steps, ((1, 2), (None,))):
+                for shard in tasks:
+                    self.run_task(session, step, shard)
+        self.assertTrue(out.exists())
+        self.assertEqual(sorted({progress for progress, _ in seen if progress is not None}), [25, 50, 75, 100])
+        self.assertTrue(any("iteration 2 of 4" in (message or "") for _, message in seen))
+
+    def run_task(self, session, step, shard):
+        """Runs a task to its end, which has to be a good one."""
+        from openjd.model import ParameterValue, ParameterValueType
+        from openjd.sessions import ActionState, SessionState
+
+        of = {"Frame": ParameterValue(type=ParameterValueType.INT, value="0")}
+        of |= {"Shard": ParameterValue(type=ParameterValueType.INT, value=str(shard))} if shard else {}
+        session.run_task(step_script=step.script, task_parameter_values=of)
+        while session.state == SessionState.RUNNING:
+            time.sleep(0.01)
+        self.assertEqual(session.action_status.state, ActionState.SUCCESS)
+
+
+class Scale(unittest.TestCase):
+    costs = scale.Costs(load=0.5, pilot=2, iteration=5, write=3, each=0.5, finish=20, file=250e6)
+
+    def ratio(self, costs, farm, job):
+        """The formula over the simulation, which may have other costs."""
+        return scale.seconds(self.costs, farm, job) / scale.simulate(costs, farm, job)
+
+    def cases(self):
+        for frames, cores, threads, shards in itertools.product((1, 10, 50), (1, 16, 100, 1000), (1, 4), (1, 4, 16, 64)):
+            if threads <= cores and frames * shards <= 200:
+                yield scale.Farm(cores, threads), scale.Job(frames, shards, 256)
+
+    def test_the_formula_is_within_a_tenth_of_the_simulation(self):
+        for farm, job in self.cases():
+            with self.subTest(f"{farm} {job}"):
+                self.assertAlmostEqual(self.ratio(self.costs, farm, job), 1, delta=0.1)
+
+    def test_the_formula_knows_every_cost(self):
+        for name in scale.Costs.__dataclass_fields__:
+            other = replace(self.costs, **{name: 20 * getattr(self.costs, name)})
+            off = max(abs(self.ratio(other, farm, job) - 1) for farm, job in self.cases())
+            self.assertGreater(off, 0.15, name)
+
+    def test_one_core_pays_for_everything_once(self):
+        parts = scale.predict(self.costs, scale.Farm(1, start=0), scale.Job(1, 1, 256))
+        self.assertAlmostEqual(sum(parts.values()), 0.5 + 2 + 256 * 5 + 3 + 0.25 + 0.5 + 0.25 + 20)
+
+    def test_a_tree_of_merges_is_as_simulated(self):
+        for shards in (64, 512):
+            farm, job = scale.Farm(1000), scale.Job(1, shards, 512, fan=8)
+            self.assertAlmostEqual(self.ratio(self.costs, farm, job), 1, delta=0.1)
+
+    def test_more_cores_are_never_slower_where_the_best_is_chosen(self):
+        taken = [scale.seconds(self.costs, *scale.best(self.costs, cores, 1, 256)) for cores in (1, 2, 8, 64, 512, 4096)]
+        self.assertEqual(taken, sorted(taken, reverse=True))
+
+
+if __name__ == "__main__":
+    unittest.main()
