@@ -15,6 +15,8 @@ PROGRAM = "target/release/caustique"
 WHOLE = ("./scripts/demo.sh", "./scripts/test.sh", "./scripts/python.sh")
 #: Scripts that need Blender.
 EXPORTER = "scripts/blender/export.py"
+# It needs Blender, and is run by blender_compositor.py.
+COMPOSITOR = "scripts/blender/compositor.py"
 MOST_LINES = 200
 WIDEST = 120
 
@@ -94,6 +96,8 @@ class Commands(support.Scratch):
                     self.assertTrue((support.ROOT / EXPORTER).is_file())
                     # What it would export stands in for a scene of ours.
                     (self.dir / words[-1]).write_bytes(support.scene("blocks").read_bytes())
+                elif COMPOSITOR in words:
+                    self.assertTrue((support.ROOT / COMPOSITOR).is_file())
                 else:
                     done = subprocess.run(
                         ["bash", "-c", shortened(command)], cwd=self.dir, capture_output=True, text=True, timeout=300, check=False
