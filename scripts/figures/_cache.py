@@ -15,7 +15,8 @@ from pathlib import Path
 
 from record import ROOT
 
-CACHE = Path(os.environ.get("CAUSTIQUE_CACHE", ROOT / "out" / "finished"))
+HOME = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+CACHE = Path(os.environ.get("CAUSTIQUE_CACHE", HOME / "caustique" / "finished"))
 BIN = Path(os.environ.get("CAUSTIQUE_BIN", ROOT / "target/release/caustique")).resolve()
 THREADS = int(os.environ.get("THREADS", "2"))
 WIDTH = int(os.environ.get("WIDTH", "240" if os.environ.get("SHORT") == "1" else "320"))

@@ -8,7 +8,7 @@ relMSE of all pixels and without the worst 0.5 %, HDR-FLIP (which keeps the nois
 goes on.
 
   CAUSTIQUE_BIN       the program
-  CAUSTIQUE_CACHE     where all is kept [out/finished]
+  CAUSTIQUE_CACHE     where all is kept [caustique/finished in the cache of the user]
   SET                 first, second, all, or twins: scenes as far as peers' drivers can say them [first]
   SCENES              names below scenes, such as pool,second/still,twin/pool [those of SET]
   BUDGETS             seconds [15,60,240]

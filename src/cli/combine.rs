@@ -7,6 +7,7 @@ use super::say;
 use caustique::error::Result;
 use caustique::film::{self, Layer, LayerSet, Naming, Plane};
 use caustique::image::exr;
+use caustique::pipeline::tell_stored;
 use caustique::render::Clock;
 use caustique::scene::description::Picture;
 use serde_json::json;
@@ -90,10 +91,13 @@ pub fn run(args: &CombineArgs) -> Result<()> {
         }
         let clock = Clock::start();
         let finish = || ready.finish().apply(&mut set, |_| true);
-        let account =
+        let mut account =
             Form::Auto.during("finishing the picture", finish).map_err(|error| error.within(args.input.display()))?;
         let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
         object["combined"] = ready.facts(&account);
+        if let Some(header) = object.as_object_mut() {
+            tell_stored(header, &mut set, &mut account)?;
+        }
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
         args.picture.write_png(&set, &Picture::default())?;

@@ -1,12 +1,14 @@
 //! `caustique info`: what a scene or an EXR holds.
 
 use super::progress::{Form, duration, percent};
+use super::render::place;
 use super::scene::SceneArgs;
 use super::{plot, print, print_json, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
 use caustique::light::Emitter;
+use caustique::pipeline::Place;
 use caustique::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::fs::File;
@@ -101,6 +103,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
             let hours = cores / 3600.0;
             text += &format!("{} would take about {} more, {hours:.2} core-hours\n", percent(error), duration(seconds));
         }
+        text += &accuracy_text(object);
     }
     for warning in object.get("warnings").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {
         text += &format!("warning: {warning}\n");
@@ -120,6 +123,34 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
         _ => (finished, "estimated relative error of the finished picture"),
     };
     text + &plot::log_log(&points, name, of)
+}
+
+/// How sure the error is, and where it is.
+fn accuracy_text(object: &Map<String, Value>) -> String {
+    let accuracy = object.get("accuracy");
+    let number = |value: &Value, key: &str| value.get(key).and_then(Value::as_f64);
+    let mut text = String::new();
+    if let Some([low, high]) = accuracy.and_then(|accuracy| accuracy["interval"].as_array()).map(Vec::as_slice) {
+        let [low, high] = [low, high].map(|end| percent(end.as_f64().unwrap_or(f64::NAN)));
+        let confidence = accuracy.and_then(|accuracy| number(accuracy, "confidence")).unwrap_or(f64::NAN);
+        text += &format!("the error lies between {low} and {high} in {} of all pictures\n", percent(confidence));
+    }
+    let rows = |of: &str| object.get("worst").and_then(|worst| worst[of].as_array()).into_iter().flatten();
+    let name = |value: &Value, key: &str| value[key].as_str().unwrap_or_default().to_string();
+    let place_of = |value: &Value| {
+        let share = number(value, "share").unwrap_or(0.0);
+        let [object, material, light] = ["object", "material", "light"].map(|key| name(value, key));
+        place(&Place { share, object, material, light })
+    };
+    let by: Vec<String> = rows("by").map(place_of).collect();
+    if !by.is_empty() {
+        text += &format!("where the error is: {}\n", by.join("; "));
+    }
+    for tile in rows("tiles") {
+        let [x, y, width, height] = ["x", "y", "width", "height"].map(|key| tile[key].as_u64().unwrap_or(0));
+        text += &format!("  {width} x {height} pixels at {x},{y}: {}\n", place_of(tile));
+    }
+    text
 }
 
 fn scene_object(path: &Path, scene: &Scene) -> Value {

@@ -9,9 +9,9 @@ use super::say;
 use caustique::error::Result;
 use caustique::film::{LayerSet, Selection};
 use caustique::image::exr::{self, Attributes};
-use caustique::pipeline::finish;
 use caustique::pipeline::merge::{self, Shards, Step, is_shard};
 use caustique::pipeline::seeds::Seeds;
+use caustique::pipeline::{finish, tell_stored};
 use caustique::scene::description::Picture;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -117,7 +117,7 @@ fn join(args: &MergeArgs) -> Result<()> {
     if let Some(summary) = summary {
         summary.tell();
         if let Some((name, _)) = &delivery.finished {
-            tell_finish(name, delivery.reached.as_ref(), delivery.finishing, summary.told_of_finished());
+            tell_finish(name, &delivery, summary.told_of_finished());
         }
         summary.tell_rejected(&args.output);
     }
@@ -145,8 +145,11 @@ fn average(args: &MergeArgs) -> Result<()> {
     if let Some(order) = args.finish(&arguments) {
         let mut ready = finish::open(&order, None)?;
         tell_missing(ready.missing.as_ref());
-        let account = ready.finish().apply(&mut set, |_| true)?;
+        let mut account = ready.finish().apply(&mut set, |_| true)?;
         header["combined"] = ready.facts(&account);
+        if let Some(header) = header.as_object_mut() {
+            tell_stored(header, &mut set, &mut account)?;
+        }
     }
     if let Some(layers) = &args.layers {
         set = Selection::parse(layers)?.apply(set)?;

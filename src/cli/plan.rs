@@ -1,12 +1,12 @@
 //! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
 
 use super::number::threads;
-use super::progress::{Form, percent};
+use super::progress::{Form, duration, percent};
 use super::render::{Job, Method};
 use super::scene::SceneArgs;
 use super::{print, print_json, scene};
 use caustique::error::Result;
-use caustique::pipeline::{Loaded, check, plan};
+use caustique::pipeline::{Loaded, Outlook, check, outlook, plan, sized};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::render::auto::choose;
 use serde_json::json;
@@ -61,10 +61,27 @@ fn report(args: &PlanArgs) -> Result<()> {
     let mut plan = plan::plan(&asked, settings.method, (&scene, &camera), &removed);
     let of_scene = &scene.warnings;
     plan.warnings.splice(0..0, of_scene.iter().cloned());
+    let outlook = match job.target_error {
+        Some(error) => {
+            let settings = choice.as_ref().map_or(&settings, |choice| &choice.settings);
+            let settings = sized(settings.clone(), job.photons, camera.size());
+            let mut finish = job.pilot_finish()?;
+            let tried = || outlook((&scene, &camera), &settings, &mut finish, error);
+            Some((error, Form::beside(args.json).during("trying how the error falls", tried)?))
+        }
+        None => None,
+    };
     if args.json {
-        print_json(&json!(plan))?
+        let mut object = json!(plan);
+        if let Some((_, outlook)) = outlook {
+            object["outlook"] = json!(outlook);
+        }
+        print_json(&object)?
     } else {
         let mut text = text(&plan);
+        if let Some((error, outlook)) = outlook {
+            text += &foretold(error, outlook);
+        }
         if job.method == Method::Auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
             text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
         }
@@ -74,6 +91,20 @@ fn report(args: &PlanArgs) -> Result<()> {
         return Err(scene::forbidden(&job.scene, of_scene.len()));
     }
     Ok(())
+}
+
+/// `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and by what that is told.
+fn foretold(error: f64, outlook: Option<Outlook>) -> String {
+    let Some(Outlook { iterations, seconds, core_seconds, pilot: (done, reached), .. }) = outlook else {
+        return format!("error {}: a pilot tells no time after which it is reached\n", percent(error));
+    };
+    format!(
+        "error {} after about {} ({:.2} core-hours, {iterations} iterations): a small pilot had {} after {done}\n",
+        percent(error),
+        duration(seconds),
+        core_seconds / 3600.0,
+        percent(reached),
+    )
 }
 
 /// A column: its title, and what it says of an effect.

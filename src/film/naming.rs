@@ -119,7 +119,11 @@ pub fn describe(name: &str) -> Option<Description> {
         "CombinedCaustic" => is("RGB", RADIANCE, "Caustic as finished"),
         "CombinedEmission" => is("RGB", RADIANCE, "Emission as finished"),
         "CombinedVolume" => is("RGB", RADIANCE, "Volume as finished"),
-        "Error" => is("RGB", RADIANCE, "estimated standard error of the unfinished image (Noisy), bias included"),
+        "Error" => is(
+            "RGB",
+            RADIANCE,
+            "estimated error of the beauty: the truth lies within twice as much in nine pixels of ten",
+        ),
         "albedo" => is("RGB", "1", "reflectance at the first hit that is not a mirror or clear glass"),
         "normal" => is("XYZ", "1", "world-space unit normal at that hit"),
         "depth" => is("Z", "m", "distance along the path to that hit"),

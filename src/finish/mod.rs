@@ -5,7 +5,7 @@
 //! 2. A denoiser's picture `D` of it ([`denoiser`]).
 //! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent whatever `D` is.
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
-//! 5. The error of the result, told by independent quarters of the iterations ([`told`]).
+//! 5. The error of the result, told by independent quarters of the iterations ([`Verdict`]).
 //!
 //! All of it reads and writes named layers, so that a stored picture, also one of another renderer, is finished as a
 //! fresh one is.
@@ -15,10 +15,12 @@ pub mod denoiser;
 pub mod parts;
 pub mod statistical;
 pub mod told;
+mod verdict;
 mod window;
 
 pub use denoiser::{Denoiser, DenoiserChoice, Quality};
-pub use window::{Size, window};
+pub use verdict::{Errors, Verdict};
+pub use window::{Size, Windows, window};
 
 use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Kind, Result};
@@ -27,7 +29,10 @@ use crate::film::{CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Role};
 pub use bound::Clamped;
 use parts::Part;
 use rayon::prelude::*;
+use verdict::Trial;
 
+/// The layer of the picture's error.
+pub const ERROR: &str = "Error";
 /// The additive parts of our layers, the last one the one that light of no part goes to.
 const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
 /// Layers of ours that the picture is finished from, and that the network reads, by the beginnings of their names.
@@ -117,7 +122,12 @@ impl Estimate {
     /// The estimate by the first two quarters alone.
     #[must_use]
     pub fn first_half(&self, quarters: &[Vec<[f32; 3]>; QUARTERS]) -> Estimate {
-        self.of_some(told::first_half(quarters), 2.0)
+        self.half([&quarters[0], &quarters[1]])
+    }
+
+    /// The estimate by two quarters.
+    fn half(&self, quarters: [&[[f32; 3]]; 2]) -> Estimate {
+        self.of_some(told::mean(quarters), 2.0)
     }
 
     /// The estimate by some of the iterations, whose mean is given; all are `fewer` times as many.
@@ -138,14 +148,6 @@ pub fn quarters(set: &LayerSet) -> Option<[Vec<[f32; 3]>; QUARTERS]> {
     (!quarters.iter().any(black)).then_some(quarters)
 }
 
-/// The error of a finished picture as its quarters tell it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
-    /// Root of the trimmed relMSE of a picture finished from half of the iterations at the least quality, which the
-    /// delivered one is better than; zero where noise hides it. Bias that all quarters have in common is not in it.
-    pub half: f64,
-}
-
 /// What finishes pictures.
 pub struct Finish {
     denoiser: Denoiser,
@@ -159,8 +161,11 @@ pub struct Finish {
 pub struct Account {
     /// Levels that equation (6) has combined, if it has.
     pub combined: Option<usize>,
-    /// The error, where the picture has quarters.
-    pub told: Option<Told>,
+    /// The error of a picture finished from half of the iterations at the least quality, which the delivered one is
+    /// better than; where the picture has quarters.
+    pub verdict: Option<Verdict>,
+    /// The errors of its pixels, where the layer `Error` is wanted.
+    pub errors: Option<Errors>,
     /// Pixels that were kept between zero and the brightest estimate around.
     pub clamped: Clamped,
 }
@@ -225,7 +230,7 @@ impl Finish {
             None => None,
         };
         let ([picture, spread], clamped) = self.with_spread(&estimate)?;
-        let told = self.told(set, &estimate)?;
+        let (verdict, errors) = self.judged(set, &estimate, wanted(ERROR))?.unzip();
         let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
         let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
         set.layers.retain(|layer| layer.name != "Combined");
@@ -239,32 +244,49 @@ impl Finish {
         for (name, values) in parts {
             set.push(Layer::interleaved(name, "RGB", values))?;
         }
-        Ok(Account { combined, told, clamped })
+        Ok(Account { combined, verdict, errors: errors.flatten(), clamped })
     }
 
-    /// The squared error (trimmed, relative) of a picture finished from half of its iterations, as the other half tells
-    /// it; `None` where a quarter is missing or empty.
+    /// The error of a picture finished from half of its iterations, as the other half tells it; `None` where a quarter is
+    /// missing or empty.
     ///
     /// # Errors
     /// Layers are missing, or the denoiser fails.
-    pub fn squared_error_of_half(&mut self, set: &LayerSet) -> Result<Option<f64>> {
+    pub fn verdict(&mut self, set: &LayerSet) -> Result<Option<Verdict>> {
         let estimate = Estimate::of(set)?;
-        self.half(set, &estimate)
+        Ok(self.judged(set, &estimate, false)?.map(|(verdict, _)| verdict))
     }
 
-    /// The error of a picture finished from two of its quarters, judged by the other two; `None` where a quarter is
-    /// missing or empty.
-    fn told(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Option<Told>> {
-        Ok(self.half(set, estimate)?.map(|squared| Told { half: squared.max(0.0).sqrt() }))
-    }
-
-    fn half(&mut self, set: &LayerSet, estimate: &Estimate) -> Result<Option<f64>> {
+    /// The same, with the errors of pixels if they are wanted.
+    fn judged(
+        &mut self,
+        set: &LayerSet,
+        estimate: &Estimate,
+        of_pixels: bool,
+    ) -> Result<Option<(Verdict, Option<Errors>)>> {
         let Some(quarters) = quarters(set) else { return Ok(None) };
         let quality = std::mem::replace(&mut self.quality, Quality::Fast);
-        let picture = self.picture(&estimate.first_half(&quarters));
+        let [a, b, c, d] = &quarters;
+        let halves = [[a, b], [c, d]].map(|[a, b]| self.picture(&estimate.half([a, b])));
         self.quality = quality;
-        let picture = picture?;
-        Ok(Some(told::squared_error(&picture, [&quarters[2], &quarters[3]], &picture)))
+        let [first, second] = halves;
+        let (first, second) = (first?, second?);
+        let own = own_level(set);
+        let levels = [own, own + 1].map(|level| set.get(&format!("Level{level}")).map(Layer::triples));
+        let [own, larger] = &levels;
+        let trial = Trial {
+            size: estimate.size,
+            halves: [&first, &second],
+            quarters: &quarters,
+            deviation: &estimate.deviation,
+            levels: own.as_deref().zip(larger.as_deref()).map(|(own, larger)| [own, larger]),
+        };
+        Ok(Some(if of_pixels {
+            let (verdict, errors) = trial.judge();
+            (verdict, Some(errors))
+        } else {
+            (trial.verdict(), None)
+        }))
     }
 
     /// The finished parts that are wanted, with their layers' names: all or none of those are worked out that sum to

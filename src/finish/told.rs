@@ -51,15 +51,9 @@ pub fn judge(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]
     pixels.into_iter().filter(|(apart, _)| *apart <= most).map(|(_, judged)| judged).collect()
 }
 
-/// The mean of the errors that [`judge`] tells.
-pub fn squared_error(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> f64 {
-    let pixels = judge(picture, judges, values);
-    pixels.iter().map(|pixel| pixel.error).sum::<f64>() / pixels.len().max(1) as f64
-}
-
-/// Means of quarters 1 and 2 per pixel, of equal numbers of iterations but for one.
-pub fn first_half(quarters: &[Vec<[f32; 3]>; 4]) -> Vec<[f32; 3]> {
-    let pairs = quarters[0].par_iter().zip(&quarters[1]);
+/// Mean of two quarters per pixel, of equal numbers of iterations but for one.
+pub fn mean(quarters: [&[[f32; 3]]; 2]) -> Vec<[f32; 3]> {
+    let pairs = quarters[0].par_iter().zip(quarters[1]);
     pairs.map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
 }
 
@@ -67,6 +61,12 @@ pub fn first_half(quarters: &[Vec<[f32; 3]>; 4]) -> Vec<[f32; 3]> {
 mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
+
+    /// The mean of the errors that [`judge`] tells.
+    fn squared_error(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> f64 {
+        let pixels = judge(picture, judges, values);
+        pixels.iter().map(|pixel| pixel.error).sum::<f64>() / pixels.len().max(1) as f64
+    }
 
     /// A picture that is off by a tenth, judged by halves whose noise is five times that: the error is found with a
     /// standard error of 0.0005 (12,000 pixels of three equal channels); a judge used twice would tell its own

@@ -3,12 +3,13 @@
 use super::Ready;
 use super::facts::Facts;
 use super::layers;
+use super::worst::{Seen, Worst};
 use crate::error::{Error, Result};
 use crate::estimator::Pixel;
-use crate::film::{LayerSet, Naming, Selection};
-use crate::finish::{Account, reads};
+use crate::film::{Layer, LayerSet, Naming, Selection};
+use crate::finish::{Account, ERROR, reads};
 use crate::image::exr::{self, Attributes};
-use crate::render::{Accuracy, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
+use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
 
 /// A picture with its layers and its header.
@@ -23,6 +24,8 @@ pub struct Delivery {
     pub finished: Option<(String, Account)>,
     /// The error of the finished picture and what half of it costs, where its quarters tell.
     pub reached: Option<Reached>,
+    /// Where that error is.
+    pub worst: Option<Worst>,
     /// Seconds from the last iteration to here.
     pub finishing: f64,
     /// Why the picture is not finished, though that was asked for.
@@ -62,16 +65,29 @@ pub(super) fn deliver(
     attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
     let techniques = std::mem::take(&mut rendered.techniques);
     let history = std::mem::take(&mut rendered.history);
+    let seen = if finishes { Seen::of(&rendered.pixels, &facts.named) } else { Seen::default() };
     // The pixels are most of the memory, and all that is wanted of them is in the layers.
     let pixels = if keep { rendered.pixels } else { Vec::new() };
     let applied = ready.map(|ready| {
-        let account = ready.finish().apply(&mut set, |name| selection.wants(name))?;
+        let account = ready.finish().apply(&mut set, |name| name == ERROR || selection.wants(name))?;
         Ok((ready.name(), ready.facts(&account), account))
     });
     let finishing = clock.seconds();
-    let (finished, refusal) = match applied.transpose() {
+    let (mut finished, refusal) = match applied.transpose() {
         Ok(finished) => (finished, None),
         Err(error) => (None, Some(error)),
+    };
+    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account));
+    let errors = finished.as_mut().and_then(|(_, _, account)| account.errors.take());
+    let worst = match errors {
+        Some(errors) => {
+            let squared = errors.squared(of_finished.as_ref().map_or(1.0, |reached| reached.accuracy.fall()));
+            let squared: Vec<[f32; 3]> = squared.collect();
+            let worst = Worst::of(&squared, &errors.weight, &set, &seen);
+            tell_error(&mut set, squared)?;
+            Some(worst)
+        }
+        None => None,
     };
     // A render that is still to be finished keeps what that reads, and a shard has what it can have.
     if keep {
@@ -89,9 +105,11 @@ pub(super) fn deliver(
         header.insert("frame_rate".into(), json!(rate));
     }
     header.insert("error_of".into(), "Noisy".into());
-    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account));
     if let Some(reached) = &of_finished {
         reached.tell(&mut header, reproducible);
+    }
+    if let Some(worst) = &worst {
+        header.insert("worst".into(), json!(worst));
     }
     header.insert("combined".into(), finished.as_ref().map_or(Value::Null, |(_, facts, _)| facts.clone()));
     header.extend(more);
@@ -101,7 +119,7 @@ pub(super) fn deliver(
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let finished = finished.map(|(name, _, account)| (name, account));
     let reached = of_finished;
-    Ok((Delivery { set, attributes, techniques, finished, reached, finishing, refusal, tail: None }, pixels))
+    Ok((Delivery { set, attributes, techniques, finished, reached, worst, finishing, refusal, tail: None }, pixels))
 }
 
 /// How far a render has come.
@@ -116,8 +134,8 @@ impl Reached {
     /// By a history and what the finish has told at its end; `None` where nothing is known.
     fn of(mut history: Vec<History>, account: &Account) -> Option<Reached> {
         let last = history.last_mut()?;
-        if let Some(told) = account.told {
-            last.finished = Some(told.half * told.half);
+        if account.verdict.is_some() {
+            last.finished = account.verdict;
         }
         let last = *last;
         Some(Reached { accuracy: Accuracy::of(&history)?, history, last })
@@ -127,6 +145,16 @@ impl Reached {
     /// pixels.
     pub fn error(&self) -> f64 {
         self.accuracy.error(self.last.iterations)
+    }
+
+    /// Between what that lies in [`CONFIDENCE`] of all pictures.
+    pub fn interval(&self) -> [f64; 2] {
+        self.accuracy.interval(self.last.iterations)
+    }
+
+    /// Share of the noise that few bright samples hold, 0 to 1.
+    pub fn rare(&self) -> f64 {
+        self.accuracy.rare
     }
 
     /// How many times what the render has cost half of the error costs beside it; `None` where bias forbids it.
@@ -155,13 +183,50 @@ impl Reached {
             }
         }
         let metric = "root of relMSE, trimmed of the worst 0.5 % of the pixels";
-        let exponent = self.accuracy.exponent;
-        header.insert("accuracy".into(), json!({"metric": metric, "exponent": exponent, "halving": halving}));
+        let accuracy = json!({
+            "metric": metric,
+            "interval": self.interval(),
+            "confidence": CONFIDENCE,
+            "rare": self.rare(),
+            "exponent": self.accuracy.exponent,
+            "halving": halving,
+        });
+        header.insert("accuracy".into(), accuracy);
         let moments = header.get_mut("history").and_then(Value::as_array_mut).into_iter().flatten();
         for (entry, moment) in moments.zip(&self.history) {
             entry["finished"] = moment.finished.map(|_| self.accuracy.error(moment.iterations)).into();
         }
     }
+}
+
+/// Makes the roots of squared errors the layer `Error`.
+fn tell_error(set: &mut LayerSet, squared: impl IntoIterator<Item = [f32; 3]>) -> Result<()> {
+    set.layers.retain(|layer| layer.name != ERROR);
+    set.push(Layer::interleaved(ERROR, "RGB", squared.into_iter().map(|rgb| rgb.map(f32::sqrt))))
+}
+
+/// What the finish of a stored picture has told of its error: in its header, and in the layer `Error`. Nothing where the
+/// picture has no quarters.
+///
+/// # Errors
+/// None: errors are as many as pixels.
+pub fn tell_stored(header: &mut Map<String, Value>, set: &mut LayerSet, account: &mut Account) -> Result<()> {
+    let iterations = header.get("iterations").and_then(Value::as_u64).unwrap_or(1).max(1);
+    let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
+    let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);
+    let timed = number("seconds").is_some();
+    let history = History {
+        seconds: number("seconds").unwrap_or(0.0),
+        cpu_seconds: number("cpu_seconds").unwrap_or(0.0),
+        iterations,
+        light_paths: 0,
+        estimate: None,
+        finished: account.verdict,
+    };
+    let Some(reached) = Reached::of(vec![history], account) else { return Ok(()) };
+    reached.tell(header, !timed);
+    let Some(errors) = account.errors.take() else { return Ok(()) };
+    tell_error(set, errors.squared(reached.accuracy.fall()).collect::<Vec<_>>())
 }
 
 /// What the layers and their finish have cost.

@@ -101,8 +101,8 @@ impl Ready {
             }
         }
         self.finish.quality = picture.0;
-        // The picture, half of it for its error, and its parts.
-        Ok((picture.1 + fast * (1.0 + parts as f64)).min(MOST * seconds))
+        // The picture, two halves of it for its error, and its parts.
+        Ok((picture.1 + fast * (2.0 + parts as f64)).min(MOST * seconds))
     }
 
     /// Finishes a picture that is looked at for some seconds: the quickest way, without its error and its parts.
@@ -144,7 +144,7 @@ impl Ready {
             "levels": account.combined,
             "training": self.model.as_ref().map(|network| &network.training),
             "clamped": {"below_zero": account.clamped.below_zero, "too_bright": account.clamped.too_bright},
-            "error_at_half": account.told.map(|told| told.half),
+            "error_at_half": account.verdict.map(|verdict| verdict.noise.max(0.0).sqrt()),
         })
     }
 }

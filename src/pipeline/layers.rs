@@ -59,10 +59,10 @@ pub fn groups_named(asked: &str) -> Vec<String> {
 /// Names of objects and materials, and whose each instance is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Named {
-    objects: Vec<String>,
-    materials: Vec<String>,
+    pub objects: Vec<String>,
+    pub materials: Vec<String>,
     /// Object and material of each instance.
-    instances: Vec<[u32; 2]>,
+    pub instances: Vec<[u32; 2]>,
 }
 
 impl Named {

@@ -13,17 +13,21 @@ pub mod layers;
 pub mod load;
 pub mod memory;
 pub mod merge;
+mod outlook;
 pub mod plan;
 pub mod records;
 mod saver;
 pub mod seeds;
 pub mod shard;
+mod worst;
 
 pub use checkpoint::Saving;
-pub use deliver::{Delivery, Reached};
+pub use deliver::{Delivery, Reached, tell_stored};
 pub use facts::Facts;
 pub use finish::Ready;
 pub use load::Loaded;
+pub use outlook::{Outlook, outlook};
+pub use worst::{Place, Tile, Worst};
 
 use checkpoint::Head;
 use deliver::{Writing, deliver};

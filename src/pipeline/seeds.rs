@@ -198,7 +198,11 @@ impl Seeds {
             }
         }
         let own = sources.first().and_then(|source| source.header["levels"].as_u64()).unwrap_or(1).max(2) - 1;
-        tell_errors(&mut set, &format!("Variance{own}"), sources.len());
+        if !finished(&sources) {
+            tell_errors(&mut set, &format!("Variance{own}"), sources.len());
+        } else if let Some(error) = set.layers.iter_mut().find(|layer| layer.name == "Error") {
+            error.planes.iter_mut().flat_map(|plane| &mut plane.values).for_each(|square| *square = square.sqrt());
+        }
         for (kind, ranks) in mattes {
             let named = Cryptomatte::new(kind, []);
             for layer in named.layers(&ranks, total as f32) {
@@ -210,6 +214,11 @@ impl Seeds {
         attributes.insert(exr::ATTRIBUTE, &header(&sources, total))?;
         Ok((set, attributes))
     }
+}
+
+/// Whether errors are those of finished pictures.
+fn finished(sources: &[Source]) -> bool {
+    sources.iter().any(|source| source.header["error_of"] == "finished picture")
 }
 
 /// From mean squares of the errors of so many renders to the error of their mean. Variances fall with their number,
@@ -240,8 +249,11 @@ fn header(sources: &[Source], total: f64) -> Value {
     let mut header: Map<String, Value> =
         sources.first().and_then(|source| source.header.as_object().cloned()).unwrap_or_default();
     let sum = |key: &str| sources.iter().map(|source| source.header[key].as_f64().unwrap_or(0.0)).sum::<f64>();
-    // Independent errors of renders, by squares of their weights.
-    let squares = sources.iter().map(|source| Some((source.iterations * source.header["error"].as_f64()?).powi(2)));
+    // Independent errors of renders, by squares of their weights. What denoisers do to finished pictures they have in
+    // common, so that their mean is sure to be no worse than they are, and no more.
+    let weight =
+        |source: &Source| if finished(sources) { source.iterations * total } else { source.iterations.powi(2) };
+    let squares = sources.iter().map(|source| Some(weight(source) * source.header["error"].as_f64()?.powi(2)));
     let error = squares.sum::<Option<f64>>().map(|squares| squares.sqrt() / total);
     for (key, value) in [
         ("iterations", json!(total as u64)),

@@ -1,21 +1,32 @@
 //! What accuracy costs: the error of the picture as it would be delivered, how it falls, and when it will be small
 //! enough.
 //!
-//! Now and then a picture finished from half of the iterations is judged by the other half ([`History::finished`]). Its
-//! squared error falls as a power of the iterations, `e^2 = a n^(-2 s)`, and the whole picture's is that of twice as many
+//! Now and then pictures finished from half of the iterations are judged by the other half ([`Verdict`]). Their squared
+//! error falls as a power of the iterations, `e^2 = a n^(-2 s)`, and the whole picture's is that of twice as many
 //! iterations. Few moments tell `s` badly, so they are joined by what is usual: the square of a finished picture's error
 //! falls with the power 0.7 ([`USUAL`]), as if that had been measured with a spread of one in the logarithm of
-//! iterations. Bias that all quarters have in common is told by bandwidth levels, and added.
+//! iterations. Moments count by how sure they are. Bias that all quarters have in common is told by bandwidth levels,
+//! and added.
 
 use super::control::History;
+use crate::finish::Verdict;
 
 /// The power with which finished errors fall, usually: between 0.2 and 0.5, what the scenes of the project show
 /// (`docs/measurements.md`, slopes of finished pictures).
-const USUAL: f64 = 0.35;
+pub const USUAL: f64 = 0.35;
 /// What a power may come out as: noise alone falls with a half, and nothing rises.
 const RANGE: (f64, f64) = (0.1, 0.55);
 /// Moments that tell the level of the error: the last ones.
 const LATEST: usize = 3;
+/// Spread of the logarithm of squared errors from moment to moment, what judges add apart.
+const SCATTER: f64 = 0.2;
+/// Spread of the logarithm of an error that is told from what it is, what judges add apart: fitted on one set of scenes,
+/// and checked on another (`docs/accuracy.md`).
+const MODEL: f64 = 0.15;
+/// The share of pictures whose error lies in the interval.
+pub const CONFIDENCE: f64 = 0.9;
+/// Standard deviations to each side of a normal distribution that hold that share.
+const DEVIATIONS: f64 = 1.645;
 
 /// How the error of the finished picture falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,35 +37,68 @@ pub struct Accuracy {
     level: f64,
     /// Squared bias, which is taken to stay.
     squared_bias: f64,
+    /// Standard error of the logarithm of the latest squared error, of what judges add.
+    doubt: f64,
+    /// Share of the noise that few bright samples hold ([`Verdict::rare`]).
+    pub rare: f64,
     /// Iterations at the last moment that was judged.
     pub judged: u64,
 }
 
+/// A moment that was judged, on logarithmic scales.
+struct Moment {
+    /// Logarithm of the iterations of the picture that was judged, half of all.
+    iterations: f64,
+    squared: f64,
+    /// Standard error of `squared`.
+    doubt: f64,
+    weight: f64,
+}
+
+impl Moment {
+    /// `None` where there was no noise at all.
+    fn of(iterations: u64, verdict: &Verdict) -> Option<Moment> {
+        // An error that the judges' noise hides is no larger than that, most likely.
+        let squared = verdict.noise.max(verdict.deviation);
+        let doubt = verdict.deviation / squared;
+        let weight = SCATTER.powi(2) / (SCATTER.powi(2) + doubt.powi(2));
+        let known = squared > 0.0 && squared.is_finite();
+        known.then(|| Moment { iterations: (iterations as f64 / 2.0).ln(), squared: squared.ln(), doubt, weight })
+    }
+}
+
 impl Accuracy {
-    /// From a history; `None` while no moment was judged, or noise hides all that is to be seen.
+    /// From a history; `None` while no moment was judged, or none had noise.
     pub fn of(history: &[History]) -> Option<Accuracy> {
-        // The picture that was judged has half of the iterations.
-        let judged = |moment: &History| {
-            let squared = moment.finished.filter(|squared| *squared > 0.0)?;
-            Some((moment.iterations, (moment.iterations as f64 / 2.0).ln(), squared.ln()))
-        };
-        let moments: Vec<(u64, f64, f64)> = history.iter().filter_map(judged).collect();
-        let &(last, ..) = moments.last()?;
-        let count = moments.len() as f64;
-        let mean = |of: fn(&(u64, f64, f64)) -> f64| moments.iter().map(of).sum::<f64>() / count;
-        let (middle, average) = (mean(|m| m.1), mean(|m| m.2));
-        let spread: f64 = moments.iter().map(|m| (m.1 - middle).powi(2)).sum();
-        let falls: f64 = moments.iter().map(|m| -0.5 * (m.1 - middle) * (m.2 - average)).sum();
-        let exponent = ((falls + USUAL) / (spread + 1.0)).clamp(RANGE.0, RANGE.1);
+        let judged = || history.iter().filter_map(|moment| Some((moment.iterations, moment.finished?)));
+        let moments: Vec<Moment> = judged().filter_map(|(n, verdict)| Moment::of(n, &verdict)).collect();
+        let (last, verdict) = judged().last()?;
         let latest = &moments[moments.len().saturating_sub(LATEST)..];
-        let level = latest.iter().map(|m| m.2 + 2.0 * exponent * m.1).sum::<f64>() / latest.len() as f64;
-        let told = history.iter().rev().find_map(|moment| moment.estimate);
-        Some(Accuracy { exponent, level, squared_bias: told.map_or(0.0, |told| told.squared_bias), judged: last })
+        let doubt = latest.last()?.doubt;
+        let mean = |of: &[Moment], value: &dyn Fn(&Moment) -> f64| {
+            let (sum, weight) = of.iter().fold((0.0, 0.0), |(s, w), m| (s + m.weight * value(m), w + m.weight));
+            sum / weight
+        };
+        let (middle, average) = (mean(&moments, &|m| m.iterations), mean(&moments, &|m| m.squared));
+        let spread: f64 = moments.iter().map(|m| m.weight * (m.iterations - middle).powi(2)).sum();
+        let fall = |m: &Moment| -0.5 * m.weight * (m.iterations - middle) * (m.squared - average);
+        let falls: f64 = moments.iter().map(fall).sum();
+        let exponent = ((falls + USUAL) / (spread + 1.0)).clamp(RANGE.0, RANGE.1);
+        let level = mean(latest, &|m| m.squared + 2.0 * exponent * m.iterations);
+        Some(Accuracy { exponent, level, squared_bias: verdict.bias, doubt, rare: verdict.rare, judged: last })
     }
 
     /// Relative error of the picture finished after so many iterations: the root of trimmed relMSE.
     pub fn error(&self, iterations: u64) -> f64 {
         ((self.level - 2.0 * self.exponent * (iterations as f64).ln()).exp() + self.squared_bias).sqrt()
+    }
+
+    /// Between what the error lies in [`CONFIDENCE`] of all pictures. Where few bright samples hold the noise, the upper
+    /// end is what the error would be with all of it: as if the pixels that were left out were as well told as others.
+    pub fn interval(&self, iterations: u64) -> [f64; 2] {
+        let factor = (DEVIATIONS * MODEL.hypot(0.5 * self.doubt)).exp();
+        let error = self.error(iterations);
+        [error / factor, error * factor / (1.0 - self.rare).max(1e-4).sqrt()]
     }
 
     /// Iterations after which the error is this small; `None` where bias forbids it for longer than can be told.
@@ -63,22 +107,26 @@ impl Accuracy {
         let iterations = ((self.level - noise.ln()) / (2.0 * self.exponent)).exp();
         (noise > 0.0 && iterations.is_finite()).then_some(iterations)
     }
+
+    /// What the squared noise of a picture finished from all iterations is of that of half of them.
+    pub fn fall(&self) -> f64 {
+        (-2.0 * self.exponent).exp2()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::ErrorEstimate;
 
     /// A history judged at some iterations, whose finished error falls as said.
-    fn history(judged: &[u64], squared: impl Fn(f64) -> f64, squared_bias: f64) -> Vec<History> {
+    fn history(judged: &[u64], squared: impl Fn(f64) -> f64, bias: f64) -> Vec<History> {
         let moment = |&iterations: &u64| History {
             seconds: 0.0,
             cpu_seconds: 0.0,
             iterations,
             light_paths: 0,
-            estimate: Some(ErrorEstimate { squared_bias, ..ErrorEstimate::default() }),
-            finished: Some(squared(iterations as f64 / 2.0)),
+            estimate: None,
+            finished: Some(Verdict { noise: squared(iterations as f64 / 2.0), deviation: 1e-9, bias, rare: 0.0 }),
         };
         judged.iter().map(moment).collect()
     }
@@ -87,7 +135,8 @@ mod tests {
     fn a_power_that_is_usual_is_found_from_one_moment_and_another_from_many() {
         let usual = |n: f64| 0.01 * n.powf(-2.0 * USUAL);
         let one = Accuracy::of(&history(&[8], usual, 0.0)).expect("one moment");
-        assert!((one.exponent - USUAL).abs() < 1e-12 && (one.error(64) / usual(64.0).sqrt() - 1.0).abs() < 1e-12);
+        assert!((one.exponent - USUAL).abs() < 1e-9 && (one.error(64) / usual(64.0).sqrt() - 1.0).abs() < 1e-9);
+        assert!((one.fall() - 0.5f64.powf(0.7)).abs() < 1e-9);
         let steep = |n: f64| 0.01 / n;
         let many: Vec<u64> = (3..12).map(|power| 1 << power).collect();
         let many = Accuracy::of(&history(&many, steep, 0.0)).expect("nine moments");
@@ -103,6 +152,28 @@ mod tests {
         let told = Accuracy::of(&history(&[8, 16], |n| 0.01 / n, 0.04)).expect("two moments");
         assert!((told.error(1 << 40) - 0.2).abs() < 1e-3 && told.iterations_to(0.19).is_none());
         assert_eq!(Accuracy::of(&[]), None);
-        assert_eq!(Accuracy::of(&history(&[8, 16], |_| -1e-9, 0.0)), None);
+    }
+
+    /// An error that judges' noise hides is told as that noise, a moment that is unsure counts little, and few bright
+    /// samples raise the upper end alone.
+    #[test]
+    fn doubt_is_told() {
+        let mut moments = history(&[8, 16, 32, 64], |n| 0.01 * n.powf(-2.0 * USUAL), 0.0);
+        let sure = Accuracy::of(&moments).expect("four moments");
+        let [low, high] = sure.interval(64);
+        let model = (1.645f64 * MODEL).exp();
+        assert!(
+            (high / sure.error(64) / model - 1.0).abs() < 1e-6
+                && (low * high / sure.error(64).powi(2) - 1.0).abs() < 1e-6
+        );
+        moments[2].finished = Some(Verdict { noise: -1.0, deviation: 0.5, bias: 0.0, rare: 0.0 });
+        let unsure = Accuracy::of(&moments).expect("four moments");
+        // A weight of 1/26 for a squared error that is 350 times too large.
+        assert!((unsure.error(64) / sure.error(64)).ln().abs() < 0.15, "{}", unsure.error(64) / sure.error(64));
+        moments[3].finished = Some(Verdict { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96 });
+        let rare = Accuracy::of(&moments[3..]).expect("one moment");
+        assert!((rare.error(32) - 1e-3).abs() < 1e-9, "{}", rare.error(32));
+        let [low, high] = rare.interval(32);
+        assert!((high / 1e-3 / (1e-3 / low) - 5.0).abs() < 1e-6, "{low} {high}");
     }
 }

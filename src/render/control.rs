@@ -2,6 +2,7 @@
 
 use super::error_estimate::ErrorEstimate;
 use super::told::Told;
+use crate::finish::Verdict;
 use serde::{Deserialize, Serialize};
 
 /// What an observer wants after an iteration.
@@ -68,7 +69,6 @@ pub struct History {
     pub light_paths: u64,
     /// Estimated squared relative error, when two iterations are done.
     pub estimate: Option<ErrorEstimate>,
-    /// Squared relative error (trimmed) of the picture finished from half of these iterations, where it was judged; noise
-    /// around a small one may make it negative.
-    pub finished: Option<f64>,
+    /// The error of the picture finished from half of these iterations, where it was judged.
+    pub finished: Option<Verdict>,
 }

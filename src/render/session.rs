@@ -14,6 +14,7 @@ use crate::error::Result;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
 use crate::estimator::{BandwidthState, Pixel};
 use crate::film::{self, LayerSet};
+use crate::finish::Verdict;
 use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::scene::Scene;
@@ -188,12 +189,12 @@ impl<'a> Session<'a> {
     }
 
     /// Keeps what was told of the picture finished from half of the iterations so far ([`History::finished`]).
-    pub fn judged(&mut self, squared: Option<f64>) {
+    pub fn judged(&mut self, verdict: Option<Verdict>) {
         if !self.records() {
             self.push(self.estimate());
         }
         if let Some(moment) = self.history.last_mut() {
-            moment.finished = squared;
+            moment.finished = verdict;
         }
     }
 

@@ -31,7 +31,7 @@ use caustique::scene::{Scene, Survey};
 use preview::Preview;
 use serde_json::json;
 use std::path::Path;
-pub use summary::{Summary, tell_finish, tell_picture};
+pub use summary::{Summary, place, tell_finish, tell_picture};
 
 /// Renders a scene, or frames of it.
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -189,20 +189,20 @@ impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
         let Telling { args, summary, preview, made_for, .. } = self;
-        let Delivery { set, attributes, techniques, finished, reached, finishing, refusal, tail } = delivery;
+        let Delivery { set, attributes, techniques, tail, .. } = &delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
-        let written = files::write(args, &set, &attributes, tail.as_ref());
-        let described = files::write_usd_layer(args, &set);
-        let pictured = args.picture.write_png(&set, &made_for);
-        let debugged = techniques::write(args, (set.width, set.height), &techniques, &made_for);
+        let written = files::write(args, set, attributes, tail.as_ref());
+        let described = files::write_usd_layer(args, set);
+        let pictured = args.picture.write_png(set, &made_for);
+        let debugged = techniques::write(args, (set.width, set.height), techniques, &made_for);
         if let Some(mut preview) = preview {
-            preview.show(beauty(&set), attributes.frame);
+            preview.show(beauty(set), attributes.frame);
         }
         if talk {
             summary.tell();
-            if let Some((name, _)) = finished {
-                tell_finish(&name, reached.as_ref(), finishing, summary.told_of_finished());
+            if let Some((name, _)) = &delivery.finished {
+                tell_finish(name, &delivery, summary.told_of_finished());
             }
         }
         summary.tell_full();
@@ -212,9 +212,9 @@ impl Telling<'_> {
         pictured?;
         debugged?;
         if talk {
-            Summary::tell_files(args, &set, techniques.len());
+            Summary::tell_files(args, set, techniques.len());
         }
-        if let Some(error) = refusal {
+        if let Some(error) = delivery.refusal {
             let output = args.output.display();
             return Err(error.hint(format!(
                 "the unfinished render is in {output}: 'caustique combine {output} -o OUT.exr' finishes it"

@@ -6,7 +6,7 @@ use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
-use caustique::pipeline::Reached;
+use caustique::pipeline::{Delivery, Place, Reached};
 use caustique::render::{Rendered, StopReason, Told, peak_memory};
 use std::path::Path;
 
@@ -19,8 +19,8 @@ pub struct Summary {
     error: Option<f64>,
     /// What the error before the finish tells of.
     told: Told,
-    /// Photons are merged or gathered within bandwidths.
-    has_bandwidths: bool,
+    /// Photons are merged or gathered within bandwidths, of one level.
+    has_one_bandwidth: bool,
     rejected: u64,
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
@@ -40,7 +40,7 @@ impl Summary {
             ),
             error: rendered.relative_error(),
             told: rendered.settings.told(),
-            has_bandwidths: rendered.settings.method.has_bandwidths(),
+            has_one_bandwidth: rendered.settings.method.has_bandwidths() && rendered.settings.levels.count < 2,
             rejected: rendered.rejected(),
             stop: rendered.stop,
             full: rendered.map_is_full().then(|| {
@@ -64,10 +64,10 @@ impl Summary {
         say(&format!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30)));
     }
 
-    /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, whatever the
-    /// levels tell of it.
+    /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, which levels
+    /// tell.
     pub fn told_of_finished(&self) -> Told {
-        if self.has_bandwidths { Told::Noise } else { self.told }
+        if self.has_one_bandwidth { Told::Noise } else { self.told }
     }
 
     /// The files that are written.
@@ -129,13 +129,39 @@ pub fn tell_picture(output: &Path, set: &LayerSet) {
     say(&format!("{name}: {} x {}, {channels} channels", set.width, set.height));
 }
 
-/// What has finished a picture, and in how many seconds; the error of that, which knows of `told`, and what half of it
-/// takes.
-pub fn tell_finish(name: &str, reached: Option<&Reached>, seconds: f64, told: Told) {
+/// A few bright samples rule the noise where they hold more of it than all others.
+const RARE: f64 = 0.5;
+
+/// What has finished a picture, and in how many seconds; the error of that, which knows of `told`, what half of it
+/// takes, and where it is.
+pub fn tell_finish(name: &str, delivery: &Delivery, told: Told) {
+    let reached = delivery.reached.as_ref();
     let error = reached.map(|reached| {
-        let error = format!("; error {}{}", percent(reached.error()), told.note());
+        let [low, high] = reached.interval().map(percent);
+        let error = format!("; error {} ({low} to {high}){}", percent(reached.error()), told.note());
         let half = reached.seconds_to_half().map(|seconds| format!(", half of it in about {} more", duration(seconds)));
         error + &half.unwrap_or_default()
     });
-    say(&format!("finished with {name} in {}{}", duration(seconds), error.unwrap_or_default()));
+    say(&format!("finished with {name} in {}{}", duration(delivery.finishing), error.unwrap_or_default()));
+    if let Some(rare) = reached.map(Reached::rare).filter(|rare| *rare > RARE) {
+        let share = percent(rare);
+        say(&format!(
+            "warning: few bright samples hold {share} of the noise: light that is rarely found may be missing, and the error larger than told; another --method may find it"
+        ));
+    }
+    if let Some(worst) = delivery.worst.as_ref().filter(|worst| !worst.by.is_empty()) {
+        let places: Vec<String> = worst.by.iter().take(3).map(place).collect();
+        say(&format!("where the error is: {}", places.join("; ")));
+    }
+}
+
+/// `caustics at 'Lamp' (Glass): 61 %`.
+pub fn place(place: &Place) -> String {
+    let Place { share, object, material, light } = place;
+    let share = percent(*share);
+    match (object.is_empty(), material.is_empty()) {
+        (true, _) => format!("{light}: {share}"),
+        (_, true) => format!("{light} at '{object}': {share}"),
+        _ => format!("{light} at '{object}' ({material}): {share}"),
+    }
 }

@@ -15,6 +15,7 @@ mod weights;
 
 pub use super::clock::{Clock, Spent, cpu_seconds};
 pub use contest::Trial;
+pub use trial::settings as small;
 pub use weights::Weight;
 
 use super::cost::Cost;

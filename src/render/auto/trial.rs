@@ -16,7 +16,7 @@ pub(super) const WORST: f64 = 0.01;
 
 /// Settings of a small render: those of the large one with a share of its light paths, in bandwidths as much wider as
 /// the same number of neighbours asks for.
-pub(super) fn settings(of: &Settings, photons: f64) -> Settings {
+pub fn settings(of: &Settings, photons: f64) -> Settings {
     widened(of, photons, 1.0 / photons as f32)
 }
 

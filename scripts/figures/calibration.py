@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""The error that a render tells of its finished picture, beside the truth: by scene, budget and seed. Draws
+docs/calibration.svg from what is stored, where there is .venv-python (scripts/python.sh).
+
+  SET, SCENES, WIDTH, THREADS, REFERENCE_SECONDS   as in finished.py
+  BUDGETS   seconds [2,4,8,16]
+  SEEDS     [3]
+  METHODS   [auto]
+
+A picture counts as told right where the error is within a factor of 1.5 of the truth; the interval should hold the truth
+in nine of ten. Where more than half of the noise lies in half a per cent of the pixels the render itself warns: such
+pictures are counted apart.
+"""
+
+import math
+import subprocess
+import sys
+
+import _accuracy
+import _references
+from _accuracy import BUDGETS, METHODS, SEEDS, geometric
+from _cache import THREADS, WIDTH, Failed, program
+from record import ROOT, record
+
+FACTOR, RARE = 1.5, 0.5
+
+
+def rows():
+    """What is told and true of every picture."""
+    for scene in _references.scenes():
+        try:
+            halves, _ = _references.reference(scene)
+        except Failed as failed:
+            print(f"{_references.name(scene)}: no reference: {failed}", file=sys.stderr)
+            continue
+        truth = _accuracy.Truth(halves)
+        for method in METHODS:
+            for budget in BUDGETS:
+                for seed in range(1, SEEDS + 1):
+                    folder = _accuracy.rendered(scene, method, ["--time", budget], seed)
+                    row = {"scene": _references.name(scene), "asked": method, "budget": budget, "seed": seed}
+                    yield row | _accuracy.judged(folder, truth)
+
+
+def summary(rows):
+    """Of pictures that are told of: how many are told right, and what the intervals hold."""
+    told = [row for row in rows if row["told"] and row["true"] > 0]
+    ratios = [row["told"] / row["true"] for row in told]
+    if not told:
+        return {"pictures": len(rows), "told": 0}
+    inside = sum(row["interval"][0] <= row["true"] <= row["interval"][1] for row in told)
+    noisy = [row for row in told if row["told_noisy"] and row["true_noisy"] > 0]
+    return {
+        "pictures": len(rows),
+        "told": len(told),
+        "within": sum(1 / FACTOR <= ratio <= FACTOR for ratio in ratios),
+        "geometric_mean": round(geometric(ratios), 3),
+        "least": round(min(ratios), 3),
+        "most": round(max(ratios), 3),
+        "inside": inside,
+        "noisy": round(geometric([row["told_noisy"] / row["true_noisy"] for row in noisy]), 3) if noisy else None,
+        "pixels_within_2": round(sum(row["pixels_within_2"] for row in told) / len(told), 3),
+    }
+
+
+def line(label, found):
+    """A row of the table."""
+    if not found.get("told"):
+        return f"{label:<28}{found['pictures']:>9}{0:>6}"
+    text = f"{label:<28}{found['pictures']:>9}{found['told']:>6}{found['within']:>8}{found['geometric_mean']:>8.2f}"
+    text += f"{found['least']:>7.2f}{found['most']:>7.2f}{found['inside']:>8}{found['pixels_within_2']:>9.1%}"
+    return text + (f"{found['noisy']:>8.2f}" if found["noisy"] else "")
+
+
+def short(value):
+    """A figure for the record, to four digits."""
+    return None if value is None or math.isnan(value) else float(f"{value:.4g}")
+
+
+def main():
+    found = []
+    for row in rows():
+        found.append(row)
+        told = f"{row['told']:.4f}" if row["told"] else "nothing"
+        print(
+            f"{row['scene']:<20}{row['asked']:<6}{row['budget']:>5g} s seed {row['seed']}: told {told:>8}, "
+            f"true {row['true']:.4f}, rare {row['rare'] or 0:.2f}, {row['iterations']} iterations",
+            flush=True,
+        )
+    usual = [row for row in found if (row["rare"] or 0) <= RARE]
+    parts = {f"{budget:g} s": [row for row in usual if row["budget"] == budget] for budget in BUDGETS}
+    parts |= {name: [row for row in usual if row["scene"] == name] for name in dict.fromkeys(r["scene"] for r in usual)}
+    parts |= {"all": usual, "warned of": [row for row in found if (row["rare"] or 0) > RARE]}
+    columns = {"pictures": 9, "told": 6, "in 1.5": 8, "mean": 8, "least": 7, "most": 7, "inside": 8, "pixels": 9, "noisy": 8}
+    print("\n" + " " * 28 + "".join(f"{name:>{width}}" for name, width in columns.items()))
+    summaries = {label: summary(part) for label, part in parts.items() if part}
+    for label, one in summaries.items():
+        print(line(label, one))
+    values = {"program": program(), "width": WIDTH, "threads": THREADS, "seeds": SEEDS, "budgets": BUDGETS}
+    values |= {"methods": METHODS, "parts": summaries}
+    values["rows"] = [[r["scene"], r["budget"], r["seed"], *map(short, (r["told"], r["true"], r["rare"]))] for r in found]
+    record("calibration", values)
+    python = ROOT / ".venv-python" / "bin" / "python"
+    if python.exists():
+        subprocess.run([python, ROOT / "scripts" / "figures" / "_calibration_plot.py"], check=True)
+    else:
+        print("docs/calibration.svg is as it was: scripts/python.sh makes .venv-python, which draws it", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""What `--target-error` stops at: the truth over the error asked for, and the time over the shortest that would have
+done; and what the progress line and `caustique plan` have said of that time before.
+
+  SET, SCENES, WIDTH, THREADS, REFERENCE_SECONDS, METHODS, BUDGETS, SEEDS   as in calibration.py
+
+The error asked for is the true one of calibration.py's pictures at the next to last of the budgets, their geometric mean.
+The shortest time follows from the true errors of all its budgets, by interpolation in the logarithms. Clocks count: the
+machine must be quiet. Stores the figures `target` and `prediction`.
+"""
+
+import math
+import statistics
+import sys
+
+import _accuracy
+import _references
+from _accuracy import BUDGETS, METHODS, SEEDS, geometric
+from _cache import THREADS, WIDTH, Failed, program
+from _iteration import read
+from record import record
+
+# A prediction counts from this share of the time on, and should be so close to what comes true.
+FROM, WITHIN = 0.1, 0.3
+FACTOR, LONGER = 1.5, 1.3
+
+
+def crossing(points, error):
+    """Seconds at which errors, falling as powers between points, are as small as one; from the nearest two outside."""
+    points = sorted(points)
+    pairs = list(zip(points, points[1:]))
+    chosen = next((pair for pair in pairs if pair[0][1] >= error >= pair[1][1]), None)
+    chosen = chosen or (pairs[0] if error > points[0][1] else pairs[-1])
+    (t0, e0), (t1, e1) = chosen
+    power = math.log(e1 / e0) / math.log(t1 / t0)
+    return t0 * (error / e0) ** (1 / power) if power < -0.02 else math.nan
+
+
+def predictions(folder, error, end):
+    """What was said of the end while the render went on: the time then over the time it took, and the end told over the
+    end."""
+    said = [(line["seconds"], line["expected"]) for line in _accuracy.progress(folder) if line.get("expected")]
+    return [(now / end, (now + told["seconds"]) / end) for now, told in said if abs(told["error"] - error) < 1e-9]
+
+
+def measure(scene, method, truth):
+    """A row for a scene."""
+    points = []
+    for budget in BUDGETS:
+        judged = [
+            _accuracy.judged(_accuracy.rendered(scene, method, ["--time", budget], seed), truth)
+            for seed in range(1, SEEDS + 1)
+        ]
+        seconds = statistics.mean(one["seconds"] for one in judged)
+        points.append((seconds, geometric([max(one["true"], 1e-6) for one in judged])))
+    error = float(f"{points[-2][1]:.3g}")
+    rows = []
+    for seed in range(1, SEEDS + 1):
+        # As long again as ought to do ten times over.
+        stop = ["--target-error", error, "--time", 10 * BUDGETS[-1]]
+        folder = _accuracy.rendered(scene, method, stop, 100 + seed)
+        rows.append(_accuracy.judged(folder, truth) | {"said": predictions(folder, error, _accuracy.progress(folder)[-1]["seconds"])})
+    shortest = crossing(points, error)
+    taken = statistics.mean(row["seconds"] for row in rows)
+    late = [told for row in rows for share, told in row["said"] if share >= FROM]
+    options = ["--target-error", str(error), "--method", method, "--width", str(WIDTH), "--threads", str(THREADS)]
+    outlook = read("plan", str(scene), *options).get("outlook")
+    return {
+        "scene": _references.name(scene),
+        "method": method,
+        "error": error,
+        "true": geometric([max(row["true"], 1e-6) for row in rows]) / error,
+        "seconds": taken,
+        "longer": taken / shortest,
+        "predicted": statistics.median(late) if late else None,
+        "right": sum(abs(told - 1) <= WITHIN for told in late) / len(late) if late else None,
+        "planned": outlook["seconds"] / taken if outlook else None,
+    }
+
+
+def main():
+    rows = []
+    print(f"{'':<22}{'error':>8}{'true over it':>14}{'seconds':>9}{'over shortest':>15}{'predicted':>11}{'in 30 %':>9}{'plan':>7}")
+    for scene in _references.scenes():
+        try:
+            halves, _ = _references.reference(scene)
+        except Failed as failed:
+            print(f"{_references.name(scene)}: no reference: {failed}", file=sys.stderr)
+            continue
+        truth = _accuracy.Truth(halves)
+        for method in METHODS:
+            row = measure(scene, method, truth)
+            rows.append(row)
+            text = f"{row['scene']:<22}{row['error']:>8.2%}{row['true']:>14.2f}{row['seconds']:>9.1f}{row['longer']:>15.2f}"
+            text += f"{row['predicted']:>11.2f}{row['right']:>9.0%}" if row["predicted"] else f"{'-':>11}{'-':>9}"
+            print(text + (f"{row['planned']:>7.2f}" if row["planned"] else f"{'-':>7}"), flush=True)
+    known = [row for row in rows if row["predicted"]]
+    short = [{key: round(v, 4) if isinstance(v, float) and math.isfinite(v) else None if isinstance(v, float) else v for key, v in row.items()} for row in rows]
+    said = {"program": program(), "width": WIDTH, "threads": THREADS, "seeds": SEEDS, "budgets": BUDGETS}
+    counts = {
+        "scenes": len(rows),
+        "true": sum(1 / FACTOR <= row["true"] <= FACTOR for row in rows),
+        "longer": sum(row["longer"] <= LONGER for row in rows),
+    }
+    foretold = {
+        "scenes": len(rows),
+        "told": len(known),
+        "predicted": sum(abs(row["predicted"] - 1) <= WITHIN for row in known),
+        "planned": sum(abs(math.log(row["planned"])) <= math.log(2) for row in rows if row["planned"]),
+    }
+    print(f"\ntrue within {FACTOR} of it: {counts['true']} of {counts['scenes']}; no more than {LONGER} of the shortest: {counts['longer']}")
+    print(f"predicted within 30 %: {foretold['predicted']} of {foretold['scenes']}; planned within a factor of 2: {foretold['planned']}")
+    record("target", said | counts | {"rows": [{k: row[k] for k in ("scene", "error", "true", "seconds", "longer")} for row in short]})
+    record("prediction", said | foretold | {"rows": [{k: row[k] for k in ("scene", "predicted", "right", "planned")} for row in short]})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+//! Where a picture's error is: the worst tiles, and the objects and kinds of light that hold most of it.
+//!
+//! A pixel's squared error is shared among the kinds of light by their noise, which their layers show as what differs
+//! from pixel to pixel where reflectance is divided out; edges of objects count as noise, so shares are about right and no
+//! more. An object is who covers most of a pixel.
+
+use super::layers::Named;
+use crate::estimator::Pixel;
+use crate::film::{Layer, LayerSet};
+use crate::finish::{Size, Windows};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Tiles along the longer side of a picture.
+const TILES: usize = 20;
+/// Tiles that are told.
+const TOLD: usize = 10;
+/// Objects and lights that are told hold at least this share.
+const LEAST: f64 = 0.05;
+/// Pixels to each side of the windows in which noise is measured.
+const REACH: usize = 7;
+/// Added to reflectance before it is divided out.
+const DARK: f32 = 0.01;
+/// Layers, and what they are to people.
+const LIGHTS: [(&str, &str); 4] = [
+    ("Direct", "direct light"),
+    ("Indirect", "indirect light"),
+    ("Caustic", "caustics"),
+    ("Volume", "light from media"),
+];
+
+/// What every pixel shows.
+#[derive(Default)]
+pub(super) struct Seen {
+    /// Object and material that cover most of it.
+    of_pixels: Vec<Option<[u32; 2]>>,
+    objects: Vec<String>,
+    materials: Vec<String>,
+}
+
+impl Seen {
+    pub fn of(pixels: &[Pixel], named: &Named) -> Seen {
+        let most = |pixel: &Pixel| {
+            let (instance, fraction) = pixel.coverage.fractions().next()?;
+            named.instances.get(instance as usize).copied().filter(|_| fraction >= 0.5)
+        };
+        Seen {
+            of_pixels: pixels.par_iter().map(most).collect(),
+            objects: named.objects.clone(),
+            materials: named.materials.clone(),
+        }
+    }
+
+    /// Object and material by name.
+    fn names(&self, of: [u32; 2]) -> Option<[&str; 2]> {
+        Some([self.objects.get(of[0] as usize)?, self.materials.get(of[1] as usize)?])
+    }
+}
+
+/// Something that holds a share of the squared error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// Its share, 0 to 1.
+    pub share: f64,
+    /// The object seen there; empty where it is none.
+    pub object: String,
+    /// Its material.
+    pub material: String,
+    /// The kind of light.
+    pub light: String,
+}
+
+/// A tile.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tile {
+    /// Left edge in pixels.
+    pub x: usize,
+    /// Upper edge.
+    pub y: usize,
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Its share of the squared error, and who holds most of that.
+    #[serde(flatten)]
+    pub place: Place,
+}
+
+/// Where the error is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Worst {
+    /// Objects and lights, the worst first.
+    pub by: Vec<Place>,
+    /// Tiles, the worst first.
+    pub tiles: Vec<Tile>,
+}
+
+/// Squared errors of objects, with their materials, and lights.
+#[derive(Clone, Default)]
+struct Holders(BTreeMap<(Option<[u32; 2]>, usize), f64>);
+
+impl Holders {
+    fn add(&mut self, object: Option<[u32; 2]>, squared: f64, shares: [f32; LIGHTS.len()]) {
+        for (light, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
+            *self.0.entry((object, light)).or_default() += squared * f64::from(share);
+        }
+    }
+
+    /// The worst first.
+    fn sorted(&self) -> Vec<((Option<[u32; 2]>, usize), f64)> {
+        let mut sorted: Vec<_> = self.0.iter().map(|(key, squared)| (*key, *squared)).collect();
+        sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+        sorted
+    }
+}
+
+impl Worst {
+    /// By squared errors, what makes them relative, the layers of the kinds of light, and what is seen.
+    pub(super) fn of(squared: &[[f32; 3]], weight: &[f32], set: &LayerSet, seen: &Seen) -> Worst {
+        let size = Size { width: set.width, height: set.height };
+        let relative: Vec<f64> =
+            squared.iter().zip(weight).map(|(rgb, weight)| f64::from(rgb.iter().sum::<f32>() / 3.0 * weight)).collect();
+        let shares = shares(set, size);
+        let object = |i: usize| seen.of_pixels.get(i).copied().flatten();
+        let side = size.width.max(size.height).div_ceil(TILES).max(1);
+        let across = size.width.div_ceil(side);
+        let mut tiles = vec![(0.0, Holders::default()); across * size.height.div_ceil(side)];
+        let mut whole = Holders::default();
+        for (i, &squared) in relative.iter().enumerate() {
+            let (sum, holders) = &mut tiles[i / size.width / side * across + i % size.width / side];
+            *sum += squared;
+            holders.add(object(i), squared, shares[i]);
+            whole.add(object(i), squared, shares[i]);
+        }
+        let total = relative.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let place = |(of, light): (Option<[u32; 2]>, usize), squared: f64| {
+            let [object, material] = of.and_then(|of| seen.names(of)).unwrap_or_default().map(String::from);
+            Place { share: squared / total, object, material, light: LIGHTS[light].1.into() }
+        };
+        let by = whole.sorted().into_iter().map(|(key, squared)| place(key, squared));
+        let mut order: Vec<usize> = (0..tiles.len()).filter(|tile| tiles[*tile].0 > 0.0).collect();
+        order.sort_by(|&a, &b| tiles[b].0.total_cmp(&tiles[a].0));
+        let tile = |index: usize| {
+            let (x, y) = (index % across * side, index / across * side);
+            let (sum, holders) = &tiles[index];
+            let (key, _) = *holders.sorted().first()?;
+            let (width, height) = (side.min(size.width - x), side.min(size.height - y));
+            Some(Tile { x, y, width, height, place: place(key, *sum) })
+        };
+        Worst {
+            by: by.filter(|place| place.share >= LEAST).collect(),
+            tiles: order.into_iter().filter_map(tile).take(TOLD).collect(),
+        }
+    }
+}
+
+/// The share of each kind of light in a pixel's noise.
+fn shares(set: &LayerSet, size: Size) -> Vec<[f32; LIGHTS.len()]> {
+    let albedo = set.get("albedo").map(Layer::triples);
+    let albedo = |i: usize, c: usize| albedo.as_ref().map_or(1.0, |albedo| albedo[i][c].max(0.0) + DARK);
+    let all = vec![true; size.pixels()];
+    let noise = |(layer, _): (&str, &str)| -> Option<Vec<[f32; 1]>> {
+        let light = set.get(layer)?.triples();
+        let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
+        let plain = |i: usize| std::array::from_fn(|c| finite(light[i][c]) / albedo(i, c));
+        let plain: Vec<[f32; 3]> = (0..size.pixels()).into_par_iter().map(plain).collect();
+        let smooth = Windows::new(size, 1, &all).means(&plain);
+        let grain = |i: usize| [(0..3).map(|c| ((plain[i][c] - smooth[i][c]) * albedo(i, c)).powi(2)).sum::<f32>()];
+        let grain: Vec<[f32; 1]> = (0..size.pixels()).into_par_iter().map(grain).collect();
+        Some(Windows::new(size, REACH, &all).means(&grain))
+    };
+    let noises = LIGHTS.map(noise);
+    let of_pixel = |i: usize| {
+        let noise = noises.each_ref().map(|noise| noise.as_ref().map_or(0.0, |noise| noise[i][0].max(0.0)));
+        let sum: f32 = noise.iter().sum();
+        if sum > 0.0 { noise.map(|noise| noise / sum) } else { [0.0; LIGHTS.len()] }
+    };
+    (0..size.pixels()).map(of_pixel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lamp of glass on the left with rough caustics, a floor on the right with a little rough direct light.
+    #[test]
+    fn objects_and_lights_are_named_by_what_they_hold() {
+        let (width, height) = (80, 40);
+        let left = |i: usize| i % width < width / 2;
+        let rough = |i: usize, of: f32| of * if (i * 7919) % 13 < 6 { 1.0 } else { 0.5 };
+        let light = |of: &dyn Fn(usize) -> f32| (0..width * height).map(|i| [of(i); 3]).collect::<Vec<_>>();
+        let mut set = LayerSet::new(width, height);
+        for (name, values) in [
+            ("Caustic", light(&|i| if left(i) { rough(i, 2.0) } else { 0.0 })),
+            ("Direct", light(&|i| if left(i) { 1.0 } else { rough(i, 1.0) })),
+            ("albedo", light(&|_| 0.5)),
+        ] {
+            set.push(Layer::interleaved(name, "RGB", values)).expect("sizes agree");
+        }
+        let seen = Seen {
+            of_pixels: (0..width * height).map(|i| Some(if left(i) { [0, 1] } else { [1, 0] })).collect(),
+            objects: vec!["Lamp".into(), "Floor".into()],
+            materials: vec!["Wood".into(), "Glass".into()],
+        };
+        let squared = light(&|i| if left(i) { 4.0 } else { 1.0 });
+        let worst = Worst::of(&squared, &vec![1.0; width * height], &set, &seen);
+        let first = &worst.by[0];
+        assert_eq!([&*first.object, &*first.material, &*first.light], ["Lamp", "Glass", "caustics"]);
+        assert!((first.share - 0.8).abs() < 0.03, "{}", first.share);
+        let second = &worst.by[1];
+        assert_eq!([&*second.object, &*second.light], ["Floor", "direct light"]);
+        assert_eq!(worst.tiles.len(), TOLD);
+        let tile = &worst.tiles[0];
+        assert!((tile.width, tile.height) == (4, 4) && tile.x < 40 && tile.place.object == "Lamp");
+        assert!((tile.place.share - 4.0 * 16.0 / (2.5 * 3200.0)).abs() < 1e-6, "{}", tile.place.share);
+    }
+
+    #[test]
+    fn a_picture_without_light_has_no_worst() {
+        let set = LayerSet::new(3, 2);
+        let worst = Worst::of(&[[0.0; 3]; 6], &[1.0; 6], &set, &Seen::default());
+        assert_eq!(worst, Worst { by: vec![], tiles: vec![] });
+    }
+}
