@@ -65,9 +65,11 @@ class Settings:
             targets = prim.GetRelationship("camera").GetForwardedTargets() if prim else ()
             if targets:
                 found = self._stage.stage.GetPrimAtPath(targets[0])
-                if not (found and found.IsA(UsdGeom.Camera)):
-                    raise Fault(prim.GetPath(), f"its camera {targets[0]} is not there", "name a Camera of the stage")
-                return targets[0]
+                if found and found.IsA(UsdGeom.Camera):
+                    return targets[0]
+                # Viewers leave settings behind with cameras of their own session.
+                self._stage.losses.name(prim.GetPath(), f"its camera {targets[0]} is not there: the first of the stage is "
+                                        "taken")
         return None
 
     def purposes(self):
@@ -119,10 +121,10 @@ class Settings:
         return [left, 1 - high, right - left, high - low]
 
     def arguments(self):
-        """Options of `caustique render` that the settings stand for: an output for each product ("" without a name), then
-        those of its RenderVars and of `caustique:*`."""
-        names = (self._stage.get(UsdRender.Product(p).GetProductNameAttr(), "") for p in self.products)
-        out = [f"--output={name}" for name in names]
+        """Options of `caustique render` that the settings stand for: an output for each product where any has a name
+        ("" for one without), then those of its RenderVars and of `caustique:*`."""
+        names = [self._stage.get(UsdRender.Product(p).GetProductNameAttr(), "") for p in self.products]
+        out = [f"--output={name}" for name in names] if any(names) else []
         layers = self._layers()
         if layers:
             out.append("--layers=" + ",".join(layers))
