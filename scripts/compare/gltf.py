@@ -6,6 +6,7 @@ Meshes come out in world space, transforms composed in double precision. What th
 import base64
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +22,11 @@ EFFICACY = 683.0
 
 class Unsupported(Exception):
     """The scene holds something that the comparison cannot say in both renderers' terms."""
+
+
+def refuse(what):
+    """What becomes of an approximation where pictures have to be the same."""
+    raise Unsupported(what)
 
 
 @dataclass
@@ -71,6 +77,9 @@ class Scene:
     lights: list = field(default_factory=list)
     cameras: list = field(default_factory=list)
     environment: dict | None = None
+    medium: dict | None = None
+    #: Called with what is approximated or left out.
+    lose: Callable[[str], None] = refuse
 
     def image(self, texture):
         """The encoded bytes of a texture's image, and its sampler."""
@@ -92,24 +101,26 @@ def extension(part, name):
     return part.get("extensions", {}).get(name)
 
 
-def read(path):
-    """The scene at `path` (.glb or .gltf)."""
+def read(path, lose=refuse):
+    """The scene at `path` (.glb or .gltf). `lose` is called with what is approximated or left out."""
     path = Path(path)
     data = path.read_bytes()
     if data[:4] == b"glTF":
         document, binary = chunks(data)
     else:
         document, binary = json.loads(data), None
-    unknown = set(document.get("extensionsUsed", [])) - EXTENSIONS
-    if unknown:
-        raise Unsupported(f"{path}: extensions {', '.join(sorted(unknown))}")
+    unknown = sorted(set(document.get("extensionsUsed", [])) - EXTENSIONS)
+    if not all(name.startswith("KHR_materials_") for name in unknown):
+        raise Unsupported(f"{path}: extensions {', '.join(unknown)}")
+    for name in unknown:
+        lose(f"{name} is left out")
     buffers = [_uri(b["uri"], path.parent) if "uri" in b else binary for b in document.get("buffers", [])]
-    scene = Scene(document, path.parent, buffers)
+    scene = Scene(document, path.parent, buffers, lose=lose)
+    if document.get("animations"):
+        lose("animations are left out: everything stands where its node does")
     root = document["scenes"][document.get("scene", 0)]
     said = extras(root)
-    if said.get("medium"):
-        raise Unsupported("a medium that fills the space")
-    scene.environment = said.get("environment")
+    scene.medium, scene.environment = said.get("medium"), said.get("environment")
     scene_units = said.get("light_units")
     if scene_units is None:
         blender = document["asset"].get("generator", "").startswith("Khronos glTF Blender I/O")
@@ -199,7 +210,9 @@ def _mesh(scene, node, primitive, to_world):
         raise Unsupported(f"{name}: only triangles without morph targets")
     attributes = primitive["attributes"]
     if "COLOR_0" in attributes:
-        raise Unsupported(f"{name}: vertex colours")
+        scene.lose(f"{name}: vertex colours are left out")
+    if extras(node).get("visible"):
+        scene.lose(f"{name}: it is visible to everything")
     positions = accessor(scene, attributes["POSITION"]).astype(float)
     count = len(positions)
     if "indices" in primitive:
@@ -222,6 +235,8 @@ def _camera(scene, node, to_world):
     if raw["type"] != "perspective":
         raise Unsupported("orthographic cameras")
     said = {**extras(raw), **extras(node)}
+    if any(said.get("shift", [])):
+        scene.lose(f"camera {node.get('name')}: its shift is left out")
     perspective = raw["perspective"]
     return Camera(node.get("name", ""), to_world, perspective["yfov"], perspective.get("aspectRatio", 16 / 9),
                   said.get("aperture_radius", 0.0), said.get("focus_distance", 1.0))

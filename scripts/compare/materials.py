@@ -21,7 +21,7 @@ import mitsuba as mi
 import numpy as np
 
 import lobes
-from gltf import Unsupported, extension, extras, is_closed
+from gltf import extension, extras, is_closed
 
 #: GGX alpha below which the renderer takes a surface for perfectly smooth.
 SMOOTH = 1e-3
@@ -48,7 +48,7 @@ class Materials:
         if not factor.any():
             return None
         if raw.get("doubleSided"):
-            raise Unsupported(f"material {raw.get('name')}: emission from both sides")
+            self.scene.lose(f"material {raw.get('name')}: it shines from its front alone")
         return self.color(raw, raw.get("emissiveTexture"), factor)
 
     def is_solid(self, mesh):
@@ -64,20 +64,14 @@ class Materials:
     def medium(self, index):
         """The medium inside, or None."""
         raw = self.raw(index)
+        if extras(raw).get("priority") is not None:
+            self.scene.lose(f"material {raw.get('name')}: its priority over other glass is left out")
         said = extras(raw).get("medium")
-        if said is not None:
-            if any(said.get("sigma_s", [0])):
-                raise Unsupported(f"material {raw.get('name')}: a scattering medium")
-            sigma = np.array(said.get("sigma_a", [0, 0, 0]), float)
-        else:
+        if said is None:
             volume = extension(raw, "KHR_materials_volume") or {}
             color = np.array(volume.get("attenuationColor", [1, 1, 1]), float)
-            distance = volume.get("attenuationDistance", np.inf)
-            sigma = -np.log(np.maximum(color, 1e-6)) / distance
-        if not sigma.any():
-            return None
-        most = float(sigma.max())
-        return {"type": "homogeneous", "albedo": 0.0, "sigma_t": {"type": "rgb", "value": (sigma / most).tolist()}, "scale": most}
+            said = {"sigma_a": -np.log(np.maximum(color, 1e-6)) / volume.get("attenuationDistance", np.inf)}
+        return medium(said)
 
     def bsdf(self, mesh):
         """The BSDF that a mesh wears, made once a material."""
@@ -90,7 +84,7 @@ class Materials:
         raw = self.raw(mesh.material)
         name = raw.get("name", "default")
         if "normalTexture" in raw:
-            raise Unsupported(f"material {name}: normal maps")
+            self.scene.lose(f"material {name}: its normal map is left out")
         pbr = raw.get("pbrMetallicRoughness", {})
         factor = pbr.get("baseColorFactor", [1, 1, 1, 1])
         base = self.color(raw, pbr.get("baseColorTexture"), factor[:3])
@@ -101,25 +95,23 @@ class Materials:
             metallic = self.channel(surface, 2, metallic)
         transmission = extension(raw, "KHR_materials_transmission") or {}
         if "transmissionTexture" in transmission:
-            raise Unsupported(f"material {name}: transmission textures")
+            self.scene.lose(f"material {name}: its texture of transmission is left out")
         share = transmission.get("transmissionFactor", 0.0)
         ior = (extension(raw, "KHR_materials_ior") or {}).get("ior", 1.5)
         specular = extension(raw, "KHR_materials_specular") or {}
         if set(specular) - {"specularFactor", "specularColorFactor"}:
-            raise Unsupported(f"material {name}: specular textures")
+            self.scene.lose(f"material {name}: its textures of specular strength are left out")
         strength = specular.get("specularFactor", 1.0)
         if strength and list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]:
-            raise Unsupported(f"material {name}: specular colours")
+            self.scene.lose(f"material {name}: what it reflects is white")
         if raw.get("alphaMode", "OPAQUE") != "OPAQUE":
-            raise Unsupported(f"material {name}: alpha")
+            self.scene.lose(f"material {name}: it is there where its alpha says that it is not")
         metal = {"type": "twosided", "nested": self._metal(base, roughness)}
         if metallic == 1.0:
             return metal
         parts = []
         if share > 0.0:
-            if not self.is_solid(mesh):
-                raise Unsupported(f"material {name}: thin walls (Mitsuba's also scatter back and forth inside)")
-            parts.append(self._glass(name, base, roughness, ior, strength))
+            parts.append(self._glass(name, base, roughness, ior, strength, self.is_solid(mesh)))
         if share < 1.0:
             matte = {"type": "diffuse", "reflectance": base} if strength == 0.0 else self._matte(name, base, roughness, ior, strength)
             parts.append({"type": "twosided", "nested": matte})
@@ -127,10 +119,12 @@ class Materials:
         return dielectric if metallic == 0.0 else _blend(dielectric, metal, metallic)
 
     def _matte(self, name, base, roughness, ior, strength):
-        alpha = _plain(roughness, name) ** 2
-        common = {"int_ior": float(ior), "ext_ior": 1.0, "nonlinear": False}
+        alpha = self._plain(roughness, name) ** 2
         if strength != 1.0 and (alpha < SMOOTH or not self.correct):
-            raise Unsupported(f"material {name}: a specular strength between 0 and 1 that is smooth, or without --correct")
+            self.scene.lose(f"material {name}: its specular strength is an index of refraction with that reflectance")
+            root = abs(ior - 1) / (ior + 1) * np.sqrt(strength)
+            ior, strength = (1 + root) / (1 - root), 1.0
+        common = {"int_ior": float(ior), "ext_ior": 1.0, "nonlinear": False}
         if alpha < SMOOTH:
             return {"type": "plastic", "diffuse_reflectance": base, **common}
         rough = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, **common}
@@ -148,11 +142,15 @@ class Materials:
             return nested
         return {"type": "corrected", "kind": "metal", "nested": nested, "alpha": roughness**2, "base": base}
 
-    def _glass(self, name, base, roughness, ior, strength):
+    def _glass(self, name, base, roughness, ior, strength, solid):
         if strength != 1.0:
-            raise Unsupported(f"material {name}: glass without reflection")
-        alpha = _plain(roughness, name) ** 2
+            self.scene.lose(f"material {name}: it reflects as glass does")
+        alpha = self._plain(roughness, name) ** 2
         common = {"specular_transmittance": base, "int_ior": float(ior), "ext_ior": 1.0}
+        if not solid:
+            rough = ", and are smooth" if alpha >= SMOOTH else ""
+            self.scene.lose(f"material {name}: Mitsuba's thin walls also scatter back and forth inside{rough}")
+            return {"type": "thindielectric", **common}
         if alpha < SMOOTH:
             return {"type": "dielectric", **common}
         nested = {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha, **common}
@@ -175,6 +173,12 @@ class Materials:
             return float(texels.min()) / 255 * factor
         return self._bitmap(info, lambda texels: texels[..., channel:channel + 1] * np.float32(factor))
 
+    def _plain(self, roughness, name):
+        if isinstance(roughness, (int, float)):
+            return float(roughness)
+        self.scene.lose(f"material {name}: its texture of roughness is its mean")
+        return float(np.mean(np.array(roughness["data"])))
+
     def _texels(self, info):
         """The bytes of a texture, RGBA."""
         if info["index"] not in self.textures:
@@ -189,18 +193,18 @@ class Materials:
     def _bitmap(self, info, convert):
         transform = extension(info, "KHR_texture_transform") or {}
         if transform.get("texCoord", info.get("texCoord", 0)) != 0:
-            raise Unsupported("second texture coordinates")
+            self.scene.lose("second texture coordinates: the first place the image")
         sampler = self.scene.image(info["index"])[1]
         wraps = {WRAPS[sampler.get(key, 10497)] for key in ("wrapS", "wrapT")}
         if len(wraps) > 1:
-            raise Unsupported("two wrap modes on one texture")
+            self.scene.lose("two wrap modes on one texture are one")
         texels = self._texels(info).astype(np.float32) / np.float32(255)
         scale, offset = transform.get("scale", [1, 1]), transform.get("offset", [0, 0])
         sine, cosine = np.sin(transform.get("rotation", 0.0)), np.cos(transform.get("rotation", 0.0))
         matrix = [[cosine * scale[0], sine * scale[1], offset[0]], [-sine * scale[0], cosine * scale[1], offset[1]], [0, 0, 1]]
         return {
             "type": "bitmap", "data": mi.TensorXf(np.ascontiguousarray(convert(texels))), "raw": True,
-            "filter_type": "nearest" if sampler.get("magFilter") == 9728 else "bilinear", "wrap_mode": wraps.pop(),
+            "filter_type": "nearest" if sampler.get("magFilter") == 9728 else "bilinear", "wrap_mode": min(wraps),
             "to_uv": mi.ScalarTransform3f(matrix)}
 
 
@@ -209,10 +213,18 @@ def _linear(x):
     return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def _plain(roughness, name):
-    if not isinstance(roughness, (int, float)):
-        raise Unsupported(f"material {name}: roughness textures on dielectrics")
-    return float(roughness)
+def medium(said):
+    """The medium of coefficients (1/m), or None."""
+    absorbs, scatters = (np.array((said or {}).get(key, [0, 0, 0]), float) for key in ("sigma_a", "sigma_s"))
+    sigma = absorbs + scatters
+    if not sigma.any():
+        return None
+    most = float(sigma.max())
+    found = {"type": "homogeneous", "albedo": 0.0, "sigma_t": {"type": "rgb", "value": (sigma / most).tolist()}, "scale": most}
+    if scatters.any():
+        albedo = np.divide(scatters, sigma, out=np.zeros(3), where=sigma > 0)
+        found |= {"albedo": {"type": "rgb", "value": albedo.tolist()}, "phase": {"type": "hg", "g": float(said.get("g", 0.0))}}
+    return found
 
 
 def _blend(first, second, weight):

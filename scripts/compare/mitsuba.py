@@ -2,7 +2,7 @@
 """Renders a glTF scene with caustique and with Mitsuba 3, both from the same file, and says how far they differ.
 
     scripts/compare/mitsuba.py SCENE.glb [--seeds 8] [--spp 256] [--method path] [--png DIFFERENCE.png] [--json]
-    scripts/compare/mitsuba.py export SCENE.glb -o SCENE.xml
+    scripts/compare/mitsuba.py export SCENE.glb -o SCENE.xml [--strict]
     scripts/compare/mitsuba.py import SCENE.xml -o SCENE.glb
 
 The other two commands write a scene as Mitsuba's (to_xml.py), and read one of Mitsuba's (from_xml.py).
@@ -107,17 +107,35 @@ def read(path):
         return np.stack([channels[c].pixels for c in "RGB"], axis=-1).astype(np.float64)
 
 
+class Warnings:
+    """Says on stderr what is approximated or left out, each once."""
+
+    def __init__(self, scene):
+        self.scene, self.said = scene, set()
+
+    def __call__(self, what):
+        if what not in self.said:
+            self.said.add(what)
+            print(f"warning: {self.scene}: {what}", file=sys.stderr)
+
+
 def exchange(command, words):
     """Writes or reads a scene of Mitsuba's."""
     parser = argparse.ArgumentParser(prog=f"mitsuba.py {command}")
     parser.add_argument("scene", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
+    if command == "export":
+        parser.add_argument("--strict", action="store_true", help="make an error of whatever is approximated or left out")
     arguments = parser.parse_args(words)
     mi.set_variant("scalar_rgb")
     import from_xml
     import to_xml
     try:
-        (to_xml.write if command == "export" else from_xml.convert)(arguments.scene, arguments.output)
+        if command == "export":
+            told = gltf.refuse if arguments.strict else Warnings(arguments.scene)
+            to_xml.write(arguments.scene, arguments.output, told)
+        else:
+            from_xml.convert(arguments.scene, arguments.output)
     except (gltf.Unsupported, OSError) as error:
         sys.exit(f"{arguments.scene}: {error}")
 

@@ -11,9 +11,9 @@ from materials import Materials
 
 #: Elements by the plug-ins that `world` and `materials` name.
 TAGS = {
-    "bsdf": "diffuse twosided plastic roughplastic dielectric roughdielectric principled blendbsdf",
+    "bsdf": "diffuse twosided plastic roughplastic dielectric roughdielectric thindielectric principled blendbsdf",
     "shape": "ply sphere disk", "emitter": "area point spot directional constant envmap", "texture": "bitmap",
-    "medium": "homogeneous", "integrator": "path volpathmis", "sensor": "perspective thinlens", "film": "hdrfilm",
+    "medium": "homogeneous", "phase": "hg", "integrator": "path volpathmis", "sensor": "perspective thinlens", "film": "hdrfilm",
     "rfilter": "box", "sampler": "independent",
 }
 TAG = {plugin: tag for tag, plugins in TAGS.items() for plugin in plugins.split()}
@@ -21,9 +21,13 @@ TAG = {plugin: tag for tag, plugins in TAGS.items() for plugin in plugins.split(
 WIDTH = 640
 
 
-def write(path, output):
-    """Writes the scene at `path` with its first camera."""
-    scene = gltf.read(path)
+#: Rough ones: their function is not ours.
+ROUGH = {"roughplastic": "rough matte surfaces", "roughdielectric": "rough glass", "principled": "metals"}
+
+
+def write(path, output, lose=gltf.refuse):
+    """Writes the scene at `path` with its first camera. `lose` is called with what is approximated or left out."""
+    scene = gltf.read(path, lose)
     folder = output.with_suffix(".files")
     folder.mkdir(parents=True, exist_ok=True)
     writer = Writer(folder)
@@ -31,12 +35,27 @@ def write(path, output):
     aspect = scene.cameras[0].aspect if scene.cameras else 1.0
     width, height = root.get("resolution", [WIDTH, round(WIDTH / aspect)])
     described = world.describe(scene, width, height, Materials(scene, False), writer.shape)
+    kinds = set(_types(described))
+    if kinds & {"point", "spot", "directional"} and kinds & {"dielectric", "thindielectric", "principled"}:
+        lose("lamps without a size: Mitsuba's path tracers do not find their light through glass and off mirrors")
+    rough = sorted(ROUGH[kind] for kind in kinds & set(ROUGH))
+    if rough:
+        lose(f"{', '.join(rough)}: Mitsuba's facets mask each other in another way, and light that they scatter more than once "
+             "is lost")
     element = ET.Element("scene", version="3.0.0")
     for name, value in described.items():
         if name != "type":
             writer.add(element, name, value)
     ET.indent(element)
     ET.ElementTree(element).write(output, encoding="utf-8", xml_declaration=True)
+
+
+def _types(described):
+    """The plug-ins of all that is described."""
+    if isinstance(described, dict):
+        yield described["type"]
+        for part in described.values():
+            yield from _types(part)
 
 
 class Writer:
@@ -51,7 +70,7 @@ class Writer:
         path = self.folder / f"{self.files}.{extension}"
         return path, f"{self.folder.name}/{path.name}"
 
-    def shape(self, mesh, materials, medium):
+    def shape(self, mesh, materials, inside):
         """A mesh, its triangles in a file."""
         path, name = self.file("ply")
         shape = world.make_mesh(mesh, materials, None)
@@ -61,7 +80,7 @@ class Writer:
                      "bsdf": materials.describe(mesh)}
         if emission is not None:
             described["emitter"] = {"type": "area", "radiance": emission}
-        return described if medium is None else {**described, "interior": medium}
+        return described if inside is None else {**described, "interior": inside}
 
     def image(self, array):
         """An image of scene-linear floats in a file; its name."""

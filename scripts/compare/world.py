@@ -4,7 +4,7 @@ import mitsuba as mi
 import numpy as np
 
 from gltf import Unsupported
-from materials import BLACK, Materials
+from materials import BLACK, Materials, medium
 
 #: The sun's disc stands this many scene radii away.
 FAR = 1000.0
@@ -16,26 +16,34 @@ def build(scene, width, height, correct=False, glass="auto"):
 
 
 def describe(scene, width, height, materials, make):
-    """What `mi.load_dict` takes, with its first camera and a film of this size. `make(mesh, materials, medium)` makes shapes."""
+    """What `mi.load_dict` takes, with its first camera and a film of this size. `make(mesh, materials, inside)` makes shapes;
+    `inside` is a medium or None."""
     if not scene.cameras:
         raise Unsupported("a file without a camera")
     world = {"type": "scene"}
-    has_media = False
+    space = medium(scene.medium)
+    has_media = space is not None
     for i, mesh in enumerate(scene.meshes):
-        medium = materials.medium(mesh.material) if _transmits(materials, mesh) else None
-        has_media |= medium is not None
-        world[f"mesh{i}"] = make(mesh, materials, medium)
+        inside = None
+        if _transmits(materials, mesh):
+            if space is not None:
+                raise Unsupported(f"{mesh.name}: glass in a medium that fills the space")
+            inside = materials.medium(mesh.material)
+        has_media |= inside is not None
+        world[f"mesh{i}"] = make(mesh, materials, inside)
     low = np.min([m.positions.min(axis=0) for m in scene.meshes], axis=0)
     high = np.max([m.positions.max(axis=0) for m in scene.meshes], axis=0)
     center, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
     for i, light in enumerate(scene.lights):
         if light.intensity.any():
-            world[f"light{i}"] = _light(light, center, radius, scene.environment)
+            world[f"light{i}"] = _light(light, center, radius, scene)
     if scene.environment:
         world["environment"] = _environment(scene)
     # Absorption apart, both compute the same; the path integrator is faster.
     world["integrator"] = {"type": "volpathmis" if has_media else "path", "max_depth": -1, "rr_depth": 5}
     world["sensor"] = _camera(scene.cameras[0], width, height)
+    if space is not None:
+        world["sensor"]["medium"] = space
     return world
 
 
@@ -44,14 +52,14 @@ def _transmits(materials, mesh):
     return extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0) > 0.0
 
 
-def make_mesh(mesh, materials, medium):
+def make_mesh(mesh, materials, inside):
     properties = mi.Properties()
     emission = materials.emission(mesh.material)
     properties["bsdf"] = materials.bsdf(mesh)
     if emission is not None:
         properties["emitter"] = mi.load_dict({"type": "area", "radiance": emission})
-    if medium is not None:
-        properties["interior"] = mi.load_dict(medium)
+    if inside is not None:
+        properties["interior"] = mi.load_dict(inside)
     smooth, textured = mesh.normals is not None and emission is None, mesh.uvs is not None
     # Light leaves the front, which the winding decides: a shape that emits keeps no normals of its own.
     properties["face_normals"] = not smooth
@@ -68,7 +76,8 @@ def make_mesh(mesh, materials, medium):
     return shape
 
 
-def _light(light, center, radius, environment):
+def _light(light, center, radius, scene):
+    environment = scene.environment
     position, axis = light.to_world[:3, 3], -light.to_world[:3, 2] / np.linalg.norm(light.to_world[:3, 2])
     strength = {"type": "rgb", "value": [float(x) for x in light.intensity]}
     if light.kind == "point" and light.radius > 0.0:
@@ -78,17 +87,20 @@ def _light(light, center, radius, environment):
     if light.kind == "point":
         return {"type": "point", "position": position.tolist(), "intensity": strength}
     if light.kind == "spot":
-        # glTF's edge is the square of a ramp in the cosine, Mitsuba's a ramp in the angle.
+        if light.radius > 0.0:
+            scene.lose("spots have no size")
+        inner = outer = np.degrees((light.outer + light.inner) / 2)
         if light.outer - light.inner > 0.01:
-            raise Unsupported("spots with a soft edge")
-        middle = np.degrees((light.outer + light.inner) / 2)
-        return {"type": "spot", "intensity": strength, "cutoff_angle": middle, "beam_width": middle,
+            scene.lose("spots with a soft edge: glTF's is the square of a ramp in the cosine, Mitsuba's a ramp in the angle")
+            inner, outer = np.degrees(light.inner), np.degrees(light.outer)
+        return {"type": "spot", "intensity": strength, "cutoff_angle": outer, "beam_width": inner,
                 "to_world": _look(position, axis)}
-    if light.angle == 0.0:
+    before_image = light.angle > 0.0 and environment and "color" not in environment
+    if before_image:
+        scene.lose("a sun of some size before an image has no size")
+    if light.angle == 0.0 or before_image:
         return {"type": "directional", "direction": axis.tolist(), "irradiance": strength}
     # A disc so far away that it is seen alike from everywhere. It hides the environment, so it shines as that does, too.
-    if environment and "color" not in environment:
-        raise Unsupported("a sun of some size before an image")
     half = light.angle / 2
     radiance = light.intensity / (np.pi * np.sin(half) ** 2) + np.array(environment["color"] if environment else [0, 0, 0])
     radiance = [float(x) for x in radiance]

@@ -38,7 +38,7 @@ def kills(figures):
     for of in figures.one("kills")["rows"]:
         numbers = [str(of[key]) for key in ("kills", "resumed", "halves", "same")]
         rows.append([f"`{of['method']}`", *numbers])
-    return table(["method", "kills", "went on from a state", "with a half-written file beside", "same bytes"], rows)
+    return table(["method", "kills", "went on from a state", "with a draft (`.part`) beside", "same bytes"], rows)
 
 
 def checkpoints(figures):

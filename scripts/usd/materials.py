@@ -13,6 +13,13 @@ from faults import Fault
 from textures import Textures
 
 
+# Who reads a surface, by the identifier of its shader.
+_READ = {
+    "UsdPreviewSurface": preview.surface, preview.MATERIALX: preview.surface, materialx.OPEN_PBR: materialx.surface,
+    materialx.STANDARD: materialx.surface,
+}
+
+
 class Worn:
     """A glTF material (`index`), and what its meshes bring: primvars of texture coordinates and of colour."""
 
@@ -80,16 +87,14 @@ class Materials:
         losses, where = self._stage.losses, material.GetPath()
         mtlx = material.ComputeSurfaceSource("mtlx")[0]
         kind = mtlx.GetIdAttr().Get() if mtlx else None
-        if kind in (materialx.OPEN_PBR, materialx.STANDARD):
-            return materialx.surface(mtlx, self._reader, losses)
+        if kind in _READ:
+            return _READ[kind](mtlx, self._reader, losses)
         plain = material.ComputeSurfaceSource()[0]
         if kind and plain and plain.GetPath() != mtlx.GetPath():
             losses.name(where, f"a surface {kind} is not read: its {plain.GetIdAttr().Get()} takes its place")
         id_ = plain.GetIdAttr().Get() if plain else None
-        if id_ in ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader"):
-            return preview.surface(plain, self._reader, losses)
-        if id_ in (materialx.OPEN_PBR, materialx.STANDARD):
-            return materialx.surface(plain, self._reader, losses)
+        if id_ in _READ:
+            return _READ[id_](plain, self._reader, losses)
         found = kind or id_
         what = f"a surface {found} is not read" if found else "it has no surface that is read"
         losses.name(where, f"{what} (UsdPreviewSurface, OpenPBR, Standard Surface are): displayColor takes its place")

@@ -143,7 +143,8 @@ def primvar(prim, name, stage):
 
 
 def authored_normals(prim, faces, stage):
-    """Normals at each corner as the prim gives them; primvars:normals before normals."""
+    """Normals at each corner as the prim gives them, primvars:normals before normals; None without, or where they are
+    not as many as they should be."""
     found = primvar(prim, "normals", stage)
     if found is None:
         mesh = UsdGeom.PointBased(prim)
@@ -151,7 +152,11 @@ def authored_normals(prim, faces, stage):
         if values is None or not len(values):
             return None
         found = numpy.asarray(values, numpy.float64), mesh.GetNormalsInterpolation()
-    return faces.spread(*found, "normals")
+    try:
+        return faces.spread(*found, "normals")
+    except Fault as fault:
+        stage.losses.name(prim.GetPath(), f"{fault.fault}: they are left out, and its faces are flat")
+        return None
 
 
 def colours(prim, name, faces, stage):

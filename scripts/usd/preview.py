@@ -3,9 +3,12 @@
 from network import Texture
 from surface import Surface
 
+# The same surface as a node of MaterialX.
+MATERIALX = "ND_UsdPreviewSurface_surfaceshader"
+
 
 def surface(shader, reader, losses):
-    """The surface of a shader UsdPreviewSurface."""
+    """The surface of a shader UsdPreviewSurface, under either name."""
     where, read = shader.GetPath(), reader.read
     out = Surface(base=read(shader, "diffuseColor", (0.18, 0.18, 0.18)), metallic=read(shader, "metallic", 0.0),
                   roughness=read(shader, "roughness", 0.5), normal=read(shader, "normal"),

@@ -34,7 +34,7 @@ class Settings:
     """The RenderSettings of a stage: the stage's own, or the only one that it has, and its first product."""
 
     def __init__(self, stage):
-        self._stage, self.prim, self.product = stage, None, None
+        self._stage, self.prim, self.product, self.products = stage, None, None, ()
         named = UsdRender.Settings.GetStageRenderSettings(stage.stage)
         found = [named.GetPrim()] if named else [p for p in stage.stage.Traverse() if p.IsA(UsdRender.Settings)]
         if not found:
@@ -44,10 +44,11 @@ class Settings:
             stage.losses.name(self.prim.GetPath(), "the stage has several RenderSettings and names none as its own: "
                               "these are taken")
         products = [stage.stage.GetPrimAtPath(p) for p in UsdRender.Settings(self.prim).GetProductsRel().GetTargets()]
-        products = [p for p in products if p and p.IsA(UsdRender.Product)]
-        self.product = products[0] if products else None
-        for other in products[1:]:
-            stage.losses.name(other.GetPath(), "only the first product is rendered: render once for each")
+        self.products = [p for p in products if p and p.IsA(UsdRender.Product)]
+        self.product = self.products[0] if self.products else None
+        for other in self.products[1:]:
+            stage.losses.name(other.GetPath(), "only the first product is rendered: make RenderSettings with this product "
+                              "alone")
         self._warn()
 
     def get(self, name, default=None):
@@ -64,9 +65,11 @@ class Settings:
             targets = prim.GetRelationship("camera").GetForwardedTargets() if prim else ()
             if targets:
                 found = self._stage.stage.GetPrimAtPath(targets[0])
-                if not (found and found.IsA(UsdGeom.Camera)):
-                    raise Fault(prim.GetPath(), f"its camera {targets[0]} is not there", "name a Camera of the stage")
-                return targets[0]
+                if found and found.IsA(UsdGeom.Camera):
+                    return targets[0]
+                # Viewers leave settings behind with cameras of their own session.
+                self._stage.losses.name(prim.GetPath(), f"its camera {targets[0]} is not there: the first of the stage is "
+                                        "taken")
         return None
 
     def purposes(self):
@@ -118,8 +121,10 @@ class Settings:
         return [left, 1 - high, right - left, high - low]
 
     def arguments(self):
-        """Options of `caustique render` that the settings stand for, those of its RenderVars first."""
-        out = []
+        """Options of `caustique render` that the settings stand for: an output for each product where any has a name
+        ("" for one without), then those of its RenderVars and of `caustique:*`."""
+        names = [self._stage.get(UsdRender.Product(p).GetProductNameAttr(), "") for p in self.products]
+        out = [f"--output={name}" for name in names] if any(names) else []
         layers = self._layers()
         if layers:
             out.append("--layers=" + ",".join(layers))
@@ -163,6 +168,9 @@ class Settings:
             lose(where, f"renderingColorSpace {space} is not carried: colours are linear Rec. 709")
         if self.product and self.get("productType", "raster") != "raster":
             lose(self.product.GetPath(), "a product that is no raster is rendered as one")
+        if self.product and UsdRender.Product(self.product).GetProductNameAttr().ValueMightBeTimeVarying():
+            lose(self.product.GetPath(), "its productName changes with time: the first is taken: write #### where the "
+                 "frame's number belongs, or give -o")
 
 
 def _number(value):

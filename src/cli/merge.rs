@@ -1,13 +1,12 @@
 //! `caustique merge`: the shards of one render to its picture, or renders of other seeds to their mean.
 
-use super::combine::take_plain_names;
 use super::finish::{Denoise, tell_missing};
 use super::output::{self, Naming, PictureArgs};
 use super::progress::Form;
 use super::render::{Summary, tell_finish, tell_picture};
 use super::say;
 use caustique::error::Result;
-use caustique::film::{LayerSet, Selection};
+use caustique::film::{LayerSet, Selection, take_plain_names};
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::merge::{self, Shards, Step, is_shard};
 use caustique::pipeline::seeds::Seeds;

@@ -2,10 +2,13 @@
 
 use super::scene::SceneArgs;
 use super::{Cli, Command, usage};
-use caustique::error::Result;
+use caustique::error::{Error, Kind, Result};
 use caustique::scene::usd;
 use clap::FromArgMatches;
 use std::ffi::OsString;
+
+/// How the word begins that names the output of a product; without more it names none.
+const OUTPUT: &str = "--output=";
 
 /// The command with the options of the stage that it reads, each before those of the command line: of an option that is
 /// given twice the last one holds. `plan` takes those that it knows.
@@ -22,11 +25,16 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
     if !usd::is_stage(&path.path) || !path.path.is_file() {
         return Ok(command);
     }
-    let knows = |word: &String| {
+    let named = |word: &String| word.starts_with(OUTPUT);
+    let (products, mut said): (Vec<String>, Vec<String>) =
+        usd::arguments(&path.path, path.allow_outside)?.into_iter().partition(named);
+    said.retain(|word| {
         let name = word.trim_start_matches("--").split('=').next();
         known.is_none_or(|known| known.get_arguments().any(|argument| argument.get_long() == name))
-    };
-    let said: Vec<String> = usd::arguments(&path.path, path.allow_outside)?.into_iter().filter(knows).collect();
+    });
+    if matches!(&command, Command::Render(args) if !args.has_output()) {
+        said.extend(output(&path, products)?);
+    }
     if said.is_empty() {
         return Ok(command);
     }
@@ -42,6 +50,20 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
             None => Ok(command),
         },
     }
+}
+
+/// The output that the stage's product names, if there is one: a product, and a name.
+///
+/// # Errors
+/// Several products: one picture would be written.
+fn output(scene: &SceneArgs, mut products: Vec<String>) -> Result<Option<String>> {
+    if products.len() < 2 {
+        return Ok(products.pop().filter(|word| word != OUTPUT));
+    }
+    let names: Vec<&str> = products.iter().map(|word| word.trim_start_matches(OUTPUT)).collect();
+    let cause = format!("RenderSettings has several products, and a render writes one: {}", names.join(", "));
+    let hint = "-o OUT.exr renders the first; for each of the others make RenderSettings with that product alone";
+    Err(Error::new(Kind::Usage, scene.path.display(), cause).hint(hint))
 }
 
 /// The scene, or its first frame's file where its name is a pattern.

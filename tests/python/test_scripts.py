@@ -90,6 +90,23 @@ class Record(support.Scratch):
             record.record("rays", {"mrays": 3.5}, file)
         self.assertFalse(file.exists())
 
+    def test_a_script_that_no_commit_has_makes_the_tree_dirty(self):
+        def git(*args):
+            subprocess.run(["git", "-C", self.dir, *args], check=True, capture_output=True)
+
+        git("init")
+        for folder in ("scripts/figures", "docs"):
+            (self.dir / folder).mkdir(parents=True)
+        (self.dir / "scripts" / "figures" / "old.py").touch()
+        git("add", ".")
+        git("-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "-m", "A script.")
+        results = self.dir / "scripts" / "figures" / "results.jsonl"
+        with mock.patch.object(record, "ROOT", self.dir), mock.patch.object(record, "RESULTS", results):
+            (self.dir / "docs" / "note.md").touch()
+            self.assertRegex(record.commit(), "^[0-9a-f]{40}$")
+            (self.dir / "scripts" / "figures" / "new.py").touch()
+            self.assertRegex(record.commit(), "^[0-9a-f]{40}-dirty$")
+
     def test_a_value_without_a_name_is_refused(self):
         done = self.record("rays", "3.5")
         self.assertEqual(done.returncode, 2)

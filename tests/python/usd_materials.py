@@ -113,6 +113,21 @@ class Materials(usd_support.Stages):
         self.assertEqual(document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 0.25)
         self.assertEqual(lost, ["/Material: a surface ND_surface is not read: its UsdPreviewSurface takes its place"])
 
+    def test_the_preview_as_a_node_of_materialx(self):
+        self.worn("ND_UsdPreviewSurface_surfaceshader", "mtlx", diffuseColor=(0.1, 0.2, 0.3))
+        material = UsdShade.Material.Get(self.stage, "/Material")
+        shader = UsdShade.Shader.Get(self.stage, "/Material/Shader")
+        # As exporters write it: inputs that the material may set, and of which it sets some.
+        roughness = material.CreateInput("roughness", Sdf.ValueTypeNames.Float)
+        roughness.Set(0.25)
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).ConnectToSource(roughness)
+        metallic = material.CreateInput("metallic", Sdf.ValueTypeNames.Float)
+        shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).ConnectToSource(metallic)
+        document, _, lost = self.convert()
+        core = document["materials"][0]["pbrMetallicRoughness"]
+        numpy.testing.assert_allclose(core["baseColorFactor"], [0.1, 0.2, 0.3, 1], rtol=1e-6)
+        self.assertEqual((core["roughnessFactor"], core["metallicFactor"], lost), (0.25, 0, []))
+
     def test_keys_of_caustique(self):
         material = self.material(opacity=0.0)
         prim = material.GetPrim()

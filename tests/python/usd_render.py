@@ -84,6 +84,69 @@ def RenderVar "Var" {
         self.run_on("render", "-o", self.out, "--progress", "none", "--layers", "beauty", "--width", 4, "--height", 4)
         self.assertIn("4 x 4 pixels", support.run(["info", self.out], check=0).stdout)
 
+    def products(self, *products):
+        """Saves the stage with RenderSettings of products, (prim's name, productName or None) each."""
+        settings = UsdRender.Settings.Define(self.stage, "/Settings")
+        for name, file in products:
+            product = UsdRender.Product.Define(self.stage, f"/{name}")
+            if file is not None:
+                product.CreateProductNameAttr(str(file))
+            settings.GetProductsRel().AddTarget(f"/{name}")
+        self.save()
+
+    def in_the_folder(self, *options, check=0):
+        """Renders with the test's folder as the current one, and without -o."""
+        return support.run(["render", self.path, *QUICK, *options], check=check, cwd=self.dir)
+
+    def test_a_product_names_the_output_and_the_command_line_another(self):
+        self.products(("Product", "renders/of the stage.exr"))
+        (self.dir / "renders").mkdir()
+        self.in_the_folder()
+        named = self.dir / "renders" / "of the stage.exr"
+        picture = usd_support.read_exr(named)
+        named.unlink()
+        self.in_the_folder("-o", self.out)
+        self.assertFalse(named.exists())
+        numpy.testing.assert_array_equal(picture, usd_support.read_exr(self.out))
+        self.assertIn("emission", self.run_on("plan").stdout)
+
+    def test_a_product_names_an_output_for_each_frame(self):
+        self.products(("Product", self.dir / "shot.####.exr"))
+        self.in_the_folder("--frames", "7-8")
+        self.assertEqual(sorted(path.name for path in self.dir.glob("*.exr")), ["shot.0007.exr", "shot.0008.exr"])
+        done = self.in_the_folder(check=2)
+        self.assertIn("shot.####.exr: its name has a place for a frame's number", done.stderr)
+
+    def test_a_product_that_cannot_be_written(self):
+        for file, code, said in (
+            ("no/such.exr", 1, "no/such.exr: its folder does not exist"),
+            ("picture.png", 2, "picture.png: the name does not end in .exr"),
+            ("", 2, "the following required arguments were not provided: --output <OUT.exr>"),
+            (None, 2, "the following required arguments were not provided: --output <OUT.exr>"),
+        ):
+            with self.subTest(file):
+                self.stage.RemovePrim("/Product")
+                self.products(("Product", file))
+                self.assertIn(said, self.in_the_folder(check=code).stderr)
+        self.assertEqual(list(self.dir.glob("**/*.exr")), [])
+
+    def test_several_products_need_a_name_for_the_one_that_is_rendered(self):
+        self.products(("A", "a.exr"), ("B", "b.exr"))
+        done = self.in_the_folder(check=2)
+        self.assertIn("stage.usda: RenderSettings has several products, and a render writes one: a.exr, b.exr", done.stderr)
+        self.assertEqual(list(self.dir.glob("*.exr")), [])
+        done = self.in_the_folder("-o", self.out)
+        self.assertIn("stage.usda: /B: only the first product is rendered", done.stderr)
+
+    def test_a_product_whose_name_changes_with_time(self):
+        self.products(("Product", None))
+        name = UsdRender.Product.Get(self.stage, "/Product").CreateProductNameAttr()
+        name.Set(str(self.dir / "one.exr"), 1)
+        name.Set(str(self.dir / "two.exr"), 2)
+        self.save()
+        self.assertIn("/Product: its productName changes with time", self.in_the_folder().stderr)
+        self.assertTrue((self.dir / "one.exr").exists())
+
     def test_an_option_that_does_not_exist(self):
         self.save('def RenderSettings "Settings" {\n custom int caustique:iterationz = 1\n}\n')
         done = self.run_on("render", "-o", self.out, check=1)

@@ -17,7 +17,7 @@ import os
 from collections.abc import Sequence
 
 from . import _native
-from ._native import Error, Image, Progress, SceneWarning, __version__, combine, compare, read
+from ._native import Error, Image, Progress, SceneWarning, __version__, combine, compare, merge, read
 from .glb import pack
 from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight
 
@@ -39,6 +39,7 @@ __all__ = [
     "combine",
     "compare",
     "libraries",
+    "merge",
     "pack",
     "read",
 ]

@@ -18,6 +18,7 @@ __all__ = [
     "combine",
     "compare",
     "find_libraries",
+    "merge",
     "read",
 ]
 
@@ -25,6 +26,7 @@ __version__: str
 
 _Method = Literal["auto", "path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm"]
 _Denoise = Literal["auto", "oidn", "own", "none"]
+_Filter = Literal["box", "gaussian", "blackman-harris"]
 _Picture = Image | str | os.PathLike[str] | NDArray[Any]
 
 class Error(Exception):
@@ -109,6 +111,7 @@ class Scene:
         height: int | None = None,
         camera: str | None = None,
         crop: Sequence[float] | None = None,
+        filter: _Filter | tuple[_Filter, float] | None = None,
         seed: int = 0,
         max_depth: int | None = None,
         photons: int | None = None,
@@ -117,11 +120,20 @@ class Scene:
         initial_bandwidth: float | Literal["knn", "footprint"] | None = None,
         knn: int | None = None,
         guide: bool | None = None,
+        cppm_grid: tuple[int, int] | None = None,
+        cppm_k: float | None = None,
+        cppm_beta: float | None = None,
+        cppm_significance: float | None = None,
+        cppm_plus: bool = False,
         finish: bool | None = None,
         denoise: _Denoise | None = None,
         model: str | None = None,
         layers: str = "all",
         reproducible: bool = False,
+        shard: tuple[int, int] | None = None,
+        checkpoint: str | os.PathLike[str] | None = None,
+        checkpoint_every: float = 300.0,
+        resume: str | os.PathLike[str] | None = None,
         threads: int = 0,
         progress: Callable[[Progress], object] | None = None,
     ) -> Image: ...
@@ -136,6 +148,7 @@ class Scene:
         height: int | None = None,
         camera: str | None = None,
         crop: Sequence[float] | None = None,
+        filter: _Filter | tuple[_Filter, float] | None = None,
         seed: int = 0,
         max_depth: int | None = None,
         photons: int | None = None,
@@ -144,6 +157,11 @@ class Scene:
         initial_bandwidth: float | Literal["knn", "footprint"] | None = None,
         knn: int | None = None,
         guide: bool | None = None,
+        cppm_grid: tuple[int, int] | None = None,
+        cppm_k: float | None = None,
+        cppm_beta: float | None = None,
+        cppm_significance: float | None = None,
+        cppm_plus: bool = False,
         finish: bool | None = None,
         denoise: _Denoise | None = None,
         model: str | None = None,
@@ -177,4 +195,14 @@ def compare(
     image: _Picture, reference: _Picture, *, layer: str | None = None, relative: bool = False
 ) -> dict[str, Any]: ...
 def combine(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
+def merge(
+    paths: Sequence[str | os.PathLike[str]],
+    *,
+    partial: bool = False,
+    finish: bool | None = None,
+    denoise: _Denoise | None = None,
+    model: str | None = None,
+    layers: str | None = None,
+    threads: int = 0,
+) -> Image: ...
 def find_libraries() -> dict[str, dict[str, Any]]: ...

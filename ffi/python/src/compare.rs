@@ -5,6 +5,7 @@ use crate::image::{Image, picture};
 use crate::job::finish_order;
 use crate::value::to_python;
 use crate::work::work;
+use caustique::film::take_plain_names;
 use caustique::image::exr::ATTRIBUTE;
 use caustique::image::{Floor, compare_above};
 use caustique::pipeline::finish::open;
@@ -40,7 +41,8 @@ pub fn compare<'py>(
 /// A new image whose picture is finished as a render finishes its own; all other layers are kept.
 ///
 /// It needs what tells the noise: the layers of a render, or of another renderer's picture "Variance" (of the mean) or
-/// two independent halves "Half1" and "Half2". "albedo" and "normal" guide the denoiser.
+/// two independent halves "Half1" and "Half2". "albedo" and "normal" guide the denoiser. Layers that have Blender's names
+/// (ViewLayer.Combined) come back by ours, in our axes.
 #[pyfunction]
 #[pyo3(signature = (image, *, denoise = "auto", model = None, threads = 0))]
 pub fn combine(
@@ -57,11 +59,13 @@ pub fn combine(
         let missing = ready.missing.take();
         caller.warn(&missing.map(|error| super::job::missing(&error)).into_iter().collect::<Vec<_>>());
         let (mut set, mut attributes) = (image.set.clone(), image.attributes.clone());
+        let left = |name: String| format!("layer \"{name}\" cannot be written under this name and is left out");
+        caller.warn(&take_plain_names(&mut set).into_iter().map(left).collect::<Vec<_>>());
         let account = ready.finish().apply(&mut set, |_| true)?;
         let mut header = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
         header["combined"] = ready.facts(&account);
         attributes.insert(ATTRIBUTE, &header)?;
-        Ok(Image { set, attributes })
+        Ok(Image { set, attributes, tail: None })
     })?;
     done.whole()
 }

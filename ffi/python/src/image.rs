@@ -8,6 +8,8 @@ use caustique::film::{Layer, LayerSet, Plane, Sample};
 use caustique::image::exr::{self, Attributes, Compression};
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
+use caustique::pipeline::Delivery;
+use caustique::pipeline::shard::Tail;
 use numpy::ndarray::{Array3, ArrayView2, Axis};
 use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
 use pyo3::exceptions::PyKeyError;
@@ -30,6 +32,16 @@ pub struct Image {
     pub set: LayerSet,
     /// The header's attributes.
     pub attributes: Attributes,
+    /// What other shards are joined with, of the image of one.
+    pub tail: Option<Tail>,
+}
+
+impl Image {
+    /// What a render delivers, and why it is not finished, where that failed.
+    pub fn of(delivery: Delivery) -> (Image, Option<Error>) {
+        let Delivery { set, attributes, tail, refusal, .. } = delivery;
+        (Image { set, attributes, tail }, refusal)
+    }
 }
 
 /// Components of a layer by their number.
@@ -59,7 +71,7 @@ impl Image {
             Some(header) => Attributes::of(&to_json(header)?).map_err(raised)?,
             None => Attributes::default(),
         };
-        Ok(Image { set, attributes })
+        Ok(Image { set, attributes, tail: None })
     }
 
     /// Height and width in pixels.
@@ -148,7 +160,7 @@ impl Image {
         format!("<caustique.Image: {} x {} pixels, {} layers>", self.set.width, self.set.height, self.set.layers.len())
     }
 
-    /// Writes an EXR with all layers, or with a name that ends in .png the picture to look at.
+    /// Writes an EXR with all layers (of a shard with what `merge` needs), or with a name that ends in .png the picture to look at.
     ///
     /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
     /// exposure      of the PNG, stops
@@ -169,7 +181,9 @@ impl Image {
         let written = py.detach(|| match () {
             () if is("exr") => {
                 let options = exr::Options { compression, ..exr::Options::default() };
-                exr::write(&path, set, &self.attributes, options)
+                exr::write_followed(&path, set, &self.attributes, options, |file| {
+                    self.tail.as_ref().map_or(Ok(()), |tail| tail.write(file))
+                })
             }
             () if is("png") => png::write_tonemapped(&path, set.width, set.height, &set.beauty()?, exposure, curve),
             () => Err(Error::new(Kind::Usage, path.display(), "the name ends neither in .exr nor in .png")
@@ -183,7 +197,7 @@ impl Image {
 #[pyfunction]
 pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Image> {
     let (set, attributes) = py.detach(|| exr::read(&path)).map_err(raised)?;
-    Ok(Image { set, attributes })
+    Ok(Image { set, attributes, tail: None })
 }
 
 /// A plane as it lies in memory.

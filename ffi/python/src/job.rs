@@ -2,12 +2,14 @@
 
 use crate::error::usage;
 use crate::keywords::{Keywords, choice};
+use caustique::camera::{Filter, WIDEST};
 use caustique::error::Error;
 use caustique::estimator::InitialBandwidth;
+use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::finish::{Denoiser, DenoiserChoice, Finish};
 use caustique::pipeline::{finish, sized};
 use caustique::plan::Switches;
-use caustique::render::{DEFAULT_ITERATIONS, Levels, Method, RadiusRule, Settings, Strategy};
+use caustique::render::{DEFAULT_ITERATIONS, Levels, Method, RadiusRule, Settings, Shard, Strategy};
 use caustique::scene::{Crop, View};
 use caustique::stat::sum::MOST_TERMS;
 use caustique::transport::MAX_LEVELS;
@@ -34,6 +36,8 @@ const DENOISERS: [(&str, DenoiserChoice); 4] = [
     ("own", DenoiserChoice::Own),
     ("none", DenoiserChoice::None),
 ];
+/// Parts that a render may have.
+const MOST_SHARDS: u64 = 1_000_000;
 /// Lengths that a bandwidth may have (scene units).
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
@@ -48,6 +52,7 @@ pub struct Approach {
     bandwidth: Option<Bandwidth>,
     knn: Option<u32>,
     guide: Option<bool>,
+    chi_squared: Option<ChiSquaredSettings>,
     /// How the estimate becomes the picture, if it does.
     pub finish: Option<(DenoiserChoice, Option<String>)>,
 }
@@ -75,6 +80,8 @@ pub struct Common {
     pub target_error: Option<f64>,
     /// Effects that are switched.
     pub switches: Switches,
+    /// Which iterations are rendered; `None`: all.
+    pub shard: Option<Shard>,
 }
 
 /// A method by name; `None` is auto.
@@ -94,8 +101,8 @@ pub fn missing(error: &Error) -> String {
 }
 
 impl Approach {
-    /// From the keywords `method photons levels alpha initial_bandwidth knn guide finish denoise model`; `usual` is
-    /// what method, levels and finish are where they are left out.
+    /// From the keywords `method photons levels alpha initial_bandwidth knn guide finish denoise model` and those of
+    /// [`chi_squared`]; `usual` is what method, levels and finish are where they are left out.
     ///
     /// # Errors
     /// An argument is of another type or out of range.
@@ -116,6 +123,7 @@ impl Approach {
             bandwidth: bandwidth(keywords)?,
             knn: keywords.number("knn", 1..=1024, "from 1 to 1024")?,
             guide: keywords.take("guide")?,
+            chi_squared: chi_squared(keywords)?,
             finish: asked.then(|| (denoise.unwrap_or_default(), model)),
         })
     }
@@ -140,6 +148,7 @@ impl Approach {
             bandwidth: None,
             knn: None,
             guide: None,
+            chi_squared: None,
             finish: None,
         }
     }
@@ -150,13 +159,21 @@ impl Approach {
         Some(finish::Order { denoiser, model })
     }
 
-    /// What auto's pilots are finished with.
+    /// What auto's pilots are finished with: as the render, but for a network, and of a shard by our own denoiser,
+    /// whose pictures are the same on all machines.
     ///
     /// # Errors
     /// A library that was asked for by name is missing.
-    pub fn pilot_finish(&self) -> caustique::error::Result<Finish> {
-        let choice = self.finish.as_ref().map_or(DenoiserChoice::None, |(denoiser, _)| *denoiser);
+    pub fn pilot_finish(&self, shard: Option<Shard>) -> caustique::error::Result<Finish> {
+        let choice = match self.finish.as_ref().map_or(DenoiserChoice::None, |(denoiser, _)| *denoiser) {
+            DenoiserChoice::Auto | DenoiserChoice::Oidn if shard.is_some() => DenoiserChoice::Own,
+            asked => asked,
+        };
         Ok(Finish::new(Denoiser::open(choice)?.0, None))
+    }
+
+    fn plus(&self) -> bool {
+        self.chi_squared.is_some_and(|rule| rule.plus)
     }
 
     /// The way that is asked for; with auto the one by which options are checked.
@@ -186,8 +203,9 @@ impl Approach {
         let combines = self.finish.as_ref().is_some_and(|(_, model)| model.is_some());
         let levels = if combines { Levels::decorrelated(count) } else { Levels::new(count) };
         let usual = Settings::default();
+        let shard = common.shard.unwrap_or(usual.shard);
         let limited = common.time.is_some() || common.target_error.is_some();
-        Ok(Settings {
+        let settings = Settings {
             method,
             seed: common.seed,
             photons: self.photons.unwrap_or(method.photons()),
@@ -203,8 +221,12 @@ impl Approach {
             guided: way.guided,
             indirect: way.indirect,
             classes: common.switches.classes(),
+            chi_squared: self.chi_squared.unwrap_or(usual.chi_squared),
+            shard,
             ..usual
-        })
+        };
+        check_shard(&settings)?;
+        Ok(settings)
     }
 
     fn initial(&self, method: Method, levels: usize) -> InitialBandwidth {
@@ -232,17 +254,77 @@ impl Approach {
                 self.alpha.is_some() && (!method.has_bandwidths() || matches!(method, Method::Appm | Method::Cppm)),
                 "alpha",
             ),
-            (self.guide == Some(true) && !method.guides(), "guide"),
+            (self.guide == Some(true) && (self.plus() || !method.guides()), "guide"),
         ];
         if let Some((_, option)) = idle.iter().find(|(idle, _)| *idle) {
             let cause = format!("{option} has no effect with method='{name}' and the other arguments");
             return Err(usage(cause, format!("leave {option} out, or choose method='sppm'")));
+        }
+        if self.chi_squared.is_some() && method != Method::Cppm {
+            let cause = format!("the arguments cppm_* have no effect with method='{name}'");
+            return Err(usage(cause, "leave them out, or choose method='cppm'"));
         }
         if method == Method::Pm && self.knn == Some(1) {
             return Err(usage("knn must be 2 or more with method='pm'", "the default is 100"));
         }
         Ok(())
     }
+}
+
+/// Errors: a shard that has nothing to render, or that would need the others.
+fn check_shard(settings: &Settings) -> PyResult<()> {
+    let Settings { shard: Shard { index, count }, iterations, .. } = *settings;
+    if let Some(n) = iterations.filter(|n| index >= *n) {
+        let cause = format!("shard=({index}, {count}) holds none of {n} iterations");
+        return Err(usage(cause, "use fewer shards or more iterations"));
+    }
+    if settings.is_shard() && !settings.is_memoryless() {
+        let name = settings.method.name();
+        let cause = format!("shard cannot divide method='{name}': its bandwidths depend on all iterations before");
+        return Err(usage(cause, "choose method='sppm', or render in one process"));
+    }
+    Ok(())
+}
+
+/// Parameters of the chi-squared rule, from the keywords `cppm_grid cppm_k cppm_beta cppm_significance cppm_plus`;
+/// `None` where all are left out.
+fn chi_squared(keywords: &mut Keywords<'_>) -> PyResult<Option<ChiSquaredSettings>> {
+    let usual = ChiSquaredSettings::default();
+    let grid = keywords.take::<(usize, usize)>("cppm_grid")?;
+    let between = (End::Excluded(0.0), End::Excluded(1.0));
+    let k = keywords.number("cppm_k", between, "between 0 and 1")?;
+    let beta = keywords.number("cppm_beta", 1.0..=1000.0, "from 1 to 1000")?;
+    let significance = keywords.number("cppm_significance", between, "between 0 and 1")?;
+    let plus = keywords.take("cppm_plus")?.unwrap_or(false);
+    if let Some((annuli, sectors)) = grid
+        && !annuli.checked_mul(sectors).is_some_and(|cells| (2..=64).contains(&cells))
+    {
+        return Err(usage(format!("cppm_grid=({annuli}, {sectors}) is out of range"), "there are 2 to 64 cells"));
+    }
+    let (annuli, sectors) = grid.unwrap_or((usual.annuli, usual.sectors));
+    let asked = ChiSquaredSettings {
+        annuli,
+        sectors,
+        k: k.unwrap_or(usual.k),
+        beta: beta.unwrap_or(usual.beta),
+        significance: significance.unwrap_or(usual.significance),
+        plus,
+    };
+    let given = grid.is_some() || k.is_some() || beta.is_some() || significance.is_some() || plus;
+    Ok(given.then_some(asked))
+}
+
+/// The shard (index, count) of the keyword `shard`.
+///
+/// # Errors
+/// There is no such shard.
+pub fn shard(keywords: &mut Keywords<'_>) -> PyResult<Option<Shard>> {
+    let Some((index, count)) = keywords.take::<(u64, u64)>("shard")? else { return Ok(None) };
+    if index >= count || count > MOST_SHARDS {
+        let hint = format!("(index, count), the index below the count, and at most {MOST_SHARDS} shards");
+        return Err(usage(format!("shard=({index}, {count}) does not exist"), hint));
+    }
+    Ok(Some(Shard { index, count }))
 }
 
 fn bandwidth(keywords: &mut Keywords<'_>) -> PyResult<Option<Bandwidth>> {
@@ -270,6 +352,7 @@ impl Common {
             time: seconds(keywords, "time")?,
             target_error: keywords.number("target_error", positive(), "a relative error above 0, such as 0.05")?,
             switches,
+            shard: None,
         })
     }
 }
@@ -289,10 +372,10 @@ pub fn seconds(keywords: &mut Keywords<'_>, name: &'static str) -> PyResult<Opti
     keywords.number(name, positive(), "a number of seconds above 0")
 }
 
-/// The picture asked for, from the keywords `width height camera crop`.
+/// The picture asked for, from the keywords `width height camera crop filter`.
 ///
 /// # Errors
-/// An argument is of another type, or a window that is empty.
+/// An argument is of another type, a window that is empty, or a filter that there is not.
 pub fn view(keywords: &mut Keywords<'_>) -> PyResult<View> {
     let (camera, width, height) = (keywords.take("camera")?, keywords.take("width")?, keywords.take("height")?);
     let crop = match keywords.take::<Bound<'_, PyAny>>("crop")? {
@@ -302,7 +385,26 @@ pub fn view(keywords: &mut Keywords<'_>) -> PyResult<View> {
             Err(_) => shares(&given)?,
         }),
     };
-    Ok(View { camera, width, height, crop, ..View::default() })
+    let filter = keywords.take::<Bound<'_, PyAny>>("filter")?.map(|given| filter(&given)).transpose()?;
+    Ok(View { camera, width, height, crop, filter: filter.unwrap_or_default() })
+}
+
+/// A pixel filter by its name, or by its name and width in pixels.
+fn filter(given: &Bound<'_, PyAny>) -> PyResult<Filter> {
+    let (name, width) = match given.extract::<(String, f32)>() {
+        Ok((name, width)) => (name, Some(width)),
+        Err(_) => (given.extract::<String>()?, None),
+    };
+    if let Some(width) = width.filter(|width| !(0.1..=WIDEST).contains(width)) {
+        return Err(usage(format!("filter: the width {width} is out of range"), format!("0.1 to {WIDEST} pixels")));
+    }
+    let bell = width.unwrap_or(1.5);
+    let all = [
+        ("box", Filter::Box(width.unwrap_or(1.0))),
+        ("gaussian", Filter::Gaussian(bell)),
+        ("blackman-harris", Filter::BlackmanHarris(bell)),
+    ];
+    choice("filter", &name, &all)
 }
 
 fn shares(given: &Bound<'_, PyAny>) -> PyResult<Crop> {

@@ -11,6 +11,7 @@ mod image;
 mod job;
 mod keywords;
 mod libraries;
+mod merge;
 mod progress;
 mod scene;
 mod value;
@@ -29,6 +30,8 @@ mod _native {
     use super::image::{Image, read};
     #[pymodule_export]
     use super::libraries::find_libraries;
+    #[pymodule_export]
+    use super::merge::merge;
     #[pymodule_export]
     use super::progress::Progress;
     #[pymodule_export]

@@ -10,8 +10,9 @@ use crate::value::{to_json, to_python};
 use crate::work::{Caller, warn, work};
 use caustique::error::{Error, Result};
 use caustique::film::Naming;
+use caustique::image::atomic;
 use caustique::pipeline::load::{self, Environment, load, load_bytes};
-use caustique::pipeline::{self, Auto, Loaded, Order, Wait, Watch, check};
+use caustique::pipeline::{self, Auto, Delivery, Loaded, Order, Saving, Wait, Watch, check};
 use caustique::plan::{Plan, Switches};
 use caustique::render::auto::{Choice, choose};
 use caustique::render::{Rendered, Settings};
@@ -23,12 +24,24 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Seconds between two saves unless told otherwise.
+const EVERY: f64 = 300.0;
+
 /// A scene that has been read and built; it can be rendered as often as one likes, from several threads at once.
 #[pyclass(frozen, subclass, module = "caustique")]
 pub struct Scene {
     pub(crate) loaded: Loaded,
     pub(crate) path: PathBuf,
     pub(crate) switches: Switches,
+    said: Said,
+}
+
+/// What tells a scene from others: the options it was read with, as JSON, and the environment's file, if it has one.
+struct Said {
+    options: Value,
+    environment: Option<PathBuf>,
+    /// Files hold all of it, so that another process can read the same scene.
+    of_files: bool,
 }
 
 #[pymethods]
@@ -53,6 +66,7 @@ impl Scene {
                 .parse()
                 .map_err(|cause| usage(format!("Scene: effects='{text}': {cause}"), "such as '-dispersion,+volume'"))?,
         };
+        let said = Said::of(py, bytes.is_none(), options)?;
         let order = load::Order {
             path: path.clone(),
             environment: keywords.take::<Bound<'_, PyAny>>("environment")?.map(environment).transpose()?,
@@ -81,7 +95,7 @@ impl Scene {
             return Err(usage(format!("strict=True, and something is ignored or approximated:\n{list}"), "mend it"));
         }
         warn(py, &loaded.scene.warnings)?;
-        Ok(Scene { loaded, path, switches })
+        Ok(Scene { loaded, path, switches, said })
     }
 
     /// Whatever of the scene is ignored or approximated, a sentence each.
@@ -107,6 +121,8 @@ impl Scene {
     /// width, height             pixels; one given keeps the camera's aspect
     /// camera                    by name; else the first
     /// crop                      a window (left, top, width, height) in pixels, or in shares of the picture
+    /// filter                    pixel filter: 'box', 'gaussian' or 'blackman-harris', or one with its width in pixels,
+    ///                           ('gaussian', 2.0)
     /// seed                      another number, other noise
     /// max_depth                 longest light path in segments
     /// photons                   light paths of an iteration
@@ -115,11 +131,19 @@ impl Scene {
     /// initial_bandwidth         'knn', 'footprint', or a length in metres
     /// knn                       photons within the largest bandwidth to begin with
     /// guide                     True or False: whether light paths start towards mirrors and glass
+    /// cppm_grid                 of cppm: (annuli, sectors) in which photons are counted, (2, 6) if not given
+    /// cppm_k, cppm_beta,        of cppm: factor of a reduction (0.8), growth of the counts for a test (1.2), and
+    /// cppm_significance         probability of taking uniform photons for others (0.05)
+    /// cppm_plus                 of cppm: red, green and blue apart
     /// finish                    False leaves the estimate as it is
     /// denoise                   'auto', 'oidn', 'own' or 'none'
     /// model                     'compact' or a path: the network that combines levels
     /// layers                    'all', 'comp', 'beauty', or names separated by commas
     /// reproducible              leave clocks and threads out of the header
+    /// shard                     (index, count): every count-th iteration alone; `merge` joins what the shards save
+    /// checkpoint                a file that the state is saved to; it stays, so that the render can be extended
+    /// checkpoint_every          seconds between two saves
+    /// resume                    a checkpoint to go on from: the same options, but for when to stop
     /// threads                   0 takes all cores
     /// progress                  called with a Progress after every iteration, in the calling thread; False ends it
     ///
@@ -128,27 +152,39 @@ impl Scene {
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
-            height=None, camera=None, crop=None, seed=0, max_depth=None, photons=None, levels=None, alpha=None, \
-            initial_bandwidth=None, knn=None, guide=None, finish=None, denoise=None, model=None, layers='all', \
-            reproducible=False, threads=0, progress=None)"
+            height=None, camera=None, crop=None, filter=None, seed=0, max_depth=None, photons=None, levels=None, \
+            alpha=None, initial_bandwidth=None, knn=None, guide=None, cppm_grid=None, cppm_k=None, cppm_beta=None, \
+            cppm_significance=None, cppm_plus=False, finish=None, denoise=None, model=None, layers='all', \
+            reproducible=False, shard=None, checkpoint=None, checkpoint_every=300.0, resume=None, threads=0, \
+            progress=None)"
     )]
     fn render(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Image> {
         let mut keywords = Keywords::of(py, "render", options);
         let approach = Approach::take(&mut keywords, &Approach::usual())?;
-        let common = Common::take(&mut keywords, self.switches)?;
+        let shard = job::shard(&mut keywords)?;
+        let common = Common { shard, ..Common::take(&mut keywords, self.switches)? };
         let view = job::view(&mut keywords)?;
+        let saving = saving(&mut keywords)?;
+        let resume: Option<PathBuf> = keywords.take("resume")?;
         let layers = keywords.take("layers")?.unwrap_or_else(|| "all".to_string());
         let reproducible = keywords.take("reproducible")?.unwrap_or(false);
         let threads = keywords.take("threads")?.unwrap_or(0);
         let progress: Option<Py<PyAny>> = keywords.take("progress")?;
         keywords.finish()?;
+        if !self.said.of_files && (shard.is_some() || saving.is_some() || resume.is_some()) {
+            let cause = "render: shard, checkpoint and resume need a scene that another process can read";
+            return Err(usage(
+                cause,
+                "write caustique.pack's bytes and an environment's array to files, and read them",
+            ));
+        }
         let settings = approach.settings(&common, approach.way())?;
         let arguments = self.arguments(py, options)?;
         let progress = progress.map(Arc::new);
         let done = work(py, threads, |caller| {
             let allowed = |way, size| approach.allowed(&common, way, size);
             let auto = match approach.method {
-                None => Some(Auto { allowed: &allowed, finish: approach.pilot_finish()? }),
+                None => Some(Auto { allowed: &allowed, finish: approach.pilot_finish(shard)? }),
                 Some(_) => None,
             };
             let order = Order {
@@ -165,8 +201,8 @@ impl Scene {
                 arguments,
                 reproducible,
                 memory: None,
-                saving: None,
-                resume: None,
+                saving,
+                resume,
             };
             pipeline::render_loaded(order, &self.loaded, &mut Watcher { caller, progress })
         })?;
@@ -174,22 +210,14 @@ impl Scene {
             (Ok(delivery), None) => delivery,
             (Ok(delivery), Some(error)) => {
                 // What is finished goes with the exception that ended it.
-                let image = Image { set: delivery.set, attributes: delivery.attributes };
+                let (image, _) = Image::of(delivery);
                 error.value(py).setattr("image", Bound::new(py, image)?)?;
                 return Err(error);
             }
             (Err(_), Some(error)) => return Err(error),
             (Err(error), None) => return Err(raised(error)),
         };
-        let image = Image { set: delivery.set, attributes: delivery.attributes };
-        match delivery.refusal {
-            None => Ok(image),
-            Some(error) => {
-                let error = raised(error);
-                error.value(py).setattr("image", Bound::new(py, image)?)?;
-                Err(error)
-            }
-        }
+        delivered(py, delivery)
     }
 
     /// What a render would simulate, why, and what it warns of: the object of `caustique plan --json`, a dict. The
@@ -197,8 +225,9 @@ impl Scene {
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
-            height=None, camera=None, crop=None, seed=0, max_depth=None, photons=None, levels=None, alpha=None, \
-            initial_bandwidth=None, knn=None, guide=None, finish=None, denoise=None, model=None, threads=0)"
+            height=None, camera=None, crop=None, filter=None, seed=0, max_depth=None, photons=None, levels=None, \
+            alpha=None, initial_bandwidth=None, knn=None, guide=None, cppm_grid=None, cppm_k=None, cppm_beta=None, \
+            cppm_significance=None, cppm_plus=False, finish=None, denoise=None, model=None, threads=0)"
     )]
     fn plan<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let mut keywords = Keywords::of(py, "plan", options);
@@ -216,7 +245,7 @@ impl Scene {
                 Some(_) => None,
                 None => {
                     let make = |way| approach.allowed(&common, way, camera.size());
-                    choose((scene, &camera), &mut approach.pilot_finish()?, make, || caller.stops())
+                    choose((scene, &camera), &mut approach.pilot_finish(None)?, make, || caller.stops())
                 }
             };
             let Common { max_depth, switches, .. } = common;
@@ -263,11 +292,11 @@ impl Scene {
 }
 
 impl Scene {
-    /// Where it is from, for messages.
+    /// Where it is from: for messages, and for what tells it from other scenes.
     fn order(&self) -> load::Order {
         load::Order {
             path: self.path.clone(),
-            environment: None,
+            environment: self.said.environment.clone().map(Environment::File),
             rotation: None,
             strength: None,
             options: gltf::ReadOptions::default(),
@@ -275,18 +304,63 @@ impl Scene {
         }
     }
 
-    /// What was asked for, for the header.
+    /// What was asked for, for the header, by the names of the command line.
     fn arguments(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Value> {
-        let asked = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
-        for own in ["progress", "threads"] {
-            if asked.contains(own)? {
-                asked.del_item(own)?;
-            }
+        let own = ["progress", "threads", "checkpoint", "checkpoint_every", "resume"];
+        let mut arguments = said(py, options, &own)?;
+        if let (Value::Object(arguments), Value::Object(of_scene)) = (&mut arguments, &self.said.options) {
+            arguments.extend(of_scene.clone());
         }
-        let mut arguments = to_json(&asked)?;
+        if arguments["finish"] == false {
+            arguments["no-combine"] = true.into();
+        }
         arguments["scene"] = self.path.display().to_string().into();
         Ok(arguments)
     }
+}
+
+impl Said {
+    fn of(py: Python<'_>, of_file: bool, options: Option<&Bound<'_, PyDict>>) -> PyResult<Said> {
+        let given = options.map(|options| options.get_item("environment")).transpose()?.flatten();
+        let given = given.filter(|given| !given.is_none());
+        let environment = given.as_ref().and_then(|given| given.extract::<PathBuf>().ok());
+        let array = given.is_some_and(|given| environment.is_none() && given.extract::<[f32; 3]>().is_err());
+        let options =
+            said(py, options, if array { &["threads", "strict", "environment"] } else { &["threads", "strict"] })?;
+        Ok(Said { options, environment, of_files: of_file && !array })
+    }
+}
+
+/// Keyword arguments as JSON by the names of the command line, but for some.
+fn said(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &[&str]) -> PyResult<Value> {
+    let asked = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
+    for own in but {
+        if asked.contains(own)? {
+            asked.del_item(own)?;
+        }
+    }
+    Ok(match to_json(&asked)? {
+        Value::Object(asked) => asked.into_iter().map(|(key, value)| (key.replace('_', "-"), value)).collect(),
+        other => other,
+    })
+}
+
+/// Where and how often a render is saved, from the keywords `checkpoint checkpoint_every`.
+fn saving(keywords: &mut Keywords<'_>) -> PyResult<Option<Saving>> {
+    let path: Option<PathBuf> = keywords.take("checkpoint")?;
+    let every = job::seconds(keywords, "checkpoint_every")?.unwrap_or(EVERY);
+    if let Some(path) = &path {
+        atomic::check_writable(path).map_err(raised)?;
+    }
+    Ok(path.map(|path| Saving { path, every, keep: true }))
+}
+
+/// The image of a render; of one that could not be finished the error, with the image as its attribute.
+pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
+    let (image, refusal) = Image::of(delivery);
+    let Some(error) = refusal.map(raised) else { return Ok(image) };
+    error.value(py).setattr("image", Bound::new(py, image)?)?;
+    Err(error)
 }
 
 /// A path, a colour (r, g, b), or an array (H, W, 3).
@@ -356,6 +430,10 @@ impl Watch for Watcher<'_> {
         let progress = Progress::from(progress);
         self.caller
             .ask(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(pyo3::types::PyBool::new(py, false))));
+    }
+
+    fn unsaved(&mut self, error: &Error) {
+        self.caller.warn(&[format!("the state of the render is not saved: {error}; the render goes on")]);
     }
 
     fn rendered(&mut self, _: &Rendered) {}

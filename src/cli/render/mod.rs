@@ -15,7 +15,7 @@ use super::finish::tell_missing;
 use super::progress::{Reporter, Turn, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
-use caustique::error::{Error, Result};
+use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
 use caustique::image::atomic;
 use caustique::image::exr;
@@ -35,6 +35,10 @@ pub use summary::{Summary, place, tell_finish, tell_picture};
 
 /// Renders a scene, or frames of it.
 pub fn run(args: &RenderArgs) -> Result<()> {
+    if !args.has_output() {
+        let cause = "the following required arguments were not provided: --output <OUT.exr>";
+        return Err(Error::new(Kind::Usage, "command line", cause).hint("'--help' explains every option"));
+    }
     super::pool(args.threads)?.install(|| match args.job.scene.frames {
         Some(frames) => sequence::run(args, frames),
         None => {

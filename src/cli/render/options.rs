@@ -10,6 +10,7 @@ use crate::cli::progress::Form;
 use caustique::error::{Error, Kind, Result};
 use caustique::pipeline::Saving;
 use caustique::render::Settings;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -25,8 +26,9 @@ use std::path::PathBuf;
 #[command(next_line_help = true)]
 pub struct RenderArgs {
     /// EXR to write: the picture and every layer that made it; '-' writes to standard output. With --frames '####' in its
-    /// name stands for the frame's number
+    /// name stands for the frame's number. Needed unless the RenderProduct of a stage of USD has a productName
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
+    #[arg(default_value = "", hide_default_value = true, value_parser = OsStringValueParser::new().map(PathBuf::from))]
     #[serde(skip)]
     pub output: PathBuf,
 
@@ -115,6 +117,11 @@ impl RenderArgs {
             return Err(Error::new(Kind::Usage, "command line", cause).hint("leave --debug-techniques out"));
         }
         Ok(Settings { techniques: self.debug_techniques.is_some(), ..settings })
+    }
+
+    /// Whether there is a name for the EXR: the command line's, or the stage's.
+    pub fn has_output(&self) -> bool {
+        !self.output.as_os_str().is_empty()
     }
 
     /// The same for one frame alone, its number in the names of files.

@@ -2,6 +2,7 @@
 
 import gc
 import inspect
+import os
 import subprocess
 import sys
 import tempfile
@@ -107,6 +108,22 @@ class Errors(unittest.TestCase):
         self.assertEqual(cq.compare(as_image, as_image, layer="Level1")["mse"], 0.0)
         with self.assertRaises(cq.Error):
             cq.compare(image, reference[1:])
+
+    def test_combine_knows_the_names_of_blender(self):
+        """The same render under Blender's names: the same picture, under ours, and normals in our axes."""
+        program = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")
+        pictures = []
+        with tempfile.TemporaryDirectory() as folder:
+            for naming in ("plain", "blender"):
+                file = Path(folder) / "out.exr"
+                words = [program, "render", TORUS, "-o", file, "--method", "path", "--iterations", "8", "--width", "32"]
+                words += ["--no-combine", "--progress", "none", "--exr-naming", naming]
+                subprocess.run(words, check=True, capture_output=True)
+                pictures.append(cq.combine(cq.read(file), denoise="own"))
+        plain, blender = pictures
+        np.testing.assert_array_equal(plain.picture, blender.picture)
+        np.testing.assert_array_equal(plain["normal"], blender["normal"])
+        self.assertEqual(sorted(plain.keys()), sorted(blender.keys()))
 
     def test_combine_is_the_finish_of_a_render(self):
         """Layers of an unfinished render, finished afterwards, are the picture of a finished one."""

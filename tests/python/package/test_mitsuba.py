@@ -130,6 +130,45 @@ class Exchange(unittest.TestCase):
         self.agree(xml, back, 4096)
 
 
+    def test_what_is_approximated_is_named_and_can_be_refused(self):
+        """A scene of matte surfaces and clear glass is exact; each change that Mitsuba cannot say is named."""
+        document, binary = gltf.chunks((ROOT / "scenes" / "blocks.glb").read_bytes())
+
+        def said(change):
+            other, lost = json.loads(json.dumps(document)), []
+            change(other, other["materials"][0])
+            path, xml = self.folder / "changed.glb", self.folder / "changed.xml"
+            path.write_bytes(packed(other, binary))
+            to_xml.write(path, xml, lost.append)
+            mi.load_file(str(xml))
+            if lost:
+                with self.assertRaises(gltf.Unsupported):
+                    to_xml.write(path, xml)
+            else:
+                to_xml.write(path, xml)
+            return lost
+
+        def extended(name, **values):
+            return lambda _, material: material.setdefault("extensions", {}).update({f"KHR_materials_{name}": values})
+
+        def dispersed(other, material):
+            other.setdefault("extensionsUsed", []).append("KHR_materials_dispersion")
+
+        def fogged(other, _):
+            gltf.extras(other["scenes"][0])["medium"] = {"sigma_s": [0.2, 0.1, 0.0], "sigma_a": [0.0, 0.1, 0.2], "g": 0.3}
+
+        def seen_through(_, material):
+            material["alphaMode"] = "BLEND"
+
+        self.assertEqual(said(lambda other, material: None), [])
+        self.assertEqual(said(fogged), [])
+        self.assertIn("KHR_materials_dispersion is left out", said(dispersed))
+        self.assertIn("alpha", said(seen_through)[0])
+        self.assertIn("index of refraction", said(extended("specular", specularFactor=0.5))[0])
+        thin = said(extended("transmission", transmissionFactor=1.0))
+        self.assertTrue(any("thin walls" in line for line in thin), thin)
+
+
 def packed(document, binary):
     """The bytes of a .glb."""
     text = json.dumps(document).encode()

@@ -131,6 +131,20 @@ class BesideTheCommandLine(unittest.TestCase):
                                  keywords.get("crop"))
         self.assertFalse(np.array_equal(image.picture, cq.Scene(TORUS).render(iterations=4, width=32).picture))
 
+    def test_filters_and_parameters_of_cppm(self):
+        for keywords, options in [
+            ({"filter": "blackman-harris", "method": "path"}, ["--method", "path", "--filter", "blackman-harris"]),
+            ({"filter": ("gaussian", 2.0), "method": "cppm", "photons": 2000, "cppm_grid": (2, 4), "cppm_k": 0.5,
+              "cppm_beta": 1.5, "cppm_significance": 0.2, "cppm_plus": True},
+             ["--filter", "gaussian", "2", "--method", "cppm", "--photons", "2000", "--cppm-grid", "2,4", "--cppm-k", "0.5",
+              "--cppm-beta", "1.5", "--cppm-significance", "0.2", "--cppm-plus"]),
+        ]:
+            with self.subTest(**keywords), warnings.catch_warnings(action="ignore"):
+                image = cq.Scene(TORUS).render(iterations=3, width=24, **keywords)
+                plain = cq.Scene(TORUS).render(iterations=3, width=24, method=keywords["method"])
+                self.assert_same(image, self.by_program(TORUS, "--iterations", "3", "--width", "24", *options))
+                self.assertFalse(np.array_equal(image["Noisy"], plain["Noisy"]))
+
     def test_packed_meshes_are_a_file_of_the_program(self):
         vertices, triangles = sphere(8)
         meshes = [cq.Mesh(vertices=vertices, triangles=triangles, material=cq.Material(transmission=1, roughness=0))]
@@ -224,6 +238,72 @@ class Running(unittest.TestCase):
         self.assertGreater(counts[0], 20)
 
 
+class Divided(unittest.TestCase):
+    """Shards and checkpoints give what one render in one process gives, bit by bit."""
+
+    ASKED = {"width": 24, "iterations": 6, "seed": 3}
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.enterContext(warnings.catch_warnings(action="ignore"))
+        self.scene = cq.Scene(TORUS)
+        self.whole = self.scene.render(**self.ASKED)
+
+    def assert_same(self, image):
+        self.assertEqual(sorted(image.keys()), sorted(self.whole.keys()))
+        for name, planes in self.whole.layers.items():
+            for component, values in planes.items():
+                self.assertEqual(values.tobytes(), image.layers[name][component].tobytes(), f"{name}.{component}")
+
+    def shards(self, count=3, **options):
+        files = [self.folder / f"{index}.exr" for index in range(count)]
+        for index, file in enumerate(files):
+            self.scene.render(shard=(index, count), **self.ASKED | options).save(file)
+        return files
+
+    def test_shards_merge_to_the_render(self):
+        files = self.shards()
+        self.assert_same(cq.merge(files[::-1]))
+        with self.assertRaisesRegex(cq.Error, "shard 1 of 3 is missing"):
+            cq.merge([files[0], files[2]])
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            part = cq.merge([files[0], files[2]], partial=True)
+        self.assertIn("shard 1 is missing", str(caught[0].message))
+        self.assertFalse(np.array_equal(part["Noisy"], self.whole["Noisy"]))
+        program = [BesideTheCommandLine.PROGRAM, "merge", *files, "-o", self.folder / "merged.exr"]
+        subprocess.run(program, check=True, capture_output=True)
+        self.assert_same(cq.read(self.folder / "merged.exr"))
+
+    def test_shards_ask_for_their_finish(self):
+        bare = self.scene.render(finish=False, **self.ASKED)
+        files = self.shards(2, finish=False)
+        self.assertTrue(np.array_equal(cq.merge(files).picture, bare.picture))
+        self.assertFalse(np.array_equal(cq.merge(files, finish=True).picture, bare.picture))
+
+    def test_shards_of_scenes_that_are_not_the_same_do_not_merge(self):
+        files = self.shards(2)
+        cq.Scene(TORUS, environment=(1.0, 1.0, 1.0)).render(shard=(1, 2), **self.ASKED).save(files[1])
+        with self.assertRaisesRegex(cq.Error, "environment"):
+            cq.merge(files)
+
+    def test_a_render_goes_on_from_its_checkpoint(self):
+        state = self.folder / "state"
+        self.scene.render(checkpoint=state, checkpoint_every=0.001, **self.ASKED | {"iterations": 2})
+        self.assert_same(self.scene.render(resume=state, **self.ASKED))
+        with self.assertRaisesRegex(cq.Error, "another --seed"):
+            self.scene.render(resume=state, **self.ASKED | {"seed": 4})
+
+    def test_what_no_other_process_could_read(self):
+        sky = np.ones((4, 8, 3))
+        for scene in (still_life(), cq.Scene(TORUS, environment=sky)):
+            for options in ({"shard": (0, 2)}, {"checkpoint": self.folder / "a"}, {"resume": self.folder / "a"}):
+                with self.assertRaisesRegex(cq.Error, "another process"):
+                    scene.render(**self.ASKED | options)
+
+
 class Faults(unittest.TestCase):
     """What is wrong is said, with the remedy, and nothing is silent."""
 
@@ -247,6 +327,11 @@ class Faults(unittest.TestCase):
             ({"layers": "Nosy", "method": "path"}, "Nosy", "Noisy"),
             ({"camera": "front"}, "front", "camera"),
             ({"crop": (0, 0, 2, 2.5)}, "crop", "pixels"),
+            ({"filter": "hat"}, "filter='hat'", "gaussian"),
+            ({"filter": ("box", 99)}, "99", "0.1 to 8"),
+            ({"cppm_k": 0.5, "method": "sppm"}, "cppm_*", "method='cppm'"),
+            ({"cppm_grid": (9, 9), "method": "cppm"}, "cppm_grid=(9, 9)", "2 to 64"),
+            ({"checkpoint_every": 0.0}, "checkpoint_every=0", "above 0"),
         ]:
             with self.subTest(**options), self.assertRaises(cq.Error) as caught:
                 scene.render(**{"height": 8, "width": 8} | options)

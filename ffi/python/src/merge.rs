@@ -1,0 +1,77 @@
+//! Shards of one render, joined.
+
+use crate::error::raised;
+use crate::image::Image;
+use crate::job::{self, finish_order};
+use crate::scene::delivered;
+use crate::work::work;
+use caustique::error::Error;
+use caustique::film::Naming;
+use caustique::pipeline::finish;
+use caustique::pipeline::merge::{Order, Shards, Step};
+use pyo3::prelude::*;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// The image of the shards of one render, whose files `Image.save` or `caustique render --shard` has written: to the last
+/// bit of every layer what one process would have rendered, in whatever order they are named.
+///
+/// partial    do with the shards that are there; each that is missing is a warning
+/// finish, denoise, model, layers
+///            as for `render`; what is left out is as the shards were asked
+/// threads    0 takes all cores
+///
+/// An error that is not about the shards, but about the finish, has the unfinished image as its attribute `image`.
+#[pyfunction]
+#[pyo3(signature = (
+    paths, *, partial = false, finish = None, denoise = None, model = None, layers = None, threads = 0
+))]
+#[expect(clippy::too_many_arguments, reason = "they are those of Python's signature")]
+pub fn merge(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    partial: bool,
+    finish: Option<bool>,
+    denoise: Option<String>,
+    model: Option<String>,
+    layers: Option<String>,
+    threads: usize,
+) -> PyResult<Image> {
+    let shards = py.detach(|| Shards::open(&paths, partial)).map_err(raised)?;
+    let arguments = shards.arguments();
+    let order = Order {
+        finish: asked_finish(&arguments, finish, denoise, model)?,
+        layers: layers.or_else(|| text(&arguments, "layers")).unwrap_or_else(|| "all".into()),
+        naming: Naming::Plain,
+        reproducible: arguments["reproducible"] == true,
+    };
+    let done = work(py, threads, |caller| {
+        caller.warn(&shards.warnings());
+        let missing = |error: &Error| caller.warn(&[job::missing(error)]);
+        shards.merge(&order, |step| {
+            if let Step::Finishes(_, Some(error)) = step {
+                missing(error);
+            }
+        })
+    })?;
+    delivered(py, done.whole()?)
+}
+
+/// The finish that is asked for here, else by the shards.
+fn asked_finish(
+    arguments: &Value,
+    finish: Option<bool>,
+    denoise: Option<String>,
+    model: Option<String>,
+) -> PyResult<Option<finish::Order>> {
+    let here = finish == Some(true) || denoise.is_some() || model.is_some();
+    if finish == Some(false) || (!here && arguments["no-combine"] == true) {
+        return Ok(None);
+    }
+    let denoise = denoise.or_else(|| text(arguments, "denoise")).unwrap_or_else(|| "auto".into());
+    finish_order("merge", &denoise, model.or_else(|| text(arguments, "model"))).map(Some)
+}
+
+fn text(arguments: &Value, name: &str) -> Option<String> {
+    arguments[name].as_str().map(String::from)
+}

@@ -1,0 +1,36 @@
+"""The wheel needs what it asks for and nothing else: it renders in an environment of its own (scripts/python.sh)."""
+
+import json
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+from shared import ROOT, TORUS
+
+PYTHON = ROOT / ".venv-wheel" / "bin" / "python"
+RENDER = f"""
+import caustique, numpy
+image = caustique.Scene({str(TORUS)!r}).render(method="path", iterations=2, width=16, height=8, finish=False)
+image.save("torus.exr")
+again = caustique.read("torus.exr")
+assert numpy.array_equal(image.picture, again.picture) and image.picture.max() > 0
+print(caustique.__file__)
+"""
+
+
+class Alone(unittest.TestCase):
+    def test_it_has_numpy_and_nothing_else(self):
+        told = subprocess.run([PYTHON, "-m", "pip", "list", "--format=json"], capture_output=True, text=True, check=True)
+        names = {package["name"] for package in json.loads(told.stdout)}
+        self.assertEqual(names - {"pip", "setuptools"}, {"caustique", "numpy"})
+
+    def test_it_renders_far_from_its_sources(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([PYTHON, "-I", "-c", RENDER], cwd=folder, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(str(ROOT / ".venv-wheel"), str(Path(done.stdout.strip())))
+
+
+if __name__ == "__main__":
+    unittest.main()
