@@ -4,7 +4,8 @@ use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{Layer, LayerSet};
-use caustique::image::{Comparison, Floor, compare_above, exr, heat, png};
+use caustique::image::{Comparison, Floor, atomic, compare_above, exr, heat, png};
+use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -31,6 +32,10 @@ pub struct CompareArgs {
     /// Also write a heat map of FLIP: black is no difference, pale yellow a large one
     #[arg(long, value_name = "FILE.png")]
     png: Option<PathBuf>,
+    /// Also write a page with both pictures, the errors of pixels and, where the image has a layer Error, what its render
+    /// has told of them, with a scale
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -41,6 +46,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if let Some(png) = &args.png {
         output::check(png, "png")?;
     }
+    if let Some(page) = &args.page {
+        output::check(page, "html")?;
+    }
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
@@ -49,6 +57,11 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
         png::write(path, image.width, image.height, colours)?;
+    }
+    if let Some(path) = &args.page {
+        let names = [&args.image, &args.reference].map(|path| path.display().to_string());
+        let page = errors::html(&image, &reference, names.each_ref().map(String::as_str), &comparison)?;
+        atomic::write_bytes(path, page.as_bytes())?;
     }
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }

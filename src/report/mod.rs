@@ -9,6 +9,7 @@ pub mod crop;
 pub mod curve;
 pub mod data;
 pub mod entry;
+pub mod errors;
 pub mod number;
 pub mod overhead;
 pub mod page;

@@ -296,6 +296,6 @@ fn facts(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-fn data_url(png: &[u8]) -> String {
+pub(super) fn data_url(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png))
 }

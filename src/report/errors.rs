@@ -1,0 +1,131 @@
+//! A picture's errors as pictures, in one page that needs nothing from outside: what differs from a reference, what the
+//! render itself has told, and what people see of it.
+
+use super::crop::heat_bar;
+use super::number::short;
+use super::page::data_url;
+use crate::error::Result;
+use crate::film::{Layer, LayerSet};
+use crate::finish::ERROR;
+use crate::image::tonemap::ToneMap;
+use crate::image::{Comparison, heat, png};
+use crate::stat::floor;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const STYLE: &str = concat!(
+    include_str!("page.css"),
+    ".errors { display: grid; grid-template-columns: repeat(auto-fit, minmax(20rem, 1fr)); gap: 1rem; }\n",
+    ".labels { display: flex; justify-content: space-between; }\n",
+);
+/// Share of the pixels whose errors the scale has room for, so that fireflies do not turn all else black.
+const SHOWN: f64 = 0.95;
+
+/// The page for a picture beside its reference, both of the same size, with what was compared.
+///
+/// # Errors
+/// There is no picture in one of them.
+pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison: &Comparison) -> Result<String> {
+    let (pixels, truth) = (image.beauty()?, reference.beauty()?);
+    let value = |rgb: &[f32; 3]| rgb.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
+    let floor = floor::relative(truth.iter().map(value));
+    // Of a pixel, whose squared error is given by channel.
+    let relative = |square: f64, worth: &[f32; 3]| (square / 3.0 / (value(worth).powi(2) + floor)).sqrt() as f32;
+    let distance =
+        |(a, b): (&[f32; 3], &[f32; 3])| relative((0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum(), b);
+    let found: Vec<f32> = pixels.iter().zip(&truth).map(distance).collect();
+    let told = image.get(ERROR).map(Layer::triples).map(|told| -> Vec<f32> {
+        let squares = told.iter().map(|error| error.iter().map(|e| f64::from(*e).powi(2)).sum::<f64>());
+        squares.zip(&truth).map(|(square, worth)| relative(square, worth)).collect()
+    });
+    let largest = scale(found.iter().chain(told.iter().flatten()).copied());
+    let size = (image.width, image.height);
+    let look = |pixels: &[[f32; 3]]| {
+        png::encode(size.0, size.1, pixels.iter().map(|rgb| ToneMap::default().display((*rgb).into(), 0.0)))
+    };
+    let map = |errors: &[f32], largest: f32| {
+        png::encode(size.0, size.1, errors.iter().map(|error| heat::magma(error / largest)))
+    };
+    let bar = data_url(&heat_bar()?);
+    let percents = |largest: f32| [0.0, 0.5, 1.0].map(|part| format!("{} %", short(100.0 * f64::from(part * largest))));
+    let plain = [0.0, 0.5, 1.0].map(short);
+    let mut figures = vec![
+        figure(names[0], &data_url(&look(&pixels)?), None),
+        figure(names[1], &data_url(&look(&truth)?), None),
+        figure("relative error against it", &data_url(&map(&found, largest)?), Some((&bar, &percents(largest)))),
+    ];
+    if let Some(told) = &told {
+        let told = data_url(&map(told, largest)?);
+        figures.push(figure("error that the render has told", &told, Some((&bar, &percents(largest)))));
+    }
+    figures.push(figure("FLIP", &data_url(&map(&comparison.flip_map, 1.0)?), Some((&bar, &plain))));
+    let title = format!("Errors of {}", names[0]);
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header { h1 { (title) } p.lead {
+                    "relMSE " (short(comparison.relmse)) ", trimmed " (short(comparison.relmse_trimmed))
+                    ", FLIP " (short(comparison.flip)) ", mean ratio "
+                    (comparison.mean_ratio.map_or("unknown".into(), short))
+                } }
+                section { div.errors { @for figure in &figures { (figure) } } }
+                footer { "caustique " (env!("CARGO_PKG_VERSION")) }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// A picture with what it shows, and the bar of its scale with the labels of its ends and its middle.
+fn figure(title: &str, url: &str, scale: Option<(&str, &[String; 3])>) -> Markup {
+    html! {
+        figure {
+            figcaption { (title) }
+            img src=(url) alt=(title);
+            @if let Some((bar, labels)) = scale {
+                div.scale {
+                    img src=(bar) alt="colours of the scale";
+                    div.labels { @for label in labels { span { (label) } } }
+                }
+            }
+        }
+    }
+}
+
+/// The error that is shown as the largest.
+fn scale(errors: impl Iterator<Item = f32>) -> f32 {
+    let mut errors: Vec<f32> = errors.filter(|error| error.is_finite()).collect();
+    errors.sort_unstable_by(f32::total_cmp);
+    errors.get((SHOWN * errors.len() as f64) as usize).copied().unwrap_or(1.0).max(1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::compare;
+
+    #[test]
+    fn the_page_has_all_pictures_and_a_scale_that_one_firefly_does_not_rule() {
+        let set = |value: f32| -> LayerSet {
+            let mut set = LayerSet::new(8, 8);
+            let pixels = (0..64).map(|i| if i == 9 { [1e6; 3] } else { [value; 3] });
+            set.push(Layer::interleaved("", "RGB", pixels)).expect("sizes agree");
+            set
+        };
+        let (mut image, reference) = (set(1.1), set(1.0));
+        let compared = compare(&image, &reference).expect("both are pictures");
+        let without = html(&image, &reference, ["a.exr", "b.exr"], &compared).expect("both are pictures");
+        assert_eq!(without.matches("<figure>").count(), 4);
+        image.push(Layer::interleaved(ERROR, "RGB", [[0.2; 3]; 64])).expect("sizes agree");
+        let page = html(&image, &reference, ["a.exr", "b.exr"], &compared).expect("both are pictures");
+        assert_eq!(page.matches("<figure>").count(), 5);
+        // 0.2 over the root of 1 and the floor of 0.01 of it.
+        assert!(page.contains("19.9 %") || page.contains("20 %"), "{}", &page[page.len() - 4000..]);
+    }
+}
