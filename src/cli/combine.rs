@@ -51,12 +51,12 @@ pub fn run(args: &CombineArgs) -> Result<()> {
         }
         let clock = Clock::start();
         let finish = || ready.finish().apply(&mut set, |_| true);
-        let mut account =
+        let account =
             Form::Auto.during("finishing the picture", finish).map_err(|error| error.within(args.input.display()))?;
         let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
         object["combined"] = ready.facts(&account);
         if let Some(header) = object.as_object_mut() {
-            tell_stored(header, &mut set, &mut account)?;
+            tell_stored(header, &account);
         }
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;

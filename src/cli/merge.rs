@@ -144,10 +144,10 @@ fn average(args: &MergeArgs) -> Result<()> {
     if let Some(order) = args.finish(&arguments) {
         let mut ready = finish::open(&order, None)?;
         tell_missing(ready.missing.as_ref());
-        let mut account = ready.finish().apply(&mut set, |_| true)?;
+        let account = ready.finish().apply(&mut set, |_| true)?;
         header["combined"] = ready.facts(&account);
         if let Some(header) = header.as_object_mut() {
-            tell_stored(header, &mut set, &mut account)?;
+            tell_stored(header, &account);
         }
     }
     if let Some(layers) = &args.layers {

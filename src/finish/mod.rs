@@ -19,7 +19,7 @@ mod verdict;
 mod window;
 
 pub use denoiser::{Denoiser, DenoiserChoice, Quality};
-pub use verdict::{Errors, Verdict};
+pub use verdict::{Errors, USUAL, Verdict};
 pub use window::{Size, Windows, window};
 
 use crate::combine::{Combiner, LevelStack};
@@ -231,6 +231,7 @@ impl Finish {
         };
         let ([picture, spread], clamped) = self.with_spread(&estimate)?;
         let (verdict, errors) = self.judged(set, &estimate, wanted(ERROR))?.unzip();
+        let errors = errors.flatten();
         let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
         let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
         set.layers.retain(|layer| layer.name != "Combined");
@@ -241,10 +242,14 @@ impl Finish {
             }
             None => Layer::interleaved("", "RGB", picture),
         })?;
+        if let Some(errors) = &errors {
+            set.layers.retain(|layer| layer.name != ERROR);
+            set.push(Layer::interleaved(ERROR, "RGB", errors.squared().map(|rgb| rgb.map(f32::sqrt))))?;
+        }
         for (name, values) in parts {
             set.push(Layer::interleaved(name, "RGB", values))?;
         }
-        Ok(Account { combined, verdict, errors: errors.flatten(), clamped })
+        Ok(Account { combined, verdict, errors, clamped })
     }
 
     /// The error of a picture finished from half of its iterations, as the other half tells it; `None` where a quarter is

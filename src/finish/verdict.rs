@@ -32,6 +32,10 @@ const UNKNOWN: f64 = 1e30;
 /// A pixel's squared error is no smaller share of what its variance lets expect.
 const LEAST: f64 = 0.1;
 
+/// The power of the iterations with which errors of finished pictures fall, usually: between 0.2 and 0.5, what the
+/// scenes of the project show (`docs/measurements.md`, slopes of finished pictures).
+pub const USUAL: f64 = 0.35;
+
 /// The error of a picture finished from half of the iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
@@ -51,18 +55,20 @@ pub struct Verdict {
 #[derive(Clone, Debug)]
 pub struct Errors {
     /// Of noise, at half of the iterations.
-    pub noise: Vec<[f32; 3]>,
+    noise: Vec<[f32; 3]>,
     /// Of bias.
-    pub bias: Vec<[f32; 3]>,
+    bias: Vec<[f32; 3]>,
     /// What makes them relative: one over the squared value of the pixel plus the [`floor`].
     pub weight: Vec<f32>,
 }
 
 impl Errors {
-    /// Squared errors of a picture whose squared error of noise is `fall` times that of the half.
-    pub fn squared(&self, fall: f64) -> impl Iterator<Item = [f32; 3]> + '_ {
+    /// Squared errors of the picture finished from all iterations, whose noise has fallen as is [`USUAL`]: what one render
+    /// has shown of its own decay is not the same where shards of it are joined.
+    pub fn squared(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
+        let fall = (-2.0 * USUAL).exp2() as f32;
         let pairs = self.noise.iter().zip(&self.bias);
-        pairs.map(move |(noise, bias)| std::array::from_fn(|c| fall as f32 * noise[c] + bias[c]))
+        pairs.map(move |(noise, bias)| std::array::from_fn(|c| fall * noise[c] + bias[c]))
     }
 }
 
@@ -326,6 +332,7 @@ mod tests {
             Trial { size: SIZE, halves, quarters: &quarters, deviation: &deviation, levels }.judge();
         assert!((verdict.bias / (0.01 / 1.01) - 1.0).abs() < 1e-3, "{}", verdict.bias);
         assert!(errors.bias.iter().flatten().all(|b| (b / 0.01 - 1.0).abs() < 1e-3));
-        assert!(errors.squared(0.0).all(|rgb| (rgb[0] / 0.01 - 1.0).abs() < 1e-3));
+        let fall = 2f32.powf(-0.7);
+        assert!(errors.squared().zip(&errors.noise).all(|(all, noise)| (all[0] - fall * noise[0] - 0.01).abs() < 1e-5));
     }
 }

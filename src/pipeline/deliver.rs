@@ -6,7 +6,7 @@ use super::layers;
 use super::worst::{Seen, Worst};
 use crate::error::{Error, Result};
 use crate::estimator::Pixel;
-use crate::film::{Layer, LayerSet, Naming, Selection};
+use crate::film::{LayerSet, Naming, Selection};
 use crate::finish::{Account, ERROR, reads};
 use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
@@ -79,16 +79,10 @@ pub(super) fn deliver(
     };
     let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account));
     let errors = finished.as_mut().and_then(|(_, _, account)| account.errors.take());
-    let worst = match errors {
-        Some(errors) => {
-            let squared = errors.squared(of_finished.as_ref().map_or(1.0, |reached| reached.accuracy.fall()));
-            let squared: Vec<[f32; 3]> = squared.collect();
-            let worst = Worst::of(&squared, &errors.weight, &set, &seen);
-            tell_error(&mut set, squared)?;
-            Some(worst)
-        }
-        None => None,
-    };
+    let worst = errors.map(|errors| {
+        let squared: Vec<[f32; 3]> = errors.squared().collect();
+        Worst::of(&squared, &errors.weight, &set, &seen)
+    });
     // A render that is still to be finished keeps what that reads, and a shard has what it can have.
     if keep {
         set.layers.retain(|layer| selection.wants(&layer.name));
@@ -199,18 +193,8 @@ impl Reached {
     }
 }
 
-/// Makes the roots of squared errors the layer `Error`.
-fn tell_error(set: &mut LayerSet, squared: impl IntoIterator<Item = [f32; 3]>) -> Result<()> {
-    set.layers.retain(|layer| layer.name != ERROR);
-    set.push(Layer::interleaved(ERROR, "RGB", squared.into_iter().map(|rgb| rgb.map(f32::sqrt))))
-}
-
-/// What the finish of a stored picture has told of its error: in its header, and in the layer `Error`. Nothing where the
-/// picture has no quarters.
-///
-/// # Errors
-/// None: errors are as many as pixels.
-pub fn tell_stored(header: &mut Map<String, Value>, set: &mut LayerSet, account: &mut Account) -> Result<()> {
+/// What the finish of a stored picture has told of its error, in its header; nothing where the picture has no quarters.
+pub fn tell_stored(header: &mut Map<String, Value>, account: &Account) {
     let iterations = header.get("iterations").and_then(Value::as_u64).unwrap_or(1).max(1);
     let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
     let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);
@@ -223,10 +207,9 @@ pub fn tell_stored(header: &mut Map<String, Value>, set: &mut LayerSet, account:
         estimate: None,
         finished: account.verdict,
     };
-    let Some(reached) = Reached::of(vec![history], account) else { return Ok(()) };
-    reached.tell(header, !timed);
-    let Some(errors) = account.errors.take() else { return Ok(()) };
-    tell_error(set, errors.squared(reached.accuracy.fall()).collect::<Vec<_>>())
+    if let Some(reached) = Reached::of(vec![history], account) {
+        reached.tell(header, !timed);
+    }
 }
 
 /// What the layers and their finish have cost.

@@ -9,11 +9,8 @@
 //! and added.
 
 use super::control::History;
-use crate::finish::Verdict;
+use crate::finish::{USUAL, Verdict};
 
-/// The power with which finished errors fall, usually: between 0.2 and 0.5, what the scenes of the project show
-/// (`docs/measurements.md`, slopes of finished pictures).
-pub const USUAL: f64 = 0.35;
 /// What a power may come out as: noise alone falls with a half, and nothing rises.
 const RANGE: (f64, f64) = (0.1, 0.55);
 /// Moments that tell the level of the error: the last ones.
@@ -107,11 +104,6 @@ impl Accuracy {
         let iterations = ((self.level - noise.ln()) / (2.0 * self.exponent)).exp();
         (noise > 0.0 && iterations.is_finite()).then_some(iterations)
     }
-
-    /// What the squared noise of a picture finished from all iterations is of that of half of them.
-    pub fn fall(&self) -> f64 {
-        (-2.0 * self.exponent).exp2()
-    }
 }
 
 #[cfg(test)]
@@ -136,7 +128,6 @@ mod tests {
         let usual = |n: f64| 0.01 * n.powf(-2.0 * USUAL);
         let one = Accuracy::of(&history(&[8], usual, 0.0)).expect("one moment");
         assert!((one.exponent - USUAL).abs() < 1e-9 && (one.error(64) / usual(64.0).sqrt() - 1.0).abs() < 1e-9);
-        assert!((one.fall() - 0.5f64.powf(0.7)).abs() < 1e-9);
         let steep = |n: f64| 0.01 / n;
         let many: Vec<u64> = (3..12).map(|power| 1 << power).collect();
         let many = Accuracy::of(&history(&many, steep, 0.0)).expect("nine moments");

@@ -31,7 +31,7 @@ mod tiles;
 mod told;
 mod volume;
 
-pub use accuracy::{Accuracy, CONFIDENCE, USUAL};
+pub use accuracy::{Accuracy, CONFIDENCE};
 pub use clock::{Clock, Spent, cpu_seconds, peak_memory};
 pub use control::{Control, History, Progress, StopReason};
 pub use drive::{LEAST, drive, render};

@@ -262,3 +262,52 @@ fn a_preview_shows_the_picture_and_changes_nothing() {
     assert_eq!(outcome.code, Some(2));
     assert!(outcome.stderr.contains("name the same file"), "{}", outcome.stderr);
 }
+
+/// A finished picture tells its error with an interval and the places that hold it, `info` says so, and a plan says what
+/// a target takes.
+#[test]
+fn the_error_of_the_finished_picture_is_told() {
+    let folder = Folder::new();
+    let said = folder.render("-o out.exr --method sppm --iterations 16 --denoise own --progress plain").stderr;
+    assert!(said.contains("; error ") && said.contains(" to ") && said.contains("where the error is: "), "{said}");
+    let (set, header) = folder.read("out.exr");
+    assert_eq!(header["error_of"], "finished picture");
+    let (error, interval) = (header["error"].as_f64().expect("a number"), &header["accuracy"]["interval"]);
+    let [low, high] = [0, 1].map(|end| interval[end].as_f64().expect("a number"));
+    assert!(0.0 < low && low < error && error < high, "{header}");
+    let shares: f64 =
+        header["worst"]["by"].as_array().expect("places").iter().filter_map(|of| of["share"].as_f64()).sum();
+    assert!((0.5..1.001).contains(&shares), "{header}");
+    assert!(header["worst"]["tiles"].as_array().is_some_and(|tiles| tiles.len() == 10));
+    // Of the beauty: the root mean square of the layer is near the number where pixels are worth about the same.
+    assert!(values(&set, "Error").iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
+    let told = folder.run("info out.exr").stdout;
+    assert!(told.contains("the error lies between ") && told.contains("where the error is: "), "{told}");
+
+    // Finished anew it tells the same layer, which does not depend on earlier moments.
+    let levels = "Variance1,Variance2,Variance3,Variance4,Variance5,Level4,Level5,albedo,normal";
+    let layers = format!("Noisy,Quarter1,Quarter2,Quarter3,Quarter4,{levels}");
+    folder.render(&format!("-o raw.exr --method sppm --iterations 16 --no-combine --layers {layers}"));
+    let outcome = folder.run("combine raw.exr -o again.exr --denoise own");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let (again, header) = folder.read("again.exr");
+    assert!(values(&again, "Error") == values(&set, "Error"));
+    assert!(header["accuracy"]["interval"].is_array());
+
+    let plan = "plan scene.glb --method sppm --width 64 --height 48 --denoise own --target-error 0.01 --json";
+    let outlook = &folder.run(plan).json()["outlook"];
+    assert!(outlook["iterations"].as_u64().is_some_and(|n| n >= 8), "{outlook}");
+    assert!(outlook["seconds"].as_f64().is_some_and(|seconds| seconds > 0.0), "{outlook}");
+}
+
+/// A picture beside its reference, with what the render has told, on one page.
+#[test]
+fn errors_are_shown_on_a_page() {
+    let folder = Folder::new();
+    folder.render("-o a.exr --method sppm --iterations 8 --denoise own");
+    folder.render("-o b.exr --method sppm --iterations 32 --denoise own --seed 1");
+    let outcome = folder.run("compare a.exr b.exr --page errors.html");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let page = std::fs::read_to_string(folder.path("errors.html")).expect("the page is there");
+    assert!(page.contains("error that the render has told") && page.matches("<figure>").count() == 5);
+}
