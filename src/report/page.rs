@@ -1,10 +1,13 @@
 //! The report as one page that needs nothing from outside: pictures, plots and style are in it.
 
 use super::crop;
+use super::curve::{Mean, Unfit};
+use super::entry::{Metric, Of};
 use super::number::{minus, plain, short, short_with_error, with_error};
+use super::outcome::Outcome;
 use super::overhead::Overhead;
 use super::plot::colour;
-use super::summary::{Strip, Subject, Summary};
+use super::summary::{Likeness, Strip, Subject, Summary};
 use super::target::Reached;
 use crate::error::Result;
 use base64::Engine;
@@ -13,11 +16,19 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
 
-/// The page. `plots` are SVG documents with the headings they go under.
+/// Plots side by side: SVG documents with the metrics that they show.
+pub struct Plots {
+    /// What they go under.
+    pub heading: &'static str,
+    /// The plots.
+    pub plots: Vec<(Metric, String)>,
+}
+
+/// The page.
 ///
 /// # Errors
 /// None that memory would not have.
-pub fn html(subject: &Subject, summary: &Summary, plots: &[(&str, &str)]) -> Result<String> {
+pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Plots]) -> Result<String> {
     let bar = data_url(&crop::heat_bar()?);
     let title = format!("Accuracy against time: {}", subject.scene);
     let page = html! {
@@ -34,11 +45,14 @@ pub fn html(subject: &Subject, summary: &Summary, plots: &[(&str, &str)]) -> Res
                     h1 { (title) }
                     p.lead { (lead(subject)) }
                 }
-                @for (heading, svg) in plots {
-                    section.plot { h2 { (heading) } (PreEscaped(svg)) }
+                @for row in plots.iter().filter(|row| !row.plots.is_empty()) {
+                    section { h2 { (row.heading) } div.pair {
+                        @for (metric, svg) in &row.plots { div.plot { h3 { (meaning(*metric)) } (PreEscaped(svg)) } }
+                    } }
                 }
-                (targets(subject, summary))
-                (fits(subject, summary))
+                (marks(subject, summary))
+                div.pair { (targets(subject, summary)) (fits(subject, summary)) }
+                (guests(subject, outcome, summary))
                 (overheads(subject, summary))
                 (reference(subject, summary))
                 @for strip in &summary.strips { (crops(strip, summary, &bar)) }
@@ -68,13 +82,51 @@ fn lead(subject: &Subject) -> String {
         1 => "1 run".into(),
         n => format!("{n} runs in turns of one iteration"),
     };
+    let runs = match subject.guests.len() {
+        0 => runs,
+        1 => format!("{runs} and another renderer"),
+        n => format!("{runs} and {n} of other renderers"),
+    };
     format!("{runs}, {each}, {width} × {height} pixels{seeds}.")
 }
 
-/// A run's name beside its colour.
-fn name(subject: &Subject, run: usize) -> Markup {
-    let (r, g, b) = colour(run);
-    html! { span.dot style=(format!("background:rgb({r},{g},{b})")) {} (subject.entries[run].name) }
+/// What a metric is, in a few words.
+fn meaning(metric: Metric) -> &'static str {
+    match metric {
+        Metric::RelMse => "relMSE, all pixels",
+        Metric::RelMseTrimmed => "relMSE, trimmed: without the worst 0.5 % of the pixels",
+        Metric::Mse => "MSE, all pixels",
+    }
+}
+
+/// What the marks of the plots mean.
+fn marks(subject: &Subject, summary: &Summary) -> Markup {
+    let any = |found: &dyn Fn(Of) -> bool| subject.lines.iter().any(|line| found(line.of));
+    html! {
+        p.note {
+            @if any(&|of| !of.is_raw()) { "Full lines and marks: what a method leaves. Dashes and hollow marks: the picture finished or denoised from it, the time for that added. " }
+            @if summary.curves.iter().flat_map(|curve| &curve.mean).any(|spot| spot.fireflies) {
+                "Crosses: fireflies rule the figure, for the worst 0.5 % of the pixels hold more than half of it. "
+            }
+            @if any(&|of| !of.is_ours()) { "Other renderers: each point is a render of its own, started when ours had got as far; seconds are of rendering, without starting up. " }
+            "Grey lines have the exponents of theory."
+        }
+    }
+}
+
+/// A curve's name beside its colour.
+fn name(subject: &Subject, line: usize) -> Markup {
+    let ((r, g, b), of) = (colour(subject, line), &subject.lines[line]);
+    let style = match of.of.is_raw() {
+        true => format!("background:rgb({r},{g},{b})"),
+        false => format!("border:2px solid rgb({r},{g},{b})"),
+    };
+    html! { span.dot style=(style) {} (of.name) }
+}
+
+/// The name of what an entry leaves, or a guest.
+fn name_of(subject: &Subject, of: Of) -> Markup {
+    subject.lines.iter().position(|line| line.of == of).map_or_else(|| html! {}, |line| name(subject, line))
 }
 
 fn targets(subject: &Subject, summary: &Summary) -> Markup {
@@ -85,13 +137,16 @@ fn targets(subject: &Subject, summary: &Summary) -> Markup {
         section {
             h2 { "Time to a given error" }
             div.wide { table {
-                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" } } }
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" } th.number { "core-seconds" } } }
                 @for (target, reached) in summary.targets.iter().zip(&summary.reached) {
                     tbody {
-                        tr.group { th colspan="4" { (subject.metric.name()) " ≤ " (plain(target.error))
+                        tr.group { th colspan="5" { (subject.metric.name()) " ≤ " (plain(target.error))
                             @if !target.of.is_empty() { small { " as " (target.of) } } } }
-                        @for run in 0..subject.entries.len() { tr { td { (name(subject, run)) } (answer(&reached[run], base(reached))) } }
+                        @for line in 0..subject.lines.len() { tr { td { (name(subject, line)) } (answer(&reached[line], base(reached))) } }
                     }
+                }
+                @if let Some(own) = subject.reference.error.of(subject.metric) {
+                    tbody { tr.group { th colspan="5" { (subject.metric.name()) " ≤ " (short(own)) small { " the reference's own error: nothing below can be told" } } } }
                 }
             } }
             p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
@@ -111,19 +166,21 @@ fn base(reached: &[Reached]) -> Option<f64> {
 
 fn answer(reached: &Reached, base: Option<f64>) -> Markup {
     match reached {
-        Reached::After { iterations, seconds, at_once: true } => html! {
+        Reached::After { iterations, seconds, core_seconds, at_once: true } => html! {
             td.number { "≤ " (whole(iterations.value)) } td.number { "≤ " (short(seconds.value)) } td.number { "–" }
+            td.number { "≤ " (short(core_seconds.value)) }
         },
-        Reached::After { iterations, seconds, .. } => html! {
+        Reached::After { iterations, seconds, core_seconds, .. } => html! {
             td.number { (whole(iterations.value)) @if let Some(e) = iterations.error { " ± " (whole(e)) } }
             td.number { (short_with_error(seconds)) }
             td.number { (base.map_or("–".into(), |base| format!("{:.0} %", 100.0 * seconds.value / base))) }
+            td.number { (short_with_error(core_seconds)) }
         },
         Reached::Never(iterations, seconds) => html! {
-            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" }
+            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" } td.number.dim { "–" }
         },
-        Reached::BelowReference => html! { td.number.dim colspan="3" { "below the reference's error" } },
-        Reached::Unknown => html! { td.number.dim colspan="3" { "not measured" } },
+        Reached::BelowReference => html! { td.number.dim colspan="4" { "below the reference's error" } },
+        Reached::Unknown => html! { td.number.dim colspan="4" { "not measured" } },
     }
 }
 
@@ -144,23 +201,81 @@ fn fits(subject: &Subject, summary: &Summary) -> Markup {
             div.wide { table {
                 thead { tr { th { "Run" } th.number { "in iterations" } th.number { "theory" } th.number { "in seconds" }
                     th.number { "points" } th.number { "iterations" } th { "Theory" } } }
-                tbody { @for run in 0..subject.entries.len() {
-                    @let [by_iterations, by_seconds] = &summary.slopes[run];
-                    @let theory = summary.theories[run];
+                tbody { @for (line, of) in subject.lines.iter().enumerate().filter(|(_, line)| line.of.is_raw()) {
+                    @let [by_iterations, by_seconds] = &summary.slopes[line];
+                    @let theory = summary.theories[line];
                     tr {
-                        td { (name(subject, run)) }
-                        td.number { (by_iterations.as_ref().map_or("–".into(), |s| with_error(&s.exponent, 2))) }
-                        td.number { (theory.map_or("–".into(), |t| minus(&format!("{:.2}", t.exponent)))) }
-                        td.number { (by_seconds.as_ref().map_or("–".into(), |s| with_error(&s.exponent, 2))) }
-                        td.number { (by_iterations.as_ref().map_or("–".into(), |s| s.points.to_string())) }
-                        td.number { (by_iterations.as_ref().map_or("–".into(), |s| format!("{}–{}", s.range.0, s.range.1))) }
-                        td { small { (theory.map_or("no closed form", |t| t.because)) } }
+                        td { (name(subject, line)) }
+                        @match by_iterations {
+                            Ok(fit) => {
+                                td.number { (with_error(&fit.exponent, 2)) }
+                                td.number { (theory.map_or("–".into(), |t| minus(&format!("{:.2}", t.exponent)))) }
+                                td.number { (by_seconds.as_ref().map_or("–".into(), |s| with_error(&s.exponent, 2))) }
+                                td.number { (fit.points) }
+                                td.number { (fit.range.0) "–" (fit.range.1) }
+                            }
+                            Err(why) => {
+                                td.number { "–" }
+                                td.number { (theory.map_or("–".into(), |t| minus(&format!("{:.2}", t.exponent)))) }
+                                td.dim colspan="3" { small { (unfit(*why)) } }
+                            }
+                        }
+                        td { small { (theory.map_or(if of.of.is_ours() { "no closed form" } else { "its own business" }, |t| t.because)) } }
                     }
                 } }
             } }
-            p.note { "Slopes of the squared error in the log-log plots, by least squares over the last decade of iterations, where there are four measurements at least. Standard errors are "
+            p.note { "Slopes of the squared error in the log-log plots, by least squares over the last decade of iterations: of four measurements or more that span a factor of four, lie on a line (± 0.17), are above the reference's own error, and are not ruled by fireflies. Standard errors are "
                 (how) ". Theory is the limit of many iterations." }
         }
+    }
+}
+
+/// Why there is no exponent.
+fn unfit(why: Unfit) -> String {
+    why.to_string()
+}
+
+/// Other renderers: whether their picture is of the same scene, what they took, and why some are missing.
+fn guests(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Markup {
+    if subject.guests.is_empty() {
+        return html! {};
+    }
+    let seconds = |values: &[f64]| Mean::of(values).map_or("–".into(), |mean| short(mean.value));
+    html! {
+        section {
+            h2 { "Other renderers" }
+            div.wide { table {
+                thead { tr { th { "Renderer" } th { "Version" } th.number { "mean" br; small { "over the reference's" } } th { "Same scene" }
+                    th.number { "starting up" br; small { "s, not counted" } } th { "What is another there" } } }
+                tbody { @for (guest, account) in outcome.guests.iter().enumerate() { tr {
+                    td { (name_of(subject, Of::Guest(guest))) }
+                    td { (if account.version.is_empty() { "–" } else { &account.version }) }
+                    td.number { (summary.likeness[guest].as_ref().map_or("–".into(), ratio)) }
+                    td { (summary.likeness[guest].as_ref().map_or("–".into(), verdict)) }
+                    td.number { (seconds(&account.startups)) }
+                    td { small {
+                        @if let Some(why) = &account.out { b { "Left out: " } (why) ". " }
+                        @if account.unfinished > 0 { (account.unfinished) " renders ended before every pixel had a sample. " }
+                        (account.approximations.join("; "))
+                    } }
+                } } }
+            } }
+            p.note { "The mean is that of the longest render, its error taking pixels for independent; a picture of the same scene has the reference's within 1 % and twice that error. "
+                "Settings are public ones: one sample a pixel from a box filter, 32 segments, nothing clamped, no adaptive sampling, the same threads. OIDN gets albedo and normal from our own path tracing, the same for all and not counted." }
+        }
+    }
+}
+
+fn ratio(of: &Likeness) -> String {
+    with_error(&Mean { value: of.ratio, error: Some(of.error) }, 4)
+}
+
+fn verdict(of: &Likeness) -> String {
+    let off = 100.0 * (of.ratio - 1.0);
+    match of.is_same() {
+        true if off.abs() <= 1.0 => "within 1 %".into(),
+        true => "within 1 % and its noise".into(),
+        false => minus(&format!("no: {off:+.1} %")),
     }
 }
 
@@ -178,7 +293,7 @@ fn overheads(subject: &Subject, summary: &Summary) -> Markup {
                     th.number { "pilot" br; small { "core-s, once" } } th.number { "light" br; small { "core-s" } } th.number { "map" br; small { "core-s" } }
                     th.number { "eye" br; small { "core-s" } } } }
                 tbody { @for (run, row) in summary.overhead.iter().enumerate() { tr {
-                    td { (name(subject, run)) }
+                    td { (name_of(subject, Of::Estimate(run))) }
                     td.number { (row.as_ref().map_or("–".into(), |row| format!("{:.0}", row.iterations))) }
                     td.number { (cell(row, &|row| Some(row.render_seconds))) }
                     td.number { (cell(row, &|row| row.finish_seconds)) }
@@ -265,7 +380,7 @@ fn runs(subject: &Subject) -> Markup {
                 tbody { @for (run, entry) in subject.entries.iter().enumerate() {
                     @let (settings, method) = (&entry.settings, entry.settings.method);
                     tr {
-                        td { (name(subject, run)) }
+                        td { (name_of(subject, Of::Estimate(run))) }
                         td { (method.name()) }
                         td.number { (settings.levels.count) }
                         td { (entry.finish.as_deref().unwrap_or("off")) }

@@ -56,15 +56,15 @@ def material(of, folder):
     elif of.kind == "glass":
         # The interface has the base colour on the way through alone, which Cycles gives the root of for a refraction.
         shader = nodes.add("BsdfGlass", Color=colour, Roughness=of.roughness, IOR=of.ior)
-        shader.distribution = "GGX"
+        shader.distribution = "MULTI_GGX"
         if of.absorption.any():
             most = of.absorption.max()
             volume = nodes.add("VolumeAbsorption", Color=(*(1 - of.absorption / most), 1.0), Density=most)
             nodes.link(volume.outputs[0], output.inputs["Volume"])
     else:
         shader = nodes.add("BsdfPrincipled", Base_Color=colour, Roughness=of.roughness, IOR=of.ior,
-                           Metallic=float(of.kind == "metal"))
-        shader.distribution = "GGX"
+                           Metallic=float(of.kind == "metal"), Specular_IOR_Level=of.specular / 2)
+        shader.distribution = "MULTI_GGX"
     if of.texture:
         file = os.path.join(folder, f"{made.name}.image")
         with open(file, "wb") as sink:

@@ -70,8 +70,10 @@ def material(of, name, folder):
     if of.kind == "matte":
         found.update({own + "type": "matte", own + "kd": base})
     elif of.kind == "coated":
-        found.update({own + "type": "disney", own + "basecolor": base, own + "metallic": 0, own + "specular": 0.5,
-                      own + "roughness": of.roughness})
+        # The lobe called disney is a fifth darker.
+        shine = of.specular * ((of.ior - 1) / (of.ior + 1)) ** 2
+        found.update({own + "type": "glossy2", own + "kd": base, own + "ks": text([shine] * 3), own + "uroughness": alpha,
+                      own + "vroughness": alpha, own + "multibounce": 0})
     elif of.kind == "glass":
         smooth = of.roughness == 0
         found.update({own + "type": "glass" if smooth else "roughglass", own + "kr": "1 1 1", own + "kt": base,

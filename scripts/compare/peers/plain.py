@@ -30,6 +30,8 @@ class Material:
     base: np.ndarray
     roughness: float
     ior: float = 1.5
+    #: Of the interface: a share of what its index reflects.
+    specular: float = 1.0
     #: Radiance from the front.
     emission: np.ndarray = field(default_factory=lambda: np.zeros(3))
     #: Absorption inside, per unit of length.
@@ -94,9 +96,10 @@ class Scene:
         glow = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
         made.emission = np.array(raw.get("emissiveFactor", [0, 0, 0]), float) * glow
         if kind == "coated":
-            if strength < 1 or list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]:
-                self._say(self.approximations, f"{name}: specular {strength:g} as 1")
-            self._say(self.approximations, f"{name}: the base below its shine is coupled in another way")
+            made.specular = strength
+            if list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]:
+                self._say(self.approximations, f"{name}: its shine without a colour")
+            self._say(self.approximations, "what lies below a shine is coupled to it in another way")
         if kind == "glass":
             made.absorption = self._absorption(mesh, raw, name)
         if made.emission.any() and raw.get("doubleSided"):
