@@ -1,6 +1,6 @@
-//! Other renderers on our scenes: Mitsuba, LuxCore and Cycles, each driven by a script in Python (`scripts/compare`, part
-//! of the program as the converter of USD is, so that it works wherever the program lies). What they say to each other is
-//! in `scripts/compare/peers/driver.py`.
+//! Other renderers on our scenes: Mitsuba, LuxCore and Cycles, each driven by a script in Python. The scripts
+//! (`scripts/compare`) are part of the program as the converter of USD is, so that they are those of its version and are
+//! found wherever it lies. What both say to each other is in `scripts/compare/peers/driver.py`.
 
 mod drivers;
 mod process;

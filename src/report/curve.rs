@@ -46,8 +46,8 @@ pub struct Spot {
     pub fireflies: bool,
 }
 
-/// Whether a few bright samples rule a picture's error: the worst 0.5 % of its pixels hold more than half of its relMSE.
-/// Of Gaussian noise as large everywhere they hold 6 %.
+/// Whether a few bright samples rule a picture's error: the worst 0.5 % of its pixels hold more than half of its
+/// relMSE. Of Gaussian noise as large everywhere they hold 2 to 5 %.
 pub fn fireflies(errors: &Errors) -> bool {
     (1.0 - WORST) * errors.relmse_trimmed < 0.5 * errors.relmse
 }

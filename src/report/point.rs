@@ -18,8 +18,8 @@ pub struct Point {
     pub seconds: f64,
     /// Processor seconds, likewise.
     pub cpu_seconds: f64,
-    /// Wall-clock seconds of the finish and its layers, of finished pictures: the median of all its uses with this seed,
-    /// which do the same work; or of denoising another renderer's picture.
+    /// Wall-clock seconds of the finish and its layers, of finished pictures: the median of all its uses with this
+    /// seed, which do the same work; or of denoising another renderer's picture.
     pub finish_seconds: Option<f64>,
     /// Its error as measured against the reference, the reference's own included.
     pub errors: Errors,

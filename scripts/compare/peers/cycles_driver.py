@@ -54,7 +54,6 @@ def material(of, folder):
     if of.kind == "matte":
         shader = nodes.add("BsdfDiffuse", Color=colour, Roughness=0.0)
     elif of.kind == "glass":
-        # The interface has the base colour on the way through alone, which Cycles gives the root of for a refraction.
         shader = nodes.add("BsdfGlass", Color=colour, Roughness=of.roughness, IOR=of.ior)
         shader.distribution = "MULTI_GGX"
         if of.absorption.any():
@@ -184,6 +183,14 @@ def build(of, folder):
     return scene
 
 
+def approximations(scene):
+    """What Cycles says in another way."""
+    found = list(scene.approximations)
+    if any(of.kind == "glass" and of.base.min() < 1 for _, of in scene.meshes):
+        found.append("glass also tints what it reflects")
+    return found
+
+
 def settle(scene, options):
     """Settings of the render."""
     render, cycles = scene.render, scene.cycles
@@ -238,7 +245,7 @@ def main():
             return samples
 
         samples = one(0) if options.clock == "wall" else driver.passes(watch, one)
-        driver.done(watch, samples, bpy.app.version_string, of.approximations)
+        driver.done(watch, samples, bpy.app.version_string, approximations(of))
         pictures.write(options.output, total / samples)
 
 

@@ -22,9 +22,9 @@ use std::str::FromStr;
 /// points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the running iteration and writes what
 /// there is.
 ///
-/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. A run has two curves: NAME is the
-/// estimate, 'NAME, finished' the picture that is finished from it, the finish's time added once, as if the run stopped at
-/// that moment. With --with other renderers take turns with ours, each point a render of its own.
+/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. A run has two curves: NAME is
+/// the estimate, 'NAME, finished' the picture that is finished from it, the finish's time added once, as if the run
+/// stopped at that moment. With --with other renderers take turns with ours, each point a render of its own.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
 pub struct ConvergeArgs {
