@@ -37,7 +37,7 @@ impl Renderer {
         let names: &[(&str, &str)] = match self {
             Renderer::Mitsuba => &[("path", "Mitsuba")],
             Renderer::Luxcore => {
-                &[("path", "LuxCore path"), ("path_cache", "LuxCore cache"), ("bidir", "LuxCore bidirectional")]
+                &[("path", "LuxCore path"), ("path_cache", "LuxCore cache"), ("bidir", "LuxCore bidir")]
             }
             Renderer::Cycles => &[("path", "Cycles")],
         };

@@ -11,7 +11,7 @@ const HINT: &str = "run 'scripts/compare/setup.sh peers'";
 /// Fails unless all modules that it is given can be found; imports none, which takes seconds.
 const PROBE: &str = "import importlib.util, sys\n\
                      missing = [name for name in sys.argv[1:] if importlib.util.find_spec(name) is None]\n\
-                     sys.exit(missing and 'no module ' + ', '.join(missing))";
+                     sys.exit('no module ' + ', '.join(missing) if missing else 0)";
 
 /// A Python with a renderer.
 #[derive(Clone, Debug)]

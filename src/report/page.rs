@@ -48,7 +48,8 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
                     } }
                 }
                 (marks(subject, summary))
-                div.pair { (targets(subject, summary)) (fits(subject, summary)) }
+                (targets(subject, summary))
+                (fits(subject, summary))
                 (guests(subject, outcome, summary))
                 (overheads(subject, summary))
                 (reference(subject, summary))

@@ -25,7 +25,9 @@ pub use super::outcome::{Field, Outcome};
 pub struct Step<'a> {
     /// The name of who made it.
     pub name: &'a str,
-    /// Iterations it has done; samples per pixel of other renderers.
+    /// Whether it is ours.
+    pub is_ours: bool,
+    /// Iterations it has done; samples per pixel of other renderers, 0 where no picture came of it.
     pub iterations: u64,
     /// Its seconds.
     pub seconds: f64,
@@ -69,7 +71,7 @@ pub fn race(
             (round as f64 + (ours + theirs) / (lanes.len() as f64 + guests)) / rules.seeds.len() as f64
         };
         loop {
-            let (name, iterations, seconds, measured);
+            let (name, iterations, seconds, measured, is_ours);
             if let Some(turn) = due(&turns, &lanes) {
                 turns.pop_front();
                 let guest = turn.guest;
@@ -82,16 +84,18 @@ pub fn race(
                 }
                 name = field.guests.as_ref().map_or("", |guests| guests.peers[guest].name);
                 (iterations, seconds) = outcome.last_of(measured);
+                is_ours = false;
             } else if let Some(run) = next(&lanes, rules) {
                 measured = outcome.step(run, &mut lanes[run], &mut field, rules, &look);
                 name = &entries[run].name;
                 (iterations, seconds) = (lanes[run].session.iterations(), lanes[run].session.spent().seconds);
+                is_ours = true;
             } else {
                 break;
             }
             let point = outcome.points.last().filter(|_| measured);
             let fraction = share(&lanes, turns.len());
-            if observe(&Step { name, iterations, seconds, fraction, point }) == Control::Stop {
+            if observe(&Step { name, is_ours, iterations, seconds, fraction, point }) == Control::Stop {
                 outcome.interrupted = true;
                 break;
             }

@@ -33,19 +33,22 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
     html! {
         section {
             h2 { "Time to a given error" }
-            div.wide { table {
-                thead { tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" } th.number { "core-seconds" } } }
-                @for (target, reached) in summary.targets.iter().zip(&summary.reached) {
-                    tbody {
+            div.targets { @for (target, reached) in summary.targets.iter().zip(&summary.reached) {
+                div.wide { table {
+                    thead {
                         tr.group { th colspan="5" { (subject.metric.name()) " ≤ " (plain(target.error))
                             @if !target.of.is_empty() { small { " as " (target.of) } } } }
-                        @for line in 0..subject.lines.len() { tr { td { (name(subject, line)) } (answer(&reached[line], base(reached))) } }
+                        tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" }
+                            th.number { "core-seconds" } }
                     }
-                }
-                @if let Some(own) = subject.reference.error.of(subject.metric) {
-                    tbody { tr.group { th colspan="5" { (subject.metric.name()) " ≤ " (short(own)) small { " the reference's own error: nothing below can be told" } } } }
-                }
+                    tbody { @for line in 0..subject.lines.len() {
+                        tr { td { (name(subject, line)) } (answer(&reached[line], base(reached))) }
+                    } }
+                } }
             } }
+            @if let Some(own) = subject.reference.error.of(subject.metric) {
+                p { "The limit: the reference's own error is " (subject.metric.name()) " " (short(own)) ". Nothing at or below it can be told." }
+            }
             p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
                 "“Relative” is the time over that of the first run listed that gets there. “≤”: the first measurement was below the target already."
                 @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
@@ -118,7 +121,7 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
                                 td.dim colspan="3" { small { (why.to_string()) } }
                             }
                         }
-                        td { small { (theory.map_or(if of.of.is_ours() { "no closed form" } else { "its own business" }, |t| t.because)) } }
+                        td { small { (theory.map_or(if of.of.is_ours() { "no closed form" } else { "–" }, |t| t.because)) } }
                     }
                 } }
             } }

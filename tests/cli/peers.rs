@@ -90,9 +90,9 @@ fn peers_are_curves_or_rows_with_a_reason() {
     assert_eq!((&path["version"], &path["startup_seconds"], &path["out"]), (&"9.9".into(), &1.5.into(), &Value::Null));
     assert_eq!((&path["approximations"][0], &path["same_scene"]), (&"red is blue".into(), &true.into()));
     assert_eq!(run("LuxCore cache")["out"], "cannot say the scene: spots; fog");
-    let failed = run("LuxCore bidirectional")["out"].as_str().expect("it failed").to_string();
+    let failed = run("LuxCore bidir")["out"].as_str().expect("it failed").to_string();
     assert!(failed.contains("it is broken") && failed.contains("exit status: 3"), "{failed}");
-    assert_eq!(points("LuxCore cache").len() + points("LuxCore bidirectional").len(), 0);
+    assert_eq!(points("LuxCore cache").len() + points("LuxCore bidir").len(), 0);
     let page = std::fs::read_to_string(folder.path("out/index.html")).expect("it is there");
     for text in ["spots; fog", "it is broken", "red is blue", "LuxCore path + OIDN", "within 1 %"] {
         assert!(page.contains(text), "{text}");

@@ -34,7 +34,12 @@ impl Reporter {
     pub fn step(&mut self, step: &Step<'_>) {
         let name = step.name;
         let relmse = step.point.map(|point| point.errors.relmse);
-        let mut sentence = format!("{name}: iteration {}, {}", step.iterations, duration(step.seconds));
+        let count = match (step.is_ours, step.iterations) {
+            (true, n) => format!("iteration {n}"),
+            (false, 0) => "no picture".into(),
+            (false, n) => format!("{n} samples a pixel"),
+        };
+        let mut sentence = format!("{name}: {count}, {}", duration(step.seconds));
         sentence += &relmse.map_or(String::new(), |relmse| format!(", relMSE {}", short(relmse)));
         let line = json!({
             "run": name, "iteration": step.iterations, "seconds": step.seconds, "fraction": step.fraction, "relmse": relmse,
