@@ -20,7 +20,9 @@ llvm_is_new() { at_least 17 "$1"; }
 find_llvm() {
     [ -z "${DRJIT_LIBLLVM_PATH:-}" ] || return 0
     local version
-    for version in $(find /usr/lib -name 'libLLVM*.so*' 2>/dev/null | sed -n 's/.*libLLVM[-.a-z]*\([0-9][0-9]*\).*/\1/p'); do
+    local files
+    files=$(find /usr/lib -name 'libLLVM*.so*' 2>/dev/null)
+    for version in $(printf '%s\n' "$files" | sed -n 's/.*libLLVM[-.a-z]*\([0-9][0-9]*\).*/\1/p'); do
         if llvm_is_new "$version"; then return; fi
     done
     return 1
@@ -46,7 +48,8 @@ need_exr_for_bpy() {
     [ "$(cat "$directory/.complete" 2>/dev/null)" != "$stamp" ] || return 0
     say "installing $requirement beside Blender's module"
     rm -rf "$directory"
-    "$ROOT/.venv-bpy/bin/python" -m pip install -q --disable-pip-version-check --no-deps --target "$directory" "$requirement" >&2 ||
+    "$ROOT/.venv-bpy/bin/python" -m pip install -q --disable-pip-version-check --no-deps --target "$directory" \
+        "$requirement" >&2 ||
         fail "pip could not install $requirement" "check the network and the disk, then run this script again"
     printf '%s\n' "$stamp" >"$directory/.complete"
 }

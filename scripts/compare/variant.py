@@ -13,7 +13,8 @@ OLDEST = 17
 
 def choose(threads=0):
     """Sets the variant, with so many threads (0: all), and returns its name."""
-    libraries = [p for pattern in ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so") for p in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
+    patterns = ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so")
+    libraries = [path for pattern in patterns for path in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
     known = {path: [int(n) for n in re.findall("[0-9]+", path.name)] for path in libraries}
     fit = {path: version for path, version in known.items() if version[0] >= OLDEST}
     if fit and "DRJIT_LIBLLVM_PATH" not in os.environ:

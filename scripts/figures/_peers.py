@@ -76,7 +76,8 @@ class Peers:
         if not (folder / "guides.exr").exists():
             with making(folder) as draft:
                 command = [BIN, "render", self.scene, "-o", draft / "guides.exr", "--method", "path", "--no-combine"]
-                timed([*command, "--iterations", GUIDES, "--width", WIDTH, "--layers", "albedo,normal", "--progress", "none"])
+                command += ["--iterations", GUIDES, "--width", WIDTH, "--layers", "albedo,normal"]
+                timed([*command, "--progress", "none"])
         layers = Layers(folder / "guides.exr")
         return {"albedo": layers.get("albedo"), "normal": layers.get("normal", "XYZ")}
 

@@ -24,8 +24,8 @@ goes on.
   SHORT=1             half an hour on two cores: width 240, budget 10, methods auto,path,bdpt,sppm,vcm, references of
                       60 core-seconds a half
 
-scripts/compare/setup.sh peers installs the peers, and OIDN; their drivers are scripts/compare/peers. Peers always have the budget in core-seconds (seconds times
-threads), ours on the wall clock at most as many: rows say what was spent.
+scripts/compare/setup.sh peers installs the peers, and OIDN; their drivers are scripts/compare/peers. Peers always have
+the budget in core-seconds (seconds times threads), ours on the wall clock at most as many: rows say what was spent.
 """
 
 import os

@@ -8,8 +8,8 @@
 use crate::stat::floor;
 use rayon::prelude::*;
 
-/// Share of the pixels left out, those where the judging quarters differ most. Which pixels these are does not depend on
-/// `F`.
+/// Share of the pixels left out, those where the judging quarters differ most. Which pixels these are does not depend
+/// on `F`.
 pub use crate::stat::WORST;
 
 /// What two judges tell of a pixel.

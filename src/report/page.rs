@@ -102,11 +102,13 @@ fn marks(subject: &Subject, summary: &Summary) -> Markup {
     let any = |found: &dyn Fn(Of) -> bool| subject.lines.iter().any(|line| found(line.of));
     html! {
         p.note {
-            @if any(&|of| !of.is_raw()) { "Full lines and marks: what a method leaves. Dashes and hollow marks: the picture finished or denoised from it, the time for that added. " }
+            @if any(&|of| !of.is_raw()) { "Full lines and marks: what a method leaves. Dashes and hollow marks: the \
+                picture finished or denoised from it, the time for that added. " }
             @if summary.curves.iter().flat_map(|curve| &curve.mean).any(|spot| spot.fireflies) {
                 "Crosses: fireflies rule the figure, for the worst 0.5 % of the pixels hold more than half of it. "
             }
-            @if any(&|of| !of.is_ours()) { "Other renderers: each point is a render of its own, started when ours had got as far; seconds are of rendering, without starting up. " }
+            @if any(&|of| !of.is_ours()) { "Other renderers: each point is a render of its own, started when ours \
+                had got as far; seconds are of rendering, without starting up. " }
             "Grey lines have the exponents of theory."
         }
     }
@@ -119,7 +121,9 @@ fn reference(subject: &Subject, summary: &Summary) -> Markup {
             h2 { "Reference" }
             p { (subject.reference.about) ". " (own_error(subject)) }
             div.frame {
-                @if let Some(whole) = summary.reference.pictures.first() { img src=(data_url(whole)) alt="the reference"; }
+                @if let Some(whole) = summary.reference.pictures.first() {
+                    img src=(data_url(whole)) alt="the reference";
+                }
                 @for (i, w) in summary.windows.iter().enumerate() {
                     div.box style=(format!("left:{:.3}%;top:{:.3}%;width:{:.3}%;height:{:.3}%",
                         100.0 * w.x as f64 / width, 100.0 * w.y as f64 / height,
@@ -134,7 +138,8 @@ fn own_error(subject: &Subject) -> String {
     let metric = subject.metric.name();
     match subject.reference.error.of(subject.metric) {
         Some(own) => format!(
-            "Its own error is {metric} {}. It is taken off every figure, for independent errors add; figures at or below it are not reported.",
+            "Its own error is {metric} {}. It is taken off every figure, for independent errors add; figures at or \
+                below it are not reported.",
             short(own)
         ),
         None => format!("Its own error in {metric} is not known: figures near it say nothing."),
@@ -152,9 +157,15 @@ fn crops(strip: &Strip, summary: &Summary, bar: &str) -> Markup {
             @for window in 0..summary.windows.len() {
                 div.crops {
                     figure {
-                        @if let Some(png) = summary.reference.pictures.get(window + 1) { img src=(data_url(png)) alt="reference"; }
+                        @if let Some(png) = summary.reference.pictures.get(window + 1) {
+                            img src=(data_url(png)) alt="reference";
+                        }
                         figcaption { b { (letter(window)) ", reference" }
-                            span.scale { img src=(bar) alt="colours of the heat maps"; span { "0" } span.end { "≥ " (format!("{:.0} %", 100.0 * strip.largest)) } } }
+                            span.scale {
+                                img src=(bar) alt="colours of the heat maps";
+                                span { "0" }
+                                span.end { "≥ " (format!("{:.0} %", 100.0 * strip.largest)) }
+                            } }
                     }
                     @for run in &strip.runs {
                         figure {
@@ -165,7 +176,8 @@ fn crops(strip: &Strip, summary: &Summary, bar: &str) -> Markup {
                     }
                 }
             }
-            p.note { "Below each crop its relative error per pixel, the root of the pixel's share of relMSE. Figures are of the whole picture. "
+            p.note { "Below each crop its relative error per pixel, the root of the pixel's share of relMSE. Figures \
+                are of the whole picture. "
                 "Pictures are those of the measurements nearest to the common time or error, of the first seed." }
         }
     }

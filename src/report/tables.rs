@@ -47,10 +47,13 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
                 } }
             } }
             @if let Some(own) = subject.reference.error.of(subject.metric) {
-                p { "The limit: the reference's own error is " (subject.metric.name()) " " (short(own)) ". Nothing at or below it can be told." }
+                p { "The limit: the reference's own error is " (subject.metric.name()) " " (short(own)) ". Nothing \
+                    at or below it can be told." }
             }
-            p.note { "From where on the error stays at or below the target; between two measurements it is taken for a power of iterations and of seconds. "
-                "“Relative” is the time over that of the first run listed that gets there. “≤”: the first measurement was below the target already."
+            p.note { "From where on the error stays at or below the target; between two measurements it is taken for \
+                a power of iterations and of seconds. "
+                "“Relative” is the time over that of the first run listed that gets there. “≤”: the first \
+                    measurement was below the target already."
                 @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
         }
     }
@@ -77,7 +80,8 @@ fn answer(reached: &Reached, base: Option<f64>) -> Markup {
             td.number { (short_with_error(core_seconds)) }
         },
         Reached::Never(iterations, seconds) => html! {
-            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) } td.number.dim { "–" } td.number.dim { "–" }
+            td.number.dim { "> " (iterations) } td.number.dim { "> " (short(*seconds)) }
+            td.number.dim { "–" } td.number.dim { "–" }
         },
         Reached::BelowReference => html! { td.number.dim colspan="4" { "below the reference's error" } },
         Reached::Unknown => html! { td.number.dim colspan="4" { "not measured" } },
@@ -94,13 +98,15 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
     let how = if subject.rules.seeds.len() > 1 {
         "over seeds"
     } else {
-        "from the scatter about the line; errors of one run at successive moments are not independent, so that it is rather too small (--seeds gives an honest one)"
+        "from the scatter about the line; errors of one run at successive moments are not independent, so that it is \
+            rather too small (--seeds gives an honest one)"
     };
     html! {
         section {
             h2 { "Exponents" }
             div.wide { table {
-                thead { tr { th { "Run" } th.number { "in iterations" } th.number { "theory" } th.number { "in seconds" }
+                thead { tr { th { "Run" } th.number { "in iterations" } th.number { "theory" }
+                    th.number { "in seconds" }
                     th.number { "points" } th.number { "iterations" } th { "Theory" } } }
                 tbody { @for (line, of) in subject.lines.iter().enumerate().filter(|(_, line)| line.of.is_raw()) {
                     @let [by_iterations, by_seconds] = &summary.slopes[line];
@@ -121,11 +127,14 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
                                 td.dim colspan="3" { small { (why.to_string()) } }
                             }
                         }
-                        td { small { (theory.map_or(if of.of.is_ours() { "no closed form" } else { "–" }, |t| t.because)) } }
+                        @let unknown = if of.of.is_ours() { "no closed form" } else { "–" };
+                        td { small { (theory.map_or(unknown, |t| t.because)) } }
                     }
                 } }
             } }
-            p.note { "Slopes of the squared error in the log-log plots, by least squares over the last decade of iterations: of four measurements or more that span a factor of four, lie on a line (± 0.17), are above the reference's own error, and are not ruled by fireflies. Standard errors are "
+            p.note { "Slopes of the squared error in the log-log plots, by least squares over the last decade of \
+                iterations: of four measurements or more that span a factor of four, lie on a line (± 0.17), are \
+                above the reference's own error, and are not ruled by fireflies. Standard errors are "
                 (how) ". Theory is the limit of many iterations." }
         }
     }
@@ -141,7 +150,8 @@ pub(super) fn guests(subject: &Subject, outcome: &Outcome, summary: &Summary) ->
         section {
             h2 { "Other renderers" }
             div.wide { table {
-                thead { tr { th { "Renderer" } th { "Version" } th.number { "mean" br; small { "over the reference's" } } th { "Same scene" }
+                thead { tr { th { "Renderer" } th { "Version" } th.number { "mean" br; small { "over the reference's" } }
+                    th { "Same scene" }
                     th.number { "starting up" br; small { "s, not counted" } } th { "What is another there" } } }
                 tbody { @for (guest, account) in outcome.guests.iter().enumerate() { tr {
                     td { (name_of(subject, Of::Guest(guest))) }
@@ -151,13 +161,17 @@ pub(super) fn guests(subject: &Subject, outcome: &Outcome, summary: &Summary) ->
                     td.number { (seconds(&account.startups)) }
                     td { small {
                         @if let Some(why) = &account.out { b { "Left out: " } (why) ". " }
-                        @if account.unfinished > 0 { (account.unfinished) " renders ended before every pixel had a sample. " }
+                        @if account.unfinished > 0 { (account.unfinished) " renders ended before every pixel had a \
+                            sample. " }
                         (account.approximations.join("; "))
                     } }
                 } } }
             } }
-            p.note { "The mean is that of the longest render, its error taking pixels for independent; a picture of the same scene has the reference's within 1 % and twice that error. "
-                "Settings are public ones: one sample a pixel from a box filter, 32 segments, nothing clamped, no adaptive sampling, the same threads. OIDN gets albedo and normal from our own path tracing, the same for all and not counted." }
+            p.note { "The mean is that of the longest render, its error taking pixels for independent; a picture of \
+                the same scene has the reference's within 1 % and twice that error. "
+                "Settings are public ones: one sample a pixel from a box filter, 32 segments, nothing clamped, no \
+                    adaptive sampling, the same threads. OIDN gets albedo and normal from our own path tracing, the \
+                    same for all and not counted." }
         }
     }
 }
@@ -185,9 +199,12 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
         section {
             h2 { "What it costs" }
             div.wide { table {
-                thead { tr { th { "Run" } th.number { "iterations" } th.number { "render" br; small { "s" } } th.number { "finish" br; small { "s, once" } }
-                    th.number { "per iteration" br; small { "s" } } th.number { "over first" } th.number { "over same method" }
-                    th.number { "pilot" br; small { "core-s, once" } } th.number { "light" br; small { "core-s" } } th.number { "map" br; small { "core-s" } }
+                thead { tr { th { "Run" } th.number { "iterations" } th.number { "render" br; small { "s" } }
+                    th.number { "finish" br; small { "s, once" } }
+                    th.number { "per iteration" br; small { "s" } } th.number { "over first" }
+                    th.number { "over same method" }
+                    th.number { "pilot" br; small { "core-s, once" } }
+                    th.number { "light" br; small { "core-s" } } th.number { "map" br; small { "core-s" } }
                     th.number { "eye" br; small { "core-s" } } } }
                 tbody { @for (run, row) in summary.overhead.iter().enumerate() { tr {
                     td { (name_of(subject, Of::Estimate(run))) }
@@ -203,8 +220,10 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
                     td.number { (cell(row, &|row| Some(row.eye))) }
                 } } }
             } }
-            p.note { "Seconds per iteration are those of pilot, iterations and finish over the number of iterations. “Over same method” compares with the first run of that method. "
-                "Light, map and eye are processor seconds of one iteration; the methods that weigh strategies path by path count their light paths under eye." }
+            p.note { "Seconds per iteration are those of pilot, iterations and finish over the number of iterations. \
+                “Over same method” compares with the first run of that method. "
+                "Light, map and eye are processor seconds of one iteration; the methods that weigh strategies path \
+                    by path count their light paths under eye." }
         }
     }
 }
@@ -215,7 +234,8 @@ pub(super) fn runs(subject: &Subject) -> Markup {
         section {
             h2 { "Runs" }
             div.wide { table {
-                thead { tr { th { "Run" } th { "Method" } th.number { "levels" } th { "finish" } th.number { "light paths" } th.number { "alpha" } th { "options of caustique render" } } }
+                thead { tr { th { "Run" } th { "Method" } th.number { "levels" } th { "finish" }
+                    th.number { "light paths" } th.number { "alpha" } th { "options of caustique render" } } }
                 tbody { @for (run, entry) in subject.entries.iter().enumerate() {
                     @let (settings, method) = (&entry.settings, entry.settings.method);
                     tr {

@@ -22,13 +22,13 @@ import driver  # noqa: E402
 import pictures  # noqa: E402
 
 
-def drive(name, scene, target, mode="path", budget=1.0):
+def drive(name, scene, target, mode="path", budget=2.0):
     """Runs a driver; returns what it says."""
     python, env = PEERS / "bin" / "python", None
     if name == "cycles":
         python, env = BPY / "bin" / "python", {**os.environ, "PYTHONPATH": str(PEERS / "bpy")}
     command = [python, "-B", DRIVERS / f"{name}_driver.py", scene, target, "--mode", mode, "--budget", budget]
-    command += ["--width", SIZE[0], "--height", SIZE[1], "--threads", 2]
+    command += ["--width", SIZE[0], "--height", SIZE[1], "--threads", 2, "--clock", "cpu"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, env=env, timeout=300)
     said = [line for line in done.stdout.splitlines() if line.startswith("PEER ")]
     assert said, done.stdout + done.stderr
@@ -83,15 +83,16 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
             for name, mode in [("mitsuba", "path"), ("luxcore", "path"), ("luxcore", "bidir"), ("cycles", "path")]:
                 with self.subTest(name=name, mode=mode):
                     said = drive(name, scene, self.dir / "picture.exr", mode)
-                    self.assertGreater(said["seconds"], 0.5)
-                    self.assertLess(said["seconds"], 3.0)
+                    # Of four core-seconds; a pass more or less, and LuxCore's slow farewell.
+                    self.assertGreater(said["core_seconds"], 2.5)
+                    self.assertLess(said["core_seconds"], 9.0)
                     self.assertGreater(min(said["core_seconds"], said["startup_seconds"], said["passes"]), 0)
                     picture = pictures.read(self.dir / "picture.exr").astype(float)
                     self.assertEqual(picture.shape, truth.shape)
                     far, noise = off(picture, truth)
                     self.assertLess(far, 0.01 + 3 * noise)
-                    # A scene five per cent darker does not pass, nor does one a row too low.
-                    far, noise = off(0.95 * picture, truth)
+                    # A scene a tenth darker does not pass, nor does one a row too low.
+                    far, noise = off(0.9 * picture, truth)
                     self.assertGreater(far, 0.01 + 3 * noise)
                     moved = np.square(np.roll(picture, 1, 0) - truth)[2:].mean()
                     self.assertGreater(moved, 2 * np.square(picture - truth)[2:].mean())

@@ -1,4 +1,5 @@
-"""Blender's Cycles as a peer (see driver.py), on the processor, its scene made by script: `path`, and `path_guiding` (Open PGL).
+"""Blender's Cycles as a peer (see driver.py), on the processor, its scene made by script: `path`, and `path_guiding`
+(Open PGL).
 
 Runs in the Python of Blender's module (.venv-bpy), with OpenEXR from .venv-peers/bpy.
 """

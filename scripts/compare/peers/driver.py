@@ -5,8 +5,8 @@
 
 A driver renders for SECONDS, writes a linear picture, and says in its last line what it did:
 
-    PEER {"seconds": of rendering, "core_seconds": likewise, "startup_seconds": before that, "passes": samples per pixel,
-          "version": of the renderer, "approximations": [of the scene, in words]}
+    PEER {"seconds": of rendering, "core_seconds": likewise, "startup_seconds": before that,
+          "passes": samples per pixel, "version": of the renderer, "approximations": [of the scene, in words]}
 
 or, where the renderer cannot say the scene, `PEER {"cannot": [why, in words]}` and writes nothing. Rendering is all
 that follows the scene's being read and converted: acceleration structures, kernels and photon maps are in it. With
@@ -73,8 +73,8 @@ def say(**facts):
 
 
 def passes(watch, render):
-    """Calls `render(number)`, which returns samples a pixel, until another call would leave the budget by more than half of
-    itself; returns all samples."""
+    """Calls `render(number)`, which returns samples a pixel, until another call would leave the budget by more than half
+    of itself; returns all samples."""
     total = number = 0
     while True:
         before = watch.spent()
@@ -86,5 +86,5 @@ def passes(watch, render):
 
 def done(watch, samples, version, approximations):
     """Says what was rendered; called before the picture is written."""
-    say(seconds=round(watch.seconds(), 4), core_seconds=round(watch.core_seconds(), 4), startup_seconds=round(watch.startup, 4),
-        passes=samples, version=version, approximations=approximations)
+    say(seconds=round(watch.seconds(), 4), core_seconds=round(watch.core_seconds(), 4),
+        startup_seconds=round(watch.startup, 4), passes=samples, version=version, approximations=approximations)

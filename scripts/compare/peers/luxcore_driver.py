@@ -1,5 +1,5 @@
-"""LuxCore as a peer (see driver.py): `path`, `path_cache` (path tracing with the caustic cache of PhotonGI), `bidir`, and
-`bidirvm` (bidirectional with vertex merging).
+"""LuxCore as a peer (see driver.py): `path`, `path_cache` (path tracing with the caustic cache of PhotonGI), `bidir`,
+and `bidirvm` (bidirectional with vertex merging).
 
 LuxCore's ways that this file minds, each measured against a closed form or against Mitsuba:
 
@@ -8,7 +8,7 @@ LuxCore's ways that this file minds, each measured against a closed form or agai
 - Bidirectional paths are 2 to 7 % too bright with an early roulette of eye paths: it begins at depth 10.
 - An environment's texels are drawn as constants but looked up between four: a map four times as fine spares fireflies.
 - BIDIRVMCPU is slow with the sampler SOBOL, and with RANDOM begins with every sixteenth pixel unless told otherwise.
-- The caustic cache begins with radii of 0.5 % of the casters' size, of 400,000 photons, and shrinks them every 24 samples.
+- The caustic cache has 400,000 photons, and radii that begin at 0.5 % of the casters' size and shrink every 24 samples.
 """
 
 import os
@@ -72,8 +72,8 @@ def material(of, name, folder):
     elif of.kind == "coated":
         # The lobe called disney is a fifth darker.
         shine = of.specular * ((of.ior - 1) / (of.ior + 1)) ** 2
-        found.update({own + "type": "glossy2", own + "kd": base, own + "ks": text([shine] * 3), own + "uroughness": alpha,
-                      own + "vroughness": alpha, own + "multibounce": 0})
+        found.update({own + "type": "glossy2", own + "kd": base, own + "ks": text([shine] * 3), own + "multibounce": 0,
+                      own + "uroughness": alpha, own + "vroughness": alpha})
     elif of.kind == "glass":
         smooth = of.roughness == 0
         found.update({own + "type": "glass" if smooth else "roughglass", own + "kr": "1 1 1", own + "kt": base,
@@ -92,8 +92,9 @@ def material(of, name, folder):
                       own + "fresnel": f"fresnel_{name}", own + "uroughness": alpha, own + "vroughness": alpha})
     if of.emission.any():
         most = of.emission.max()
-        found.update({own + "emission": text(of.emission / most), own + "emission.gain": text([most] * 3), own + "emission.power": 0,
-                      own + "emission.efficency": 0, own + "emission.gain.normalizebycolor": 0, own + "emission.theta": 90})
+        found.update({own + "emission": text(of.emission / most), own + "emission.gain": text([most] * 3),
+                      own + "emission.power": 0, own + "emission.efficency": 0, own + "emission.theta": 90,
+                      own + "emission.gain.normalizebycolor": 0})
     return found
 
 
@@ -151,8 +152,8 @@ def settings(scene, options):
     """Properties of the render."""
     depth, mode = driver.DEPTH, options.mode
     found = {
-        "renderengine.type": ENGINES[mode], "renderengine.seed": options.seed + 1, "native.threads.count": options.threads,
-        "sampler.type": "RANDOM" if mode == "bidirvm" else "SOBOL", "sampler.random.bucketsize": 1,
+        "renderengine.type": ENGINES[mode], "renderengine.seed": options.seed + 1,
+        "native.threads.count": options.threads, "sampler.type": "RANDOM" if mode == "bidirvm" else "SOBOL", "sampler.random.bucketsize": 1,
         "film.width": options.width, "film.height": options.height, "film.filter.type": "NONE",
         "film.imagepipelines.0.0.type": "NOP", "film.outputs.0.type": "RGB", "film.outputs.0.filename": "unused.exr",
         "path.pathdepth.total": depth, "path.pathdepth.diffuse": depth, "path.pathdepth.glossy": depth,
@@ -165,8 +166,8 @@ def settings(scene, options):
         cache = "path.photongi."
         found.update({
             cache + "caustic.enabled": 1, cache + "indirect.enabled": 0, cache + "photon.maxcount": 400000,
-            cache + "photon.maxdepth": depth, cache + "caustic.maxsize": 100000, cache + "caustic.lookup.radius": 0.005 * size,
-            cache + "caustic.lookup.normalangle": 10, cache + "caustic.updatespp": 24,
+            cache + "photon.maxdepth": depth, cache + "caustic.maxsize": 100000,
+            cache + "caustic.lookup.radius": 0.005 * size, cache + "caustic.lookup.normalangle": 10, cache + "caustic.updatespp": 24,
             cache + "caustic.updatespp.radiusreduction": 0.96, cache + "caustic.updatespp.minradius": 0.0005 * size})
     return found
 

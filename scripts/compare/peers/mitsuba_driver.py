@@ -1,6 +1,7 @@
 """Mitsuba 3 as a peer (see driver.py): path tracing, its scene as world.py says it.
 
-Its rough surfaces get what they lack of ours (lobes.py), so that materials mean the same. The vectorised variant where there is an LLVM that it takes, thrice as fast as the scalar one.
+Its rough surfaces get what they lack of ours (lobes.py), so that materials mean the same. The vectorised variant where
+there is an LLVM that it takes, thrice as fast as the scalar one.
 """
 
 import mitsuba as mi

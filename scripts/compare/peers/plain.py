@@ -1,4 +1,4 @@
-"""A scene as LuxCore and Cycles take it: a few kinds of materials, lamps with a body as meshes, suns in the environment.
+"""A scene as LuxCore and Cycles take it: few kinds of materials, lamps with a body as meshes, suns in the environment.
 
 What they cannot say is named: `blockers` make a comparison worthless, `approximations` are judged by the mean of the
 picture. Mitsuba needs none of this: world.py says our scenes in its own terms.
@@ -184,7 +184,7 @@ def ball(light):
 
 
 def disc(toward, radius, irradiance, height, width, fine=8):
-    """A sun of so many radians about a direction, on the grid of `Scene.environment`: all its pixels have its irradiance."""
+    """A sun of so many radians about a direction, on the grid of `Scene.environment`: its pixels have its irradiance."""
     v = (np.arange(height * fine) + 0.5) / (height * fine) * np.pi
     rows = np.abs(v - np.arccos(np.clip(toward[1], -1, 1))) < radius + np.pi / height
     rows = np.repeat(rows.reshape(height, fine).any(1), fine)
@@ -204,7 +204,8 @@ def icosphere(times):
     points = np.array([np.roll(p, k) for k in range(3) for p in points], float)
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     near = np.linalg.norm(points[:, None] - points[None], axis=2) < 1.1
-    triangles = [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
+    triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j)]
+    triangles = [(i, j, k) for i, j, k in triples if near[i, j] and near[j, k] and near[i, k]]
     triangles = np.array([t if np.linalg.det(points[list(t)]) > 0 else t[::-1] for t in triangles])
     for _ in range(times):
         edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
