@@ -62,8 +62,8 @@ class Scene:
             self.camera = cameras[0]
         else:
             self.blockers.append("no camera" if camera is None else f'no camera "{camera}"')
-        if self.document.get("animations"):
-            self.blockers.append("animations")
+        if scene.medium:
+            self.blockers.append("a medium fills the space")
         self._meshes(scene)
         suns = self._lights(scene)
         self.environment = self._environment(scene, suns)
