@@ -14,9 +14,9 @@ set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 FIGURES=$ROOT/scripts/figures
 
-# Every script there is a figure, except for the recorder, what installs other renderers, and modules that figures share: _NAME.py.
+# Every script there is a figure, except for the recorder and modules that figures share: _NAME.py.
 names() {
-    find "$FIGURES" -maxdepth 1 \( -name '*.sh' -o -name '*.py' \) ! -name 'record.py' ! -name 'peers.sh' ! -name '_*' -printf '%f\n' |
+    find "$FIGURES" -maxdepth 1 \( -name '*.sh' -o -name '*.py' \) ! -name 'record.py' ! -name '_*' -printf '%f\n' |
         sed 's/\.[a-z]*$//' | sort
 }
 

@@ -55,4 +55,6 @@ pub mod render;
 
 pub mod pipeline;
 
+pub mod peers;
+
 pub mod report;

@@ -16,6 +16,8 @@ mod frames;
 mod limits;
 #[path = "cli/merge.rs"]
 mod merge;
+#[path = "cli/peers.rs"]
+mod peers;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/running.rs"]

@@ -145,6 +145,17 @@ def chunks(data):
     return document, binary
 
 
+def pack(path, document, binary):
+    """Writes a .glb file of a document and its binary buffer."""
+    document["buffers"][0]["byteLength"] = len(binary)
+    text = json.dumps(document).encode()
+    text, binary = text + b" " * (-len(text) % 4), bytes(binary) + bytes(-len(binary) % 4)
+    with open(path, "wb") as sink:
+        sink.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary)))
+        sink.write(struct.pack("<I4s", len(text), b"JSON") + text)
+        sink.write(struct.pack("<I4s", len(binary), b"BIN\0") + binary)
+
+
 def _uri(uri, folder):
     if uri.startswith("data:"):
         return base64.b64decode(uri.split(",", 1)[1])

@@ -18,7 +18,6 @@ darker, full colour at 10 %. Runs in .venv-compare, which it makes (setup.sh).
 import argparse
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -43,27 +42,10 @@ import OpenEXR  # noqa: E402
 
 import gltf  # noqa: E402
 import tiles  # noqa: E402
+import variant  # noqa: E402
 
 #: Samples that Mitsuba takes at once: what a wave of them needs of memory stays below a gibibyte.
 WAVE = 1 << 22
-
-
-def set_variant():
-    """The vectorised variant where there is an LLVM, the scalar one otherwise."""
-    patterns = ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so")
-    libraries = [p for pattern in patterns for p in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
-    if libraries and "DRJIT_LIBLLVM_PATH" not in os.environ:
-        # LLVM 14 and 15 cannot compile all that Mitsuba 3.9 asks for: the newest.
-        newest = max(libraries, key=lambda p: [int(n) for n in re.findall("[0-9]+", p.name)])
-        os.environ["DRJIT_LIBLLVM_PATH"] = str(newest)
-    try:
-        mi.set_variant("llvm_ad_rgb")
-        import drjit as dr
-        dr.eval(dr.arange(mi.Float, 2) + 1)
-    except Exception as error:  # noqa: BLE001, whatever Dr.Jit raises without LLVM
-        print(f"mitsuba: no LLVM ({error}); the scalar variant", file=sys.stderr)
-        mi.set_variant("scalar_rgb")
-    return mi.variant()
 
 
 def render_mitsuba(world, size, spp, seeds):
@@ -164,10 +146,7 @@ def main():
     arguments = parser.parse_args()
     arguments.iterations = arguments.iterations or arguments.spp
 
-    variant = set_variant()
-    if arguments.threads:
-        import drjit as dr
-        dr.set_thread_count(arguments.threads)
+    name = variant.choose(arguments.threads)
     import world
     try:
         scene = gltf.read(arguments.scene)
@@ -186,7 +165,7 @@ def main():
     values = tiles.compare(ours, theirs)
     values.update(scene=Path(arguments.scene).stem, method=arguments.method, corrected=arguments.correct, seeds=arguments.seeds,
                   spp=arguments.spp, iterations=arguments.iterations, width=size[0], height=size[1], mitsuba=mi.__version__,
-                  variant=variant, seconds_mitsuba=round(middle - start, 1), seconds_caustique=round(end - middle, 1))
+                  variant=name, seconds_mitsuba=round(middle - start, 1), seconds_caustique=round(end - middle, 1))
     if arguments.png:
         tiles.picture(ours, theirs, arguments.png)
     if arguments.save:

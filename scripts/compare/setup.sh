@@ -1,18 +1,31 @@
 #!/usr/bin/env bash
-# Makes .venv-compare, in which scripts/compare/mitsuba.py runs, and installs the LLVM that Mitsuba's vectorised variant
-# loads. Runs again in a second when nothing is missing. Without an LLVM the comparison takes Mitsuba's scalar variant.
+# Installs other renderers to compare with. Runs again in a second when nothing is missing.
+#
+#   scripts/compare/setup.sh          Mitsuba in .venv-compare, for scripts/compare/mitsuba.py
+#   scripts/compare/setup.sh peers    Mitsuba, LuxCore and Intel OIDN in .venv-peers, Cycles in .venv-bpy (as
+#                                     scripts/setup.sh test makes it), for `caustique converge --with` and
+#                                     scripts/figures/finished.py
+#
+# Either also installs the LLVM that Mitsuba's vectorised variant loads. Without one Mitsuba takes its scalar variant, a
+# third as fast.
 
 set -euo pipefail
 
 # shellcheck source=scripts/setup.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../setup.sh"
 
-# LLVM 14 and 15 cannot compile all that Mitsuba 3.9 asks for.
+# LLVM 15 and 16 abort on kernels of Mitsuba 3.9 (scripts/compare/variant.py).
+llvm_is_new() { at_least 17 "$1"; }
+
 find_llvm() {
     [ -z "${DRJIT_LIBLLVM_PATH:-}" ] || return 0
-    "$PYTHON" -c 'import glob, re, sys
-names = [path.rsplit("/", 1)[1] for path in glob.glob("/usr/lib/*-linux-gnu/libLLVM*.so*")]
-sys.exit(not any(int(n) >= 16 for name in names for n in re.findall("[0-9]+", name)[:1]))'
+    local version
+    local files
+    files=$(find /usr/lib -name 'libLLVM*.so*' 2>/dev/null)
+    for version in $(printf '%s\n' "$files" | sed -n 's/.*libLLVM[-.a-z]*\([0-9][0-9]*\).*/\1/p'); do
+        if llvm_is_new "$version"; then return; fi
+    done
+    return 1
 }
 
 need_llvm() {
@@ -20,14 +33,38 @@ need_llvm() {
     find_llvm && return
     apt_update
     package=$(apt-cache pkgnames libllvm | grep -E '^libllvm[0-9]+$' | sort -V | tail -n 1 || true)
-    if [ -z "$package" ]; then
-        say "apt has no LLVM: Mitsuba renders with its slow scalar variant"
-        return
+    if [ -n "$package" ] && llvm_is_new "${package#libllvm}"; then
+        apt_install "$package"
+    else
+        say "apt has no LLVM of 17 or later: Mitsuba renders with its slow scalar variant"
     fi
-    apt_install "$package"
 }
 
+# Blender's module does not come with OpenEXR; its environment stays as scripts/setup.sh makes it.
+need_exr_for_bpy() {
+    local directory=$ROOT/.venv-peers/bpy requirement stamp
+    requirement=$(sed -n '/^OpenEXR==/p' "$ROOT/scripts/requirements-peers.txt")
+    stamp="$("$ROOT/.venv-bpy/bin/python" --version) $requirement"
+    [ "$(cat "$directory/.complete" 2>/dev/null)" != "$stamp" ] || return 0
+    say "installing $requirement beside Blender's module"
+    rm -rf "$directory"
+    "$ROOT/.venv-bpy/bin/python" -m pip install -q --disable-pip-version-check --no-deps --target "$directory" \
+        "$requirement" >&2 ||
+        fail "pip could not install $requirement" "check the network and the disk, then run this script again"
+    printf '%s\n' "$stamp" >"$directory/.complete"
+}
+
+case ${1:-mitsuba} in
+mitsuba | peers) ;;
+*) fail "unknown mode '$1'" "'peers', or nothing for Mitsuba alone" ;;
+esac
 need_python
 need_llvm
 need_venv_module
-need_venv .venv-compare "$PYTHON" requirements-compare.txt
+if [ "${1:-mitsuba}" = mitsuba ]; then
+    need_venv .venv-compare "$PYTHON" requirements-compare.txt
+else
+    need_venv .venv-peers "$PYTHON" requirements-peers.txt
+    need_bpy
+    need_exr_for_bpy
+fi

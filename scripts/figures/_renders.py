@@ -8,10 +8,11 @@ import subprocess
 from _cache import BIN, CACHE, THREADS, WIDTH, Failed, digest, load, making, program, save, scene_key, timed
 from _iteration import read
 from _pictures import Layers, write
+from record import ROOT
 
 CLOCK = os.environ.get("CLOCK", "wall")
 OPTIONS = shlex.split(os.environ.get("OPTIONS", ""))
-# The interpreter that has OIDN (scripts/figures/peers.sh).
+# The interpreter that has OIDN (scripts/compare/setup.sh peers).
 PYTHON = os.environ.get("PEERS_PYTHON", "")
 PLACE = CACHE / "renders" / program()
 # On the clock of core-seconds: a render that has spent so much more or less than the budget is made again, a few times.
@@ -94,7 +95,7 @@ def _render(scene, method, denoise, budget, seed, file):
 def denoised(folder, source, target):
     """OIDN alone on a file in a folder, once; whether there is a picture then."""
     if not (folder / target).exists() and PYTHON:
-        tool = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_denoise.py")
+        tool = ROOT / "scripts" / "compare" / "peers" / "oidn.py"
         part = folder / f"{os.getpid()}-{target}"
         timed([PYTHON, tool, folder / source, part, THREADS])
         part.rename(folder / target)

@@ -8,16 +8,19 @@ take even so (media, spots, nested glass) is none.
 import json
 import shutil
 
+import _peers  # noqa: F401, finds the drivers
 from _cache import CACHE
-from _translate import PLAIN, Translation, gltf, pack
+
+import plain  # isort: skip
+import gltf  # isort: skip
 
 
-def plain(document):
+def without(document):
     """Takes from a document what can go; returns whether there was any."""
     before = json.dumps(document, sort_keys=True)
     for material in document.get("materials", []):
         extensions = material.get("extensions", {})
-        for name in set(extensions) - PLAIN:
+        for name in set(extensions) - plain.PLAIN:
             del extensions[name]
         for key in ("attenuationDistance", "attenuationColor"):
             extensions.get("KHR_materials_volume", {}).pop(key, None)
@@ -43,13 +46,13 @@ def plain(document):
 def twin(scene):
     """The twin of a scene as a file of its own; nothing where that is the scene itself, or no scene for the drivers."""
     document, binary = gltf.chunks(scene.read_bytes())
-    if not plain(document):
+    if not without(document):
         return None
     folder = CACHE / "twins"
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / scene.name
-    pack(path, document, binary)
+    gltf.pack(path, document, binary)
     environment = gltf.extras(document["scenes"][document.get("scene", 0)]).get("environment") or {}
     if "file" in environment:
         shutil.copy(scene.parent / environment["file"], folder)
-    return None if Translation(path).blockers else path
+    return None if plain.Scene(path).blockers else path

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`--method auto` against every fixed method at equal time, on all scenes: relMSE over that of the best fixed method, of all pixels and without the worst 0.1 %.
+"""`--method auto` against every fixed method at equal time, on all scenes: relMSE over that of the best fixed method, of all pixels and without the worst 0.5 %.
 
 One level, no combiner, no other option; methods that refuse a scene, for they have no photons in media, are left out there. All runs of a scene take turns in one `converge`; auto's pilot is in its time. They are compared at the largest
 number of core-seconds that all have spent. References are made by two halves of one long run, kept in out/auto, and their own squared error is taken off.

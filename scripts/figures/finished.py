@@ -20,13 +20,12 @@ goes on.
   CLOCK               wall, or cpu: budgets are core-seconds over threads [wall]
   REFERENCE_SECONDS   core-seconds of each half [240]
   PEERS               [mitsuba_path,lux_bidir,lux_path_caustic,lux_bidirvm,cycles_path]
-  CAUSTIQUE_PEERS     the folder of the peers' drivers; without it peers are left out
   PEERS_PYTHON, PEERS_PYTHON_BPY   their interpreters [those of .venv-peers and .venv-bpy]
   SHORT=1             half an hour on two cores: width 240, budget 10, methods auto,path,bdpt,sppm,vcm, references of
                       60 core-seconds a half
 
-scripts/figures/peers.sh installs the peers, and OIDN. Peers always have the budget in core-seconds (seconds times
-threads), ours on the wall clock at most as many: rows say what was spent.
+scripts/compare/setup.sh peers installs the peers, and OIDN; their drivers are scripts/compare/peers. Peers always have
+the budget in core-seconds (seconds times threads), ours on the wall clock at most as many: rows say what was spent.
 """
 
 import os
@@ -75,13 +74,13 @@ def line(label, spent, figures, note=""):
 
 
 def seeds(make, figures):
-    """Renders every seed; returns the averaged figures by picture and the mean core-seconds."""
+    """Renders every seed; returns the averaged figures by picture, the mean core-seconds, and what was approximated."""
     runs, spent = [], []
     for seed in range(1, SEEDS + 1):
         folder = make(seed)
         runs.append(figures(folder))
-        spent.append(load(folder / "run.json")["cpu_seconds"])
-    return mean(runs), sum(spent) / len(spent)
+        spent.append(load(folder / "run.json"))
+    return mean(runs), sum(of["cpu_seconds"] for of in spent) / len(spent), spent[0].get("approximations")
 
 
 def ours(scene, budget, reference, halves, cell):
@@ -90,7 +89,7 @@ def ours(scene, budget, reference, halves, cell):
         for method in METHODS:
             name = f"{method} {denoise}".strip()
             try:
-                pictures, spent = seeds(
+                pictures, spent, _ = seeds(
                     lambda seed: _renders.render(scene, method, denoise, budget, seed),
                     lambda folder: _renders.figures(folder, reference, halves, _renders.pictures),
                 )
@@ -113,24 +112,21 @@ def others(peers, names, budget, reference, halves, cell):
     """The peers' renders of a scene at a budget."""
     for name in names:
         try:
-            pictures, spent = seeds(
+            pictures, spent, approximated = seeds(
                 lambda seed: peers.render(name, budget, seed),
                 lambda folder: _renders.figures(folder, reference, halves, peers.pictures),
             )
         except Failed as failed:
             cell["notes"][name] = str(failed)
             print(f"    {name:<32}{failed}", flush=True)
-            if peers.blockers:
-                cell["notes"] = {key: note for key, note in cell["notes"].items() if key not in names} | {
-                    "peers": str(failed)
-                }
-                return
             continue
         note = _peers.stranger(pictures["noisy"])
         if note:
             cell["notes"][name] = note
         else:
             cell["peers"][name] = pictures
+            if approximated:
+                cell["notes"][f"{name} approximates"] = "; ".join(approximated)
         cell["core_seconds"][name] = spent
         line(name, spent, pictures["noisy"], note or "")
         if "oidn" in pictures:
@@ -166,8 +162,6 @@ def measure(scene, names):
         ours(scene, budget, reference, halves, cell)
         if peers:
             others(peers, names, budget, reference, halves, cell)
-            if peers.approximations and cell["peers"]:
-                cell["notes"]["approximated for peers"] = "; ".join(peers.approximations)
         cells.append(cell)
     return cells, known
 
@@ -197,7 +191,7 @@ def main():
     if reason:
         print(reason, file=sys.stderr)
     if not _renders.PYTHON:
-        print("OIDN alone is left out: there is no .venv-peers; make it by scripts/figures/peers.sh", file=sys.stderr)
+        print("OIDN alone is left out: there is no .venv-peers; make it by scripts/compare/setup.sh peers", file=sys.stderr)
     if not scenes:
         print(f"SET={_references.SET} has no scenes yet", file=sys.stderr)
         return

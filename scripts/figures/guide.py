@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone, of sppm and cppm whose photons bring all light, and of vcm, with and without, of all pixels and without the worst 0.1 %.
+"""Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone, of sppm and cppm whose photons bring all light, and of vcm, with and without, of all pixels and without the worst 0.5 %.
 On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
 
 Settings, references and environment variables are those of auto.py; METHODS (sppm,all,cppm,vcm) chooses among the

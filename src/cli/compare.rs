@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Measure the error of an image against a reference
 ///
 /// relMSE is the mean over pixels of the squared difference over the squared reference plus 0.01; trimmed leaves out
-/// the worst 0.1 % of pixels. FLIP estimates the difference that people see when they switch between the two. Grain is
+/// the worst 0.5 % of pixels. FLIP estimates the difference that people see when they switch between the two. Grain is
 /// the part of relMSE that neighbouring pixels do not share: of the error its mean over 3 x 3 pixels is taken off.
 #[derive(clap::Args)]
 pub struct CompareArgs {

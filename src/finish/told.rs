@@ -8,9 +8,9 @@
 use crate::stat::floor;
 use rayon::prelude::*;
 
-/// Share of the pixels left out, those where the judging quarters differ most: one bright sample in either would rule
-/// the mean. Which pixels these are does not depend on `F`.
-pub const WORST: f64 = 0.005;
+/// Share of the pixels left out, those where the judging quarters differ most. Which pixels these are does not depend
+/// on `F`.
+pub use crate::stat::WORST;
 
 /// What two judges tell of a pixel.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,7 @@ use super::flip;
 use crate::error::{Error, Kind, Result};
 use crate::film::LayerSet;
 use crate::math::Rgb;
-use crate::stat::floor;
+use crate::stat::{WORST, floor};
 
 /// The error of a picture A against a reference B of the same size, over all pixels that are finite in both.
 ///
@@ -15,7 +15,7 @@ use crate::stat::floor;
 pub struct Comparison {
     /// Mean over pixels of [`relative_squared_error`], the papers' relMSE.
     pub relmse: f64,
-    /// The same without the worst 0.1 % of pixels (rounded down).
+    /// The same without the worst 0.5 % of pixels (rounded down), [`WORST`].
     pub relmse_trimmed: f64,
     /// Mean over pixels and channels of the squared difference.
     pub mse: f64,
@@ -87,7 +87,7 @@ fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
     let mut relative: Vec<f64> = pixels.iter().map(|&i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect();
     let relmse = relative.iter().sum::<f64>() / n;
     relative.sort_unstable_by(f64::total_cmp);
-    relative.truncate(pixels.len() - pixels.len() / 1000);
+    relative.truncate(pixels.len() - (n * WORST) as usize);
     let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
     let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
     let total = |image: &[[f32; 3]]| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();

@@ -1,9 +1,11 @@
 //! From points to a curve per run, and its slope.
 
 use super::entry::Metric;
-use super::race::Point;
+use super::point::Point;
 use super::reference::Reference;
-use crate::stat::PowerLaw;
+use crate::image::Errors;
+use crate::stat::{PowerLaw, WORST};
+use std::fmt;
 
 /// A mean over seeds and its standard error, which one seed does not tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,12 +34,22 @@ pub struct Spot {
     pub iterations: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Core-seconds.
+    pub cpu_seconds: f64,
     /// The error without the reference's own.
     pub figure: f64,
     /// Its standard error over seeds.
     pub spread: Option<f64>,
     /// Whether the figure is above the reference's own error, so that it may be reported.
     pub reported: bool,
+    /// Whether fireflies rule the error of all pixels, with some seed at least, see [`fireflies`].
+    pub fireflies: bool,
+}
+
+/// Whether a few bright samples rule a picture's error: the worst 0.5 % of its pixels hold more than half of its
+/// relMSE. Of Gaussian noise as large everywhere they hold 2 to 5 %.
+pub fn fireflies(errors: &Errors) -> bool {
+    (1.0 - WORST) * errors.relmse_trimmed < 0.5 * errors.relmse
 }
 
 /// A run's error against iterations and seconds.
@@ -56,16 +68,18 @@ pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
     if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { a + t * (b - a) }
 }
 
-/// Seconds and figure after so many iterations, between two moments as a power of iterations.
-fn at(curve: &[Spot], iterations: u64) -> Option<(f64, f64)> {
+/// Seconds, core-seconds and figure after so many iterations, between two moments as a power of iterations.
+fn at(curve: &[Spot], iterations: u64) -> Option<[f64; 3]> {
+    let values = |spot: &Spot| [spot.seconds, spot.cpu_seconds, spot.figure];
     let next = curve.iter().position(|spot| spot.iterations >= iterations)?;
     let after = &curve[next];
     let Some(before) = next.checked_sub(1).map(|i| &curve[i]).filter(|_| after.iterations > iterations) else {
-        return (after.iterations == iterations).then_some((after.seconds, after.figure));
+        return (after.iterations == iterations).then_some(values(after));
     };
     let t =
         (iterations as f64 / before.iterations as f64).ln() / (after.iterations as f64 / before.iterations as f64).ln();
-    Some((between(before.seconds, after.seconds, t), between(before.figure, after.figure, t)))
+    let (before, after) = (values(before), values(after));
+    Some(std::array::from_fn(|i| between(before[i], after[i], t)))
 }
 
 /// A fitted exponent.
@@ -81,6 +95,40 @@ pub struct Slope {
     pub points: usize,
 }
 
+/// Why no exponent is fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unfit {
+    /// Fewer than four measurements above the reference's own error in the last decade.
+    Few(usize),
+    /// They span less than a factor of four.
+    Narrow,
+    /// So many of them are ruled by fireflies.
+    Fireflies(usize),
+    /// They do not lie on a line: the exponent's standard error.
+    Scattered(f64),
+    /// Denoised pictures follow no power.
+    Denoised,
+}
+
+impl fmt::Display for Unfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Unfit::Few(n) => write!(f, "{n} measurements are too few"),
+            Unfit::Narrow => write!(f, "the measurements span too little"),
+            Unfit::Fireflies(n) => write!(f, "fireflies rule {n} of the measurements"),
+            Unfit::Scattered(error) => write!(f, "the measurements scatter too much (± {error:.1})"),
+            Unfit::Denoised => write!(f, "denoised pictures follow no power"),
+        }
+    }
+}
+
+/// Least points of a fit.
+const POINTS: usize = 4;
+/// Least ratio of the last to the first of them.
+const SPAN: f64 = 4.0;
+/// Largest standard error of an exponent that says something: half of what lies between the exponents of theory.
+const SCATTER: f64 = 1.0 / 6.0;
+
 /// The axis of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -88,6 +136,8 @@ pub enum Axis {
     Iterations,
     /// Wall-clock seconds.
     Seconds,
+    /// Core-seconds.
+    CoreSeconds,
 }
 
 impl Axis {
@@ -96,20 +146,22 @@ impl Axis {
         match self {
             Axis::Iterations => spot.iterations as f64,
             Axis::Seconds => spot.seconds,
+            Axis::CoreSeconds => spot.cpu_seconds,
         }
     }
 }
 
 impl Curve {
-    /// The curve of a run.
-    pub fn of(run: usize, points: &[Point], metric: Metric, reference: &Reference) -> Curve {
+    /// The curve of a line, by its number.
+    pub fn of(line: usize, points: &[Point], metric: Metric, reference: &Reference) -> Curve {
         let own = reference.error.of(metric).unwrap_or(0.0);
         let mut by_seed: Vec<(u64, Vec<Spot>)> = Vec::new();
-        for point in points.iter().filter(|point| point.run == run) {
+        for point in points.iter().filter(|point| point.line == line) {
             let figure = metric.of(&point.errors) - own;
             let reported = reference.figure(metric, &point.errors).is_some();
-            let Point { iterations, seconds, .. } = *point;
-            let spot = Spot { iterations, seconds, figure, spread: None, reported };
+            let Point { iterations, seconds, cpu_seconds, .. } = *point;
+            let fireflies = metric == Metric::RelMse && fireflies(&point.errors);
+            let spot = Spot { iterations, seconds, cpu_seconds, figure, spread: None, reported, fireflies };
             match by_seed.iter_mut().find(|(seed, _)| *seed == point.seed) {
                 Some((_, spots)) => spots.push(spot),
                 None => by_seed.push((point.seed, vec![spot])),
@@ -125,11 +177,19 @@ impl Curve {
         moments.sort_unstable();
         moments.dedup();
         let mean = |&iterations: &u64| {
-            let all: Vec<(f64, f64)> = by_seed.iter().map(|curve| at(curve, iterations)).collect::<Option<_>>()?;
-            let seconds = Mean::of(&all.iter().map(|spot| spot.0).collect::<Vec<_>>())?.value;
-            let figure = Mean::of(&all.iter().map(|spot| spot.1).collect::<Vec<_>>())?;
-            let reported = figure.value > own && figure.value > 0.0;
-            Some(Spot { iterations, seconds, figure: figure.value, spread: figure.error, reported })
+            let all: Vec<[f64; 3]> = by_seed.iter().map(|curve| at(curve, iterations)).collect::<Option<_>>()?;
+            let mean = |i: usize| Mean::of(&all.iter().map(|spot| spot[i]).collect::<Vec<_>>());
+            let figure = mean(2)?;
+            let here = |spot: &&Spot| spot.iterations == iterations;
+            Some(Spot {
+                iterations,
+                seconds: mean(0)?.value,
+                cpu_seconds: mean(1)?.value,
+                figure: figure.value,
+                spread: figure.error,
+                reported: figure.value > own && figure.value > 0.0,
+                fireflies: by_seed.iter().flatten().filter(here).any(|spot| spot.fireflies),
+            })
         };
         Curve { mean: moments.iter().filter_map(mean).collect(), by_seed, own }
     }
@@ -148,26 +208,33 @@ impl Curve {
         self.mean.last()
     }
 
-    /// The exponent of the error over the last decade of iterations, where there are four moments or more.
-    pub fn slope(&self, axis: Axis) -> Option<Slope> {
-        let last = self.last()?.iterations;
+    /// The exponent of the error over the last decade of iterations, where it means something.
+    ///
+    /// # Errors
+    /// Why it means nothing.
+    pub fn slope(&self, axis: Axis) -> Result<Slope, Unfit> {
+        let last = self.last().ok_or(Unfit::Few(0))?.iterations;
         let decade = |spot: &&Spot| spot.reported && spot.iterations * 10 >= last;
         let fit = |curve: &[Spot]| {
-            let points: Vec<(f64, f64)> =
-                curve.iter().filter(decade).map(|spot| (axis.of(spot), spot.figure)).collect();
-            (points.len() >= 4).then(|| PowerLaw::fit(points.iter().copied()).map(|line| (line, points)))?
+            let spots: Vec<&Spot> = curve.iter().filter(decade).collect();
+            let points: Vec<(f64, f64)> = spots.iter().map(|spot| (axis.of(spot), spot.figure)).collect();
+            let ends = points.first().zip(points.last()).map(|(first, last)| (first.0, last.0));
+            let Some(range) = ends.filter(|_| points.len() >= POINTS) else { return Err(Unfit::Few(points.len())) };
+            let ruled = spots.iter().filter(|spot| spot.fireflies).count();
+            match PowerLaw::fit(points.iter().copied()) {
+                _ if range.1 < SPAN * range.0 => Err(Unfit::Narrow),
+                _ if ruled > 0 => Err(Unfit::Fireflies(ruled)),
+                Some(line) if line.exponent_error <= SCATTER => Ok((line, range, points.len())),
+                Some(line) => Err(Unfit::Scattered(line.exponent_error)),
+                None => Err(Unfit::Narrow),
+            }
         };
-        let (line, points) = fit(&self.mean)?;
+        let (line, range, points) = fit(&self.mean)?;
         let seeds: Vec<f64> =
-            self.by_seed.iter().filter_map(|curve| fit(curve).map(|(line, _)| line.exponent)).collect();
+            self.by_seed.iter().filter_map(|curve| fit(curve).ok().map(|(line, ..)| line.exponent)).collect();
         let exponent = Mean::of(&seeds).filter(|mean| mean.error.is_some() && seeds.len() == self.by_seed.len());
         let single = Mean { value: line.exponent, error: Some(line.exponent_error) };
-        Some(Slope {
-            exponent: exponent.unwrap_or(single),
-            line,
-            range: (points[0].0, points[points.len() - 1].0),
-            points: points.len(),
-        })
+        Ok(Slope { exponent: exponent.unwrap_or(single), line, range, points })
     }
 }
 
@@ -180,9 +247,11 @@ mod tests {
         let spot = |iterations: u64, figure: f64| Spot {
             iterations,
             seconds: 0.5 * iterations as f64,
+            cpu_seconds: iterations as f64,
             figure,
             spread: None,
             reported: true,
+            fireflies: false,
         };
         let power = |factor: f64, moments: &[u64]| moments.iter().map(|&n| spot(n, factor / n as f64)).collect();
         let curve = Curve::from_seeds(vec![power(1.0, &[1, 2, 4, 8]), power(3.0, &[1, 2, 4, 7])], 0.2);
@@ -190,11 +259,44 @@ mod tests {
         assert_eq!(shown.len(), 4);
         assert_eq!((shown[0], shown[2], shown[3].0), ((1, 2.0), (4, 0.5), 7));
         assert!((shown[3].1 - 2.0 / 7.0).abs() < 1e-12 && (curve.mean[3].seconds - 3.5).abs() < 1e-12, "{shown:?}");
+        assert!((curve.mean[3].cpu_seconds - 7.0).abs() < 1e-12);
         assert_eq!(curve.mean[0].spread, Some(1.0));
         let slope = curve.slope(Axis::Seconds).expect("four moments");
         assert!((slope.exponent.value + 1.0).abs() < 1e-12 && slope.exponent.error.is_some_and(|e| e < 1e-12));
         assert_eq!(curve.without_each_seed()[0].mean[3].iterations, 7);
         // Without a figure above the reference's own error there is nothing to fit.
-        assert!(Curve::from_seeds(vec![power(0.1, &[1, 2, 4, 8])], 0.2).slope(Axis::Iterations).is_none());
+        let below = Curve::from_seeds(vec![power(0.1, &[1, 2, 4, 8])], 0.2).slope(Axis::Iterations);
+        assert_eq!(below.err(), Some(Unfit::Few(0)));
+    }
+
+    #[test]
+    fn exponents_that_mean_nothing_are_not_fitted() {
+        let spot = |&(iterations, figure): &(u64, f64)| Spot {
+            iterations,
+            seconds: iterations as f64,
+            cpu_seconds: iterations as f64,
+            figure,
+            spread: None,
+            reported: true,
+            fireflies: figure > 1.0,
+        };
+        let fit = |points: &[(u64, f64)]| {
+            Curve::from_seeds(vec![points.iter().map(spot).collect()], 0.0).slope(Axis::Iterations)
+        };
+        let line = [(10, 1.0), (20, 0.5), (40, 0.25), (80, 0.125)];
+        assert!(fit(&line).is_ok_and(|slope| (slope.exponent.value + 1.0).abs() < 1e-12 && slope.points == 4));
+        assert_eq!(fit(&line[1..]), Err(Unfit::Few(3)));
+        assert_eq!(fit(&[(10, 1.0), (12, 0.8), (14, 0.7), (16, 0.6)]), Err(Unfit::Narrow));
+        assert_eq!(fit(&[(10, 1.0), (20, 1.1), (40, 0.25), (80, 0.125)]), Err(Unfit::Fireflies(1)));
+        assert!(matches!(fit(&[(10, 1.0), (20, 0.1), (40, 0.9), (80, 0.1)]), Err(Unfit::Scattered(_))));
+    }
+
+    /// Equal Gaussian noise is no firefly; one pixel of a thousand that is a hundred times as wrong is.
+    #[test]
+    fn fireflies_are_told_from_noise() {
+        let of = |relmse: f64, relmse_trimmed: f64| {
+            fireflies(&Errors { relmse, relmse_trimmed, mse: 1.0, mean_ratio: None })
+        };
+        assert!(!of(1.0, 0.94 / 0.995) && of(1.0, 0.3) && !of(0.0, 0.0));
     }
 }

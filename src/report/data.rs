@@ -1,7 +1,9 @@
 //! The report as CSV and JSON.
 
-use super::curve::{Mean, Slope, Spot};
-use super::race::{Outcome, Point};
+use super::curve::{Mean, Slope, Spot, Unfit, fireflies};
+use super::entry::Of;
+use super::outcome::Outcome;
+use super::point::Point;
 use super::summary::{Subject, Summary, finite};
 use super::target::Reached;
 use crate::error::{Error, Kind, Result};
@@ -12,7 +14,7 @@ use serde_json::{Value, json};
 #[derive(Serialize)]
 struct Row<'a> {
     run: &'a str,
-    method: &'a str,
+    method: &'static str,
     seed: u64,
     iterations: u64,
     light_paths: u64,
@@ -26,14 +28,15 @@ struct Row<'a> {
     mse: f64,
     mean_ratio: Option<f64>,
     estimated_error: Option<f64>,
+    fireflies: bool,
 }
 
 impl<'a> Row<'a> {
     fn of(subject: &'a Subject, point: &Point) -> Row<'a> {
-        let entry = &subject.entries[point.run];
+        let line = &subject.lines[point.line];
         Row {
-            run: &entry.name,
-            method: entry.settings.method.name(),
+            run: &line.name,
+            method: method(subject, line.of),
             seed: point.seed,
             iterations: point.iterations,
             light_paths: point.light_paths,
@@ -46,7 +49,16 @@ impl<'a> Row<'a> {
             mse: point.errors.mse,
             mean_ratio: point.errors.mean_ratio,
             estimated_error: point.estimate.map(f64::sqrt),
+            fireflies: fireflies(&point.errors),
         }
+    }
+}
+
+/// The method of a curve; another renderer's is its way there.
+fn method(subject: &Subject, of: Of) -> &'static str {
+    match of {
+        Of::Estimate(entry) | Of::Finished(entry) => subject.entries[entry].settings.method.name(),
+        Of::Guest(guest) | Of::Denoised(guest) => subject.guests[guest].mode,
     }
 }
 
@@ -69,19 +81,9 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
         pairs.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect::<Value>()
     };
     let rules = &subject.rules;
-    let runs = subject.entries.iter().enumerate().map(|(run, entry)| {
-        let mut object = entry.object();
-        object["theory"] = summary.theories[run]
-            .map_or(Value::Null, |theory| json!({"exponent": theory.exponent, "because": theory.because}));
-        let [by_iterations, by_seconds] = &summary.slopes[run];
-        object["fit_iterations"] = by_iterations.as_ref().map_or(Value::Null, slope);
-        object["fit_seconds"] = by_seconds.as_ref().map_or(Value::Null, slope);
-        object["curve"] = summary.curves[run].mean.iter().filter(|spot| spot.reported).map(spot).collect();
-        object["overhead"] = json!(summary.overhead[run]);
-        object
-    });
+    let runs = (0..subject.lines.len()).map(|line| run(subject, outcome, summary, line));
     let targets = summary.targets.iter().zip(&summary.reached).map(|(target, reached)| {
-        let answers = subject.entries.iter().zip(reached).map(|(entry, reached)| answer(&entry.name, reached));
+        let answers = subject.lines.iter().zip(reached).map(|(line, reached)| answer(&line.name, reached));
         let of = Some(&target.of).filter(|of| !of.is_empty());
         json!({"error": finite(target.error), "of": of, "runs": answers.collect::<Vec<_>>()})
     });
@@ -110,6 +112,50 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
     })
 }
 
+/// A curve with what made it.
+fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> Value {
+    let of = subject.lines[line].of;
+    let mut object = match of {
+        Of::Estimate(entry) | Of::Finished(entry) => subject.entries[entry].object(),
+        Of::Guest(guest) | Of::Denoised(guest) => peer(subject, outcome, summary, guest),
+    };
+    object["name"] = subject.lines[line].name.as_str().into();
+    object["finish"] = match of {
+        Of::Finished(entry) => json!(subject.entries[entry].finish),
+        Of::Denoised(_) => "Open Image Denoise".into(),
+        _ => Value::Null,
+    };
+    object["theory"] = summary.theories[line]
+        .map_or(Value::Null, |theory| json!({"exponent": theory.exponent, "because": theory.because}));
+    for (name, fit) in ["fit_iterations", "fit_seconds"].into_iter().zip(&summary.slopes[line]) {
+        object[name] = fit.as_ref().map_or(Value::Null, slope);
+    }
+    object["no_fit"] = summary.slopes[line][0].as_ref().err().map(Unfit::to_string).into();
+    object["curve"] = summary.curves[line].mean.iter().filter(|spot| spot.reported).map(spot).collect();
+    if let Of::Estimate(entry) = of {
+        object["overhead"] = json!(summary.overhead[entry]);
+    }
+    object
+}
+
+/// What is known of another renderer.
+fn peer(subject: &Subject, outcome: &Outcome, summary: &Summary, guest: usize) -> Value {
+    let account = &outcome.guests[guest];
+    let startup = Mean::of(&account.startups).map(|mean| mean.value);
+    let likeness = summary.likeness[guest];
+    json!({
+        "renderer": format!("{:?}", subject.guests[guest].renderer).to_lowercase(),
+        "mode": subject.guests[guest].mode,
+        "version": account.version,
+        "startup_seconds": startup,
+        "approximations": account.approximations,
+        "unfinished": account.unfinished,
+        "out": account.out,
+        "mean_ratio": likeness.map(|of| json!({"value": finite(of.ratio), "standard_error": finite(of.error)})),
+        "same_scene": likeness.map(|of| of.is_same()),
+    })
+}
+
 fn mean(mean: &Mean) -> Value {
     json!({"value": finite(mean.value), "standard_error": mean.error.map(finite)})
 }
@@ -125,14 +171,18 @@ fn slope(slope: &Slope) -> Value {
 }
 
 fn spot(spot: &Spot) -> Value {
-    let Spot { iterations, seconds, figure, spread, .. } = *spot;
-    json!({"iterations": iterations, "seconds": seconds, "figure": finite(figure), "standard_error": spread.map(finite)})
+    let Spot { iterations, seconds, cpu_seconds, figure, spread, fireflies, .. } = *spot;
+    json!({
+        "iterations": iterations, "seconds": seconds, "cpu_seconds": cpu_seconds, "figure": finite(figure),
+        "standard_error": spread.map(finite), "fireflies": fireflies,
+    })
 }
 
 fn answer(run: &str, reached: &Reached) -> Value {
     match reached {
-        Reached::After { iterations, seconds, at_once } => json!({
-            "run": run, "reached": true, "iterations": mean(iterations), "seconds": mean(seconds), "upper_bound": at_once,
+        Reached::After { iterations, seconds, core_seconds, at_once } => json!({
+            "run": run, "reached": true, "iterations": mean(iterations), "seconds": mean(seconds),
+            "cpu_seconds": mean(core_seconds), "upper_bound": at_once,
         }),
         Reached::Never(iterations, seconds) => json!({
             "run": run, "reached": false, "ended_after": {"iterations": iterations, "seconds": seconds},

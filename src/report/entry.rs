@@ -1,6 +1,7 @@
-//! What is compared, and the figure it is compared by.
+//! What is compared, the curves that come of it, and the figure it is compared by.
 
 use crate::image::Errors;
+use crate::peers::Peer;
 use crate::render::{Settings, Spent};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -29,7 +30,6 @@ impl Entry {
             "options": self.options,
             "method": method.name(),
             "levels": levels.count,
-            "finish": self.finish,
             "max_depth": (max_depth < u32::MAX).then_some(max_depth),
         });
         if method.counts_photons() {
@@ -43,6 +43,56 @@ impl Entry {
     }
 }
 
+/// A curve of the report.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// What the report calls it.
+    pub name: String,
+    /// What its pictures are.
+    pub of: Of,
+}
+
+/// What the pictures of a curve are; entries and guests by number, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// The estimate of an entry, as the method leaves it.
+    Estimate(usize),
+    /// The picture that is finished from it.
+    Finished(usize),
+    /// Another renderer's picture.
+    Guest(usize),
+    /// The same, denoised.
+    Denoised(usize),
+}
+
+impl Of {
+    /// Whether it is ours: such curves know iterations, others samples per pixel.
+    pub fn is_ours(self) -> bool {
+        matches!(self, Of::Estimate(_) | Of::Finished(_))
+    }
+
+    /// Whether it is what a renderer makes, before any denoiser.
+    pub fn is_raw(self) -> bool {
+        matches!(self, Of::Estimate(_) | Of::Guest(_))
+    }
+}
+
+/// The curves of entries and guests: each as it is, then as it is finished, where it is.
+pub fn lines(entries: &[Entry], guests: &[Peer], denoised: bool) -> Vec<Line> {
+    let two = |name: &str, of: Of, and: Option<(&str, Of)>| {
+        let more = and.map(|(suffix, of)| Line { name: format!("{name}{suffix}"), of });
+        std::iter::once(Line { name: name.into(), of }).chain(more)
+    };
+    let ours = entries.iter().enumerate().flat_map(|(i, entry)| {
+        two(&entry.name, Of::Estimate(i), entry.finish.as_ref().map(|_| (", finished", Of::Finished(i))))
+    });
+    let theirs = guests
+        .iter()
+        .enumerate()
+        .flat_map(|(i, guest)| two(guest.name, Of::Guest(i), denoised.then_some((" + OIDN", Of::Denoised(i)))));
+    ours.chain(theirs).collect()
+}
+
 /// The figure that curves, targets and fits are about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -50,7 +100,7 @@ pub enum Metric {
     /// Mean relative squared error.
     #[default]
     RelMse,
-    /// The same without the worst 0.1 % of pixels.
+    /// The same without the worst 0.5 % of pixels.
     #[serde(rename = "relmse_trimmed")]
     RelMseTrimmed,
     /// Mean squared error.
@@ -62,7 +112,7 @@ impl Metric {
     pub fn name(self) -> &'static str {
         match self {
             Metric::RelMse => "relMSE",
-            Metric::RelMseTrimmed => "trimmed relMSE",
+            Metric::RelMseTrimmed => "relMSE, trimmed",
             Metric::Mse => "MSE",
         }
     }

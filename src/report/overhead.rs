@@ -1,7 +1,7 @@
 //! What an iteration costs and of what, and what levels and finish add, as Table 2 of \[post-reconstruction 2021\].
 
 use super::entry::Entry;
-use super::race::Ending;
+use super::point::Ending;
 use crate::render::Phases;
 use serde::Serialize;
 

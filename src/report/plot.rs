@@ -1,6 +1,7 @@
 //! The plots: error against iterations and against seconds, both axes logarithmic, as SVG.
 
-use super::curve::{Axis, Spot};
+use super::curve::{Axis, Curve, Spot};
+use super::entry::{Metric, Of};
 use super::number::{minus, plain};
 use super::summary::{Subject, Summary};
 use crate::error::{Error, Kind, Result};
@@ -11,7 +12,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// Width and height of a plot.
 const SIZE: (u32, u32) = (860, 520);
 /// Room on the right for the runs' names.
-const NAMES: i32 = 170;
+const NAMES: i32 = 190;
 /// Most ticks on an axis.
 const TICKS: usize = 12;
 /// Least distance of two names.
@@ -26,9 +27,17 @@ const FAINT: RGBColor = RGBColor(228, 228, 228);
 pub const COLOURS: [(u8, u8, u8); 7] =
     [(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (0, 0, 0)];
 
-/// The colour of a run.
-pub fn colour(run: usize) -> (u8, u8, u8) {
-    COLOURS[run % COLOURS.len()]
+/// The colour of a curve: an entry's or a guest's, whatever is made of its pictures.
+pub fn colour(subject: &Subject, line: usize) -> (u8, u8, u8) {
+    COLOURS[number(subject, line) % COLOURS.len()]
+}
+
+/// The number of an entry, or of a guest after them.
+fn number(subject: &Subject, line: usize) -> usize {
+    match subject.lines[line].of {
+        Of::Estimate(entry) | Of::Finished(entry) => entry,
+        Of::Guest(guest) | Of::Denoised(guest) => subject.entries.len() + guest,
+    }
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
@@ -36,16 +45,36 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 type Log = WithKeyPoints<LogCoord<f64>>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Log, Log>>;
 
-/// Error against an axis; `None` where no run has a figure to show.
+/// What is drawn.
+struct Picture<'a> {
+    subject: &'a Subject,
+    summary: &'a Summary,
+    metric: Metric,
+    axis: Axis,
+    /// What is reported, by line.
+    curves: Vec<Vec<Spot>>,
+}
+
+/// Error in a metric against an axis; `None` where no curve has a figure to show. Samples of other renderers are no
+/// iterations: against these there are ours alone.
 ///
 /// # Errors
 /// None that memory would not have.
-pub fn svg(subject: &Subject, summary: &Summary, axis: Axis) -> Result<Option<String>> {
-    let shown = |run: usize| summary.curves[run].mean.iter().filter(|spot| spot.reported).copied().collect();
-    let curves: Vec<Vec<Spot>> = (0..summary.curves.len()).map(shown).collect();
+pub fn svg(
+    subject: &Subject,
+    summary: &Summary,
+    metric: Metric,
+    curves: &[Curve],
+    axis: Axis,
+) -> Result<Option<String>> {
+    let shown = |(line, curve): (usize, &Curve)| -> Vec<Spot> {
+        let counts = axis != Axis::Iterations || subject.lines[line].of.is_ours();
+        curve.mean.iter().filter(|spot| counts && spot.reported).copied().collect()
+    };
+    let curves: Vec<Vec<Spot>> = curves.iter().enumerate().map(shown).collect();
     let Some((across, up)) = ranges(&curves, axis) else { return Ok(None) };
     let mut text = String::new();
-    let drawn = draw(&mut text, subject, summary, &curves, axis, (across, up));
+    let drawn = draw(&mut text, &Picture { subject, summary, metric, axis, curves }, (across, up));
     drawn.map_err(|cause| Error::new(Kind::Image, "plot", cause))?;
     Ok(Some(text))
 }
@@ -78,10 +107,7 @@ fn log(low: f64, high: f64) -> Log {
 
 fn draw(
     text: &mut String,
-    subject: &Subject,
-    summary: &Summary,
-    curves: &[Vec<Spot>],
-    axis: Axis,
+    picture: &Picture<'_>,
     ((left, right), (low, high)): ((f64, f64), (f64, f64)),
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let root: Area<'_> = SVGBackend::with_string(text, SIZE).into_drawing_area();
@@ -94,8 +120,12 @@ fn draw(
         .build_cartesian_2d(log(left, right), log(low, high))?;
     chart
         .configure_mesh()
-        .x_desc(if axis == Axis::Iterations { "iterations" } else { "seconds (wall clock)" })
-        .y_desc(subject.metric.name())
+        .x_desc(match picture.axis {
+            Axis::Iterations => "iterations",
+            Axis::Seconds => "seconds (wall clock)",
+            Axis::CoreSeconds => "core-seconds",
+        })
+        .y_desc(picture.metric.name())
         .x_label_formatter(&|x| minus(&plain(*x)))
         .y_label_formatter(&|y| minus(&plain(*y)))
         .x_labels(TICKS)
@@ -106,52 +136,57 @@ fn draw(
         .label_style((FONT, 15).into_font().color(&INK))
         .axis_desc_style((FONT, 16).into_font().color(&INK))
         .draw()?;
-    floor(&mut chart, subject, (left, right), low)?;
-    if axis == Axis::Iterations {
-        guides(&mut chart, summary, (left, right), (low, high))?;
+    floor(&mut chart, picture, (left, right), low)?;
+    guides(&mut chart, picture)?;
+    for line in 0..picture.curves.len() {
+        series(&mut chart, picture, line)?;
     }
-    for (run, curve) in curves.iter().enumerate() {
-        series(&mut chart, run, curve, axis)?;
-    }
-    names(&root, &chart, subject, curves, axis)?;
+    names(&root, &chart, picture)?;
     root.present()?;
     Ok(())
 }
 
-/// A run's line, markers and, with several seeds, bars of one standard error.
+/// A curve's line, markers and, with several seeds, bars of one standard error. Finished and denoised pictures have
+/// dashes and hollow markers; measurements that fireflies rule are crossed out.
 fn series(
     chart: &mut Chart<'_, '_>,
-    run: usize,
-    curve: &[Spot],
-    axis: Axis,
+    picture: &Picture<'_>,
+    line: usize,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let (r, g, b) = colour(run);
-    let ink = RGBColor(r, g, b);
-    let points: Vec<(f64, f64)> = curve.iter().map(|spot| (axis.of(spot), spot.figure)).collect();
-    chart.draw_series(LineSeries::new(points.iter().copied(), ink.stroke_width(2)))?;
+    let (r, g, b) = colour(picture.subject, line);
+    let (ink, of, curve) = (RGBColor(r, g, b), picture.subject.lines[line].of, &picture.curves[line]);
+    let points: Vec<(f64, f64)> = curve.iter().map(|spot| (picture.axis.of(spot), spot.figure)).collect();
+    let thick = ink.stroke_width(2);
+    match of.is_raw() {
+        true => chart.draw_series(LineSeries::new(points.iter().copied(), thick)).map(drop)?,
+        false => chart.draw_series(DashedLineSeries::new(points.iter().copied(), 6, 4, thick)).map(drop)?,
+    }
     let bar = |spot: &Spot| {
         let spread = spot.spread?;
-        let (x, low) = (axis.of(spot), (spot.figure - spread).max(0.1 * spot.figure));
+        let (x, low) = (picture.axis.of(spot), (spot.figure - spread).max(0.1 * spot.figure));
         Some(PathElement::new(vec![(x, low), (x, spot.figure + spread)], ink.stroke_width(1)))
     };
     chart.draw_series(curve.iter().filter_map(bar))?;
-    // Beyond seven runs colours come again, with other markers.
-    if run < COLOURS.len() {
-        chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, ink.filled())))?;
+    let fill = if of.is_raw() { ink.filled() } else { ink.stroke_width(1) };
+    // Beyond seven colours they come again, with other markers.
+    if number(picture.subject, line) < COLOURS.len() {
+        chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, fill)))?;
     } else {
-        chart.draw_series(points.iter().map(|&point| TriangleMarker::new(point, 5, ink.filled())))?;
+        chart.draw_series(points.iter().map(|&point| TriangleMarker::new(point, 5, fill)))?;
     }
+    let ruled = curve.iter().filter(|spot| spot.fireflies).map(|spot| (picture.axis.of(spot), spot.figure));
+    chart.draw_series(ruled.map(|point| Cross::new(point, 6, INK.stroke_width(1))))?;
     Ok(())
 }
 
 /// The reference's own error, if that is near what is shown.
 fn floor(
     chart: &mut Chart<'_, '_>,
-    subject: &Subject,
+    picture: &Picture<'_>,
     (left, right): (f64, f64),
     low: f64,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let Some(own) = subject.reference.error.of(subject.metric).filter(|own| *own > low) else { return Ok(()) };
+    let Some(own) = picture.subject.reference.error.of(picture.metric).filter(|own| *own > low) else { return Ok(()) };
     let ends = [(left, own), (right, own)];
     chart.draw_series(LineSeries::new(ends, GREY.stroke_width(1)))?;
     let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
@@ -159,26 +194,33 @@ fn floor(
     Ok(())
 }
 
-/// Thin lines with the exponents of theory, through the left upper corner.
-fn guides(
-    chart: &mut Chart<'_, '_>,
-    summary: &Summary,
-    (left, right): (f64, f64),
-    (low, high): (f64, f64),
-) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let mut exponents: Vec<f64> =
-        summary.theories.iter().flatten().map(|theory| theory.exponent).filter(|e| *e < 0.0).collect();
-    exponents.sort_by(f64::total_cmp);
-    exponents.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
-    for exponent in exponents {
-        // Where it leaves the plot, below or on the right.
-        let end = right.min(left * (low / high).powf(1.0 / exponent));
-        let at = |x: f64| high * (x / left).powf(exponent);
-        chart.draw_series(LineSeries::new([(left, high), (end, at(end))], GUIDE.stroke_width(1)))?;
-        let place = left * (end / left).powf(0.86);
-        let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
-        let name = format!(" N^{}", minus(&nice(exponent)));
-        chart.draw_series([Text::new(name, (place, at(place)), style)])?;
+/// How far below the data a line of theory runs.
+const BELOW: f64 = 0.7;
+
+/// Thin lines with the exponents of theory against iterations, each below the last decade of the first curve that it is
+/// about.
+fn guides(chart: &mut Chart<'_, '_>, picture: &Picture<'_>) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    if picture.axis != Axis::Iterations {
+        return Ok(());
+    }
+    let mut drawn: Vec<f64> = Vec::new();
+    for (theory, curve) in picture.summary.theories.iter().zip(&picture.curves) {
+        let Some(exponent) = theory.map(|theory| theory.exponent).filter(|exponent| *exponent < 0.0) else { continue };
+        let Some(last) = curve.last().map(|spot| spot.iterations as f64) else { continue };
+        let decade: Vec<&Spot> = curve.iter().filter(|spot| 10.0 * spot.iterations as f64 >= last).collect();
+        let first = decade[0].iterations as f64;
+        if drawn.iter().any(|other| (other - exponent).abs() < 1e-6) || first == last {
+            continue;
+        }
+        drawn.push(exponent);
+        // Below the lowest of the points, so that it crosses none.
+        let height = |spot: &&Spot| spot.figure / (spot.iterations as f64).powf(exponent);
+        let lowest = BELOW * decade.iter().map(height).fold(f64::INFINITY, f64::min);
+        let at = |x: f64| (x, lowest * x.powf(exponent));
+        chart.draw_series(LineSeries::new([at(first), at(last)], GUIDE.stroke_width(2)))?;
+        let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Right, VPos::Top));
+        let name = format!("N^{} ", minus(&nice(exponent)));
+        chart.draw_series([Text::new(name, at((first * last).sqrt()), style)])?;
     }
     Ok(())
 }
@@ -192,20 +234,18 @@ fn nice(exponent: f64) -> String {
     format!("{exponent}")
 }
 
-/// Every run's name beside the end of its line, moved apart where they would overlap.
+/// Every curve's name beside the end of its line, moved apart where they would overlap.
 fn names(
     root: &Area<'_>,
     chart: &Chart<'_, '_>,
-    subject: &Subject,
-    curves: &[Vec<Spot>],
-    axis: Axis,
+    picture: &Picture<'_>,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let end = |(run, curve): (usize, &Vec<Spot>)| {
+    let end = |(line, curve): (usize, &Vec<Spot>)| {
         let spot = curve.last()?;
-        let (x, y) = chart.backend_coord(&(axis.of(spot), spot.figure));
-        Some((run, x, y))
+        let (x, y) = chart.backend_coord(&(picture.axis.of(spot), spot.figure));
+        Some((line, x, y))
     };
-    let mut ends: Vec<(usize, i32, i32)> = curves.iter().enumerate().filter_map(end).collect();
+    let mut ends: Vec<(usize, i32, i32)> = picture.curves.iter().enumerate().filter_map(end).collect();
     ends.sort_by_key(|end| end.2);
     let mut places: Vec<i32> = ends.iter().map(|end| end.2).collect();
     for i in 1..places.len() {
@@ -217,20 +257,20 @@ fn names(
         places[i] = places[i].min(below);
     }
     let margin = SIZE.0 as i32 - NAMES + 10;
-    for ((run, x, y), place) in ends.into_iter().zip(places) {
-        let (r, g, b) = colour(run);
+    for ((line, x, y), place) in ends.into_iter().zip(places) {
+        let (r, g, b) = colour(picture.subject, line);
         let ink = RGBColor(r, g, b);
         let leader = vec![(x + 5, y), (margin - 4, place)];
         root.draw(&PathElement::new(leader, ink.mix(0.35).stroke_width(1)))?;
         let style = (FONT, 15).into_font().color(&ink).pos(Pos::new(HPos::Left, VPos::Center));
-        root.draw(&Text::new(clip(&subject.entries[run].name), (margin, place), style))?;
+        root.draw(&Text::new(clip(&picture.subject.lines[line].name), (margin, place), style))?;
     }
     Ok(())
 }
 
 /// A name that fits beside the plot; the page's tables have it whole.
 fn clip(name: &str) -> String {
-    const MOST: usize = 21;
+    const MOST: usize = 25;
     if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
 }
 
@@ -242,6 +282,6 @@ mod tests {
     fn exponents_and_names_are_short() {
         assert_eq!([-1.0, -2.0 / 3.0, -0.5].map(nice), ["-1", "-2/3", "-0.5"]);
         assert_eq!(clip("sppm"), "sppm");
-        assert_eq!(clip(&"x".repeat(40)).chars().count(), 21);
+        assert_eq!(clip(&"x".repeat(40)).chars().count(), 25);
     }
 }

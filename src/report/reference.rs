@@ -21,7 +21,7 @@ use std::path::Path;
 pub struct OwnError {
     /// Mean relative squared error.
     pub relmse: Option<f64>,
-    /// The same without the worst 0.1 % of pixels.
+    /// The same without the worst 0.5 % of pixels.
     pub relmse_trimmed: Option<f64>,
     /// Mean squared error.
     pub mse: Option<f64>,

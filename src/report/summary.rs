@@ -1,16 +1,22 @@
 //! A race with all that is told from it: what [`data`](super::data), [`plot`](super::plot) and [`page`](super::page)
 //! write down.
 
-use super::crop::{self, Look, Window};
-use super::curve::{Axis, Curve, Slope};
-use super::entry::{Entry, Metric};
+use super::crop::{Look, Window};
+use super::curve::{Axis, Curve, Slope, Unfit};
+use super::entry::{Entry, Line, Metric, Of};
+use super::outcome::Outcome;
 use super::overhead::{self, Overhead};
-use super::race::{Outcome, Point, Rules};
+use super::point::Point;
+use super::race::Rules;
 use super::reference::Reference;
+use super::strips;
 use super::target::{self, Reached, Target};
 use super::theory::{Theory, theory};
-use crate::error::Result;
+use crate::error;
+use crate::peers::Peer;
 use serde_json::Value;
+
+pub use super::strips::{Shown, Strip};
 
 /// What was compared and how.
 pub struct Subject {
@@ -18,8 +24,12 @@ pub struct Subject {
     pub scene: String,
     /// Size of the picture.
     pub size: (u32, u32),
-    /// The entries.
+    /// Ours.
     pub entries: Vec<Entry>,
+    /// Other renderers.
+    pub guests: Vec<Peer>,
+    /// The curves.
+    pub lines: Vec<Line>,
     /// Seeds, moments, ends.
     pub rules: Rules,
     /// The figure of curves, targets and fits.
@@ -32,40 +42,49 @@ pub struct Subject {
     pub settings: Vec<(String, String)>,
 }
 
-/// A picture of the report as PNG, with what stands below it.
-pub struct Shown {
-    /// The run's name, or the reference's.
-    pub name: String,
-    /// Iterations, seconds, error; empty for the reference.
-    pub caption: String,
-    /// A PNG per window.
-    pub pictures: Vec<Vec<u8>>,
-    /// A heat map per window; none for the reference.
-    pub heat_maps: Vec<Vec<u8>>,
+/// How a guest's picture compares with the reference as a whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Likeness {
+    /// The mean of its longest renders over the reference's.
+    pub ratio: f64,
+    /// Its standard error, taking errors of pixels for independent.
+    pub error: f64,
 }
 
-/// Crops of all runs at moments that have something in common.
-pub struct Strip {
-    /// What it is.
-    pub title: String,
-    /// The runs.
-    pub runs: Vec<Shown>,
-    /// The relative error that is palest in the heat maps.
-    pub largest: f64,
+/// A ratio of means that is so near to one is of the same scene.
+const SAME: f64 = 0.01;
+
+impl Likeness {
+    /// Whether it is one within a hundredth and twice the noise.
+    pub fn is_same(&self) -> bool {
+        (self.ratio - 1.0).abs() <= SAME + 2.0 * self.error
+    }
+}
+
+/// Curves in a metric.
+pub struct Figure {
+    /// The metric.
+    pub metric: Metric,
+    /// A curve per line.
+    pub curves: Vec<Curve>,
 }
 
 /// Everything that is told.
 pub struct Summary {
-    /// A curve per entry.
+    /// A curve per line.
     pub curves: Vec<Curve>,
-    /// Fitted exponents per entry, by iterations and by seconds.
-    pub slopes: Vec<[Option<Slope>; 2]>,
-    /// What theory says, per entry.
+    /// The same in the metric beside: trimmed, or of all pixels where the report's is trimmed itself.
+    pub beside: Figure,
+    /// Fitted exponents per line, by iterations and by seconds.
+    pub slopes: Vec<[Result<Slope, Unfit>; 2]>,
+    /// What theory says, per line.
     pub theories: Vec<Option<Theory>>,
     /// Errors to reach.
     pub targets: Vec<Target>,
-    /// Per target and entry.
+    /// Per target and line.
     pub reached: Vec<Vec<Reached>>,
+    /// Per guest, of those that have made a picture.
+    pub likeness: Vec<Option<Likeness>>,
     /// Per entry.
     pub overhead: Vec<Option<Overhead>>,
     /// Parts of the picture that are shown.
@@ -82,7 +101,7 @@ pub struct Summary {
 pub struct Wishes {
     /// Targets that were asked for; the usual ones otherwise.
     pub targets: Vec<f64>,
-    /// More targets: the error of a run (from 0) after so many iterations.
+    /// More targets: the error of an entry's estimate (from 0) after so many iterations.
     pub targets_of: Vec<(usize, u64)>,
     /// Windows to show; where runs differ most otherwise.
     pub windows: Vec<Window>,
@@ -96,16 +115,21 @@ pub struct Wishes {
 ///
 /// # Errors
 /// Pictures that cannot be read again.
-pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> Result<Summary> {
-    let Subject { entries, metric, reference, .. } = subject;
+pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> error::Result<Summary> {
+    let Subject { entries, lines, metric, reference, .. } = subject;
     let own = reference.error.of(*metric).unwrap_or(0.0);
-    let curves: Vec<Curve> =
-        (0..entries.len()).map(|run| Curve::of(run, &outcome.points, *metric, reference)).collect();
+    let curves_in = |metric: Metric| -> Vec<Curve> {
+        (0..lines.len()).map(|line| Curve::of(line, &outcome.points, metric, reference)).collect()
+    };
+    let curves = curves_in(*metric);
+    let other = if *metric == Metric::RelMseTrimmed { Metric::RelMse } else { Metric::RelMseTrimmed };
+    let beside = Figure { metric: other, curves: curves_in(other) };
     let mut notes = wishes.notes.clone();
     let mut targets: Vec<Target> = wishes.targets.iter().map(|&error| Target { error, of: String::new() }).collect();
     for &(run, iterations) in &wishes.targets_of {
         let name = &entries[run].name;
-        match curves[run].mean.iter().find(|spot| spot.iterations == iterations) {
+        let line = lines.iter().position(|line| line.of == Of::Estimate(run)).unwrap_or_default();
+        match curves[line].mean.iter().find(|spot| spot.iterations == iterations) {
             Some(spot) => {
                 targets.push(Target {
                     error: spot.figure,
@@ -126,15 +150,26 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> R
             outcome.points.len()
         ));
     }
+    let ruled = curves.iter().filter(|curve| curve.last().is_some_and(|spot| spot.fireflies)).count();
+    if ruled > 0 {
+        notes.push(format!(
+            "Fireflies rule the last measurement of {ruled} of {} curves: the worst 0.5 % of the pixels hold more than \
+             half of relMSE. Such figures change from seed to seed; trimmed ones leave these pixels out.",
+            curves.len()
+        ));
+    }
     notes.extend(outcome.failures.iter().map(|error| format!("A run ended early: {error}.")));
     if outcome.interrupted {
         notes.push("The comparison was stopped before its end; this is what was done.".into());
     }
-    let (windows, whole, strips) = pictures(subject, outcome, wishes, &curves)?;
+    let (windows, whole, strips) =
+        strips::pictures((*metric, reference), outcome, (&wishes.windows, wishes.look), &curves)?;
     Ok(Summary {
-        slopes: curves.iter().map(|curve| [Axis::Iterations, Axis::Seconds].map(|axis| curve.slope(axis))).collect(),
-        theories: entries.iter().map(|entry| theory(&entry.settings)).collect(),
+        slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.of, curve)).collect(),
+        theories: lines.iter().map(|line| theory_of(line.of, entries)).collect(),
+        likeness: (0..subject.guests.len()).map(|guest| likeness(guest, subject, outcome)).collect(),
         curves,
+        beside,
         targets,
         reached,
         overhead: overhead::table(entries, &outcome.endings),
@@ -145,108 +180,33 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> R
     })
 }
 
-/// The points of a run whose pictures are kept.
-fn kept(points: &[Point], run: usize) -> impl Iterator<Item = &Point> {
-    points.iter().filter(move |point| point.run == run && point.picture.is_some())
+/// The exponents of a curve.
+fn slopes(of: Of, curve: &Curve) -> [Result<Slope, Unfit>; 2] {
+    [Axis::Iterations, Axis::Seconds].map(|axis| if of.is_raw() { curve.slope(axis) } else { Err(Unfit::Denoised) })
 }
 
-/// Where runs are beside each other: at about the same time, and at about the same error.
-struct Meeting {
-    time: f64,
-    error: f64,
-    at_time: Vec<Point>,
-    at_error: Vec<Point>,
-}
-
-impl Meeting {
-    fn of(runs: usize, outcome: &Outcome, metric: &Metric) -> Meeting {
-        let raw = |point: &Point| metric.of(&point.errors);
-        // The time that all runs have.
-        let last = |run: usize| kept(&outcome.points, run).last();
-        let ends: Vec<&Point> = (0..runs).filter_map(last).collect();
-        let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
-        // Of the errors that runs end with the one that most runs pass, and of several the smallest.
-        let passes = |error: f64, run: usize| {
-            let errors = || kept(&outcome.points, run).map(raw);
-            errors().any(|e| e >= error) && errors().any(|e| e <= error)
-        };
-        let count = |error: f64| (0..runs).filter(|&run| passes(error, run)).count();
-        let mut finals: Vec<f64> = ends.iter().map(|p| raw(p)).collect();
-        finals.sort_by(f64::total_cmp);
-        let error = finals.iter().rev().copied().max_by_key(|&error| count(error)).unwrap_or(0.0);
-        let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
-            let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
-            (0..runs).filter_map(of_run).collect()
-        };
-        let at_time = nearest(&|p| (p.seconds / time).ln().abs());
-        let at_error = nearest(&|p| (raw(p) / error).ln().abs());
-        Meeting { time, error, at_time, at_error }
+/// What theory says of a curve.
+fn theory_of(of: Of, entries: &[Entry]) -> Option<Theory> {
+    match of {
+        Of::Estimate(entry) => theory(&entries[entry].settings),
+        _ => None,
     }
 }
 
-/// The windows, the reference, and the crops.
-fn pictures(
-    subject: &Subject,
-    outcome: &mut Outcome,
-    wishes: &Wishes,
-    curves: &[Curve],
-) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
-    let Subject { entries, metric, reference, .. } = subject;
-    let (width, height) = (reference.width, reference.height);
-    let Meeting { time, error, at_time, at_error } = Meeting::of(entries.len(), outcome, metric);
-    let mut load = |points: &[Point]| -> Result<Vec<Vec<[f32; 3]>>> {
-        points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
-    };
-    let (timed, equal) = (load(&at_time)?, load(&at_error)?);
-    let mut windows = wishes.windows.clone();
-    if windows.is_empty() && !timed.is_empty() {
-        windows = crop::choose(&timed, &reference.picture, (width, height), 2);
-    }
-    let strip = |title: String, points: &[Point], pictures: &[Vec<[f32; 3]>]| -> Result<Strip> {
-        let largest = crop::scale(pictures, &reference.picture, width, &windows);
-        let shown = |(point, picture): (&Point, &Vec<[f32; 3]>)| -> Result<Shown> {
-            let spot = curves[point.run]
-                .by_seed
-                .first()
-                .and_then(|curve| curve.iter().find(|spot| spot.iterations == point.iterations && spot.reported));
-            let figure = spot.map_or("below the reference's error".into(), |spot| {
-                format!("{} {}", metric.name(), super::number::short(spot.figure))
-            });
-            let seconds = super::number::short(point.seconds);
-            Ok(Shown {
-                name: entries[point.run].name.clone(),
-                caption: format!("{}, {seconds} s, {figure}", super::number::iterations(point.iterations)),
-                pictures: windows
-                    .iter()
-                    .map(|w| crop::picture(picture, width, *w, wishes.look))
-                    .collect::<Result<_>>()?,
-                heat_maps: windows
-                    .iter()
-                    .map(|w| crop::heat_map(picture, &reference.picture, width, *w, largest))
-                    .collect::<Result<_>>()?,
-            })
-        };
-        Ok(Strip { title, runs: points.iter().zip(pictures).map(shown).collect::<Result<_>>()?, largest })
-    };
-    let mut strips = Vec::new();
-    if !timed.is_empty() {
-        strips.push(strip(format!("At equal time: about {} s", super::number::short(time)), &at_time, &timed)?);
-        let own = reference.error.of(*metric).unwrap_or(0.0);
-        let title = format!("At equal error: {} about {}", metric.name(), super::number::short((error - own).max(0.0)));
-        strips.push(strip(title, &at_error, &equal)?);
-    }
-    let mut parts = vec![Window::whole(width, height)];
-    parts.extend(&windows);
-    let truth = Shown {
-        name: "reference".into(),
-        caption: String::new(),
-        pictures: parts
-            .into_iter()
-            .map(|part| crop::picture(&reference.picture, width, part, wishes.look))
-            .collect::<Result<_>>()?,
-        heat_maps: Vec::new(),
-    };
-    Ok((windows, truth, strips))
+/// A guest's mean over the reference's: of its longest render with every seed.
+fn likeness(guest: usize, subject: &Subject, outcome: &Outcome) -> Option<Likeness> {
+    let Subject { lines, reference, rules, .. } = subject;
+    let line = lines.iter().position(|line| line.of == Of::Guest(guest))?;
+    let last = |seed: &u64| outcome.points.iter().rfind(|point| point.line == line && point.seed == *seed);
+    let ends: Vec<&Point> = rules.seeds.iter().filter_map(last).collect();
+    let ratios: Option<Vec<f64>> = ends.iter().map(|point| point.errors.mean_ratio).collect();
+    let ratios = ratios.filter(|ratios| !ratios.is_empty())?;
+    let n = ratios.len() as f64;
+    let values = reference.picture.iter().flatten().map(|v| f64::from(*v)).filter(|v| v.is_finite());
+    let mean = values.sum::<f64>() / (3.0 * reference.picture.len() as f64);
+    let squares = ends.iter().map(|point| point.errors.mse).sum::<f64>() / n;
+    let error = (squares / reference.picture.len() as f64 / n).sqrt() / mean;
+    Some(Likeness { ratio: ratios.iter().sum::<f64>() / n, error })
 }
 
 /// The run of a name.

@@ -1,6 +1,6 @@
 //! Time to target: iterations and seconds until a run's error has fallen to a given one, as Table 1 of \[CPPM 2020\].
 
-use super::curve::{Curve, Mean, between};
+use super::curve::{Curve, Mean, Spot, between};
 
 /// An error to reach, and why this one.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +20,8 @@ pub enum Reached {
         iterations: Mean,
         /// Seconds, interpolated.
         seconds: Mean,
+        /// Core-seconds, interpolated.
+        core_seconds: Mean,
         /// Whether the first measurement was below already, so that these are upper bounds.
         at_once: bool,
     },
@@ -31,19 +33,20 @@ pub enum Reached {
     Unknown,
 }
 
-/// From where on a curve stays at or below `target`: iterations, seconds, and whether it always was. Between two
-/// moments the error is a power of each.
-pub fn fall(curve: &Curve, target: f64) -> Option<(f64, f64, bool)> {
+/// From where on a curve stays at or below `target`: iterations, seconds, core-seconds, and whether it always was.
+/// Between two moments the error is a power of each.
+pub fn fall(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
+    let place = |spot: &Spot| [spot.iterations as f64, spot.seconds, spot.cpu_seconds];
     let spots = &curve.mean;
     let Some(last_above) = spots.iter().rposition(|spot| spot.figure > target) else {
-        return spots.first().map(|first| (first.iterations as f64, first.seconds, true));
+        return spots.first().map(|first| (place(first), true));
     };
     let (before, after) = (&spots[last_above], spots.get(last_above + 1)?);
     // What is below the reference's own error is not known.
     let [high, low] = [before.figure, after.figure].map(|figure| figure.max(curve.own));
     let t = if low > 0.0 && high > low { (high / target).ln() / (high / low).ln() } else { 1.0 };
-    let iterations = between(before.iterations as f64, after.iterations as f64, t);
-    Some((iterations, between(before.seconds, after.seconds, t), false))
+    let (before, after) = (place(before), place(after));
+    Some((std::array::from_fn(|i| between(before[i], after[i], t)), false))
 }
 
 /// When a run reaches a target: of the mean curve, with the jackknife's standard error, for which each seed is left out
@@ -52,22 +55,19 @@ pub fn reach(curve: &Curve, target: f64) -> Reached {
     if target <= curve.own {
         return Reached::BelowReference;
     }
-    let Some((iterations, seconds, at_once)) = fall(curve, target) else {
+    let Some((place, at_once)) = fall(curve, target) else {
         return curve.last().map_or(Reached::Unknown, |end| Reached::Never(end.iterations, end.seconds));
     };
     let without: Vec<Curve> = curve.without_each_seed();
-    let others: Vec<(f64, f64, bool)> = without.iter().filter_map(|curve| fall(curve, target)).collect();
-    let jackknife = |get: fn(&(f64, f64, bool)) -> f64| {
+    let others: Vec<[f64; 3]> = without.iter().filter_map(|curve| Some(fall(curve, target)?.0)).collect();
+    let jackknife = |i: usize| {
         let n = others.len() as f64;
-        let mean = others.iter().map(get).sum::<f64>() / n;
-        let squares: f64 = others.iter().map(|other| (get(other) - mean).powi(2)).sum();
+        let mean = others.iter().map(|other| other[i]).sum::<f64>() / n;
+        let squares: f64 = others.iter().map(|other| (other[i] - mean).powi(2)).sum();
         (n > 1.0 && others.len() == curve.by_seed.len()).then(|| (squares * (n - 1.0) / n).sqrt())
     };
-    Reached::After {
-        iterations: Mean { value: iterations, error: jackknife(|other| other.0) },
-        seconds: Mean { value: seconds, error: jackknife(|other| other.1) },
-        at_once,
-    }
+    let [iterations, seconds, core_seconds] = std::array::from_fn(|i| Mean { value: place[i], error: jackknife(i) });
+    Reached::After { iterations, seconds, core_seconds, at_once }
 }
 
 /// Targets where none are asked for: at most four errors of 1, 2, 5 times a power of ten, the smallest that two runs
@@ -87,15 +87,15 @@ pub fn usual(curves: &[Curve], own: f64) -> Vec<Target> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::curve::Spot;
-
     fn spots(figures: &[(u64, f64, f64)]) -> Vec<Spot> {
         let spot = |&(iterations, seconds, figure): &(u64, f64, f64)| Spot {
             iterations,
             seconds,
+            cpu_seconds: 2.0 * seconds,
             figure,
             spread: None,
             reported: true,
+            fireflies: false,
         };
         figures.iter().map(spot).collect()
     }
@@ -108,14 +108,14 @@ mod tests {
     fn between_moments_the_error_is_a_power_of_time() {
         // N^-1/2 and a tenth of a second an iteration.
         let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (16, 1.6, 0.25)]);
-        let (n, s, at_once) = fall(&curve, 1.0 / 3.0).expect("it is reached");
-        assert!((n - 9.0).abs() < 1e-9 && (s - 0.9).abs() < 1e-9 && !at_once, "{n} {s}");
-        assert_eq!(fall(&curve, 2.0), Some((1.0, 0.1, true)));
-        assert_eq!(fall(&curve, 0.25).map(|f| f.0), Some(16.0));
+        let ([n, s, c], at_once) = fall(&curve, 1.0 / 3.0).expect("it is reached");
+        assert!((n - 9.0).abs() < 1e-9 && (s - 0.9).abs() < 1e-9 && (c - 1.8).abs() < 1e-9 && !at_once, "{n} {s} {c}");
+        assert_eq!(fall(&curve, 2.0), Some(([1.0, 0.1, 0.2], true)));
+        assert_eq!(fall(&curve, 0.25).map(|f| f.0[0]), Some(16.0));
         assert_eq!(fall(&curve, 0.2), None);
         // A firefly takes it back: what counts is from where on the error stays.
         let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (8, 0.8, 2.0), (32, 3.2, 0.5)]);
-        assert_eq!(fall(&curve, 1.0), Some((16.0, 1.6, false)));
+        assert_eq!(fall(&curve, 1.0), Some(([16.0, 1.6, 3.2], false)));
     }
 
     #[test]

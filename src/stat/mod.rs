@@ -5,6 +5,10 @@ mod moments;
 mod power_law;
 pub mod sum;
 
+/// Share of the pixels that trimmed errors leave out, the worst ones: a few bright samples (fireflies) would rule the
+/// mean.
+pub const WORST: f64 = 0.005;
+
 pub use moments::{Grids, Moments, variance_of_mean};
 pub use power_law::PowerLaw;
 pub use sum::{Rounding, Sum, Total};

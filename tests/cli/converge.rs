@@ -59,25 +59,26 @@ fn the_report_of_a_small_comparison() {
         .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
         .collect();
     files.sort();
-    let expected = "a-b-c.exr error-iterations.svg error-seconds.svg five.exr index.html one.exr path.exr points.csv points.json reference.exr";
+    let expected = "a-b-c.exr error-core-seconds.svg error-iterations.svg error-seconds.svg five-finished.exr five.exr index.html one-finished.exr one.exr path-finished.exr path.exr points.csv points.json reference.exr trimmed-core-seconds.svg trimmed-iterations.svg trimmed-seconds.svg";
     assert_eq!(files.join(" "), expected);
 
-    // A row per run, seed and moment: 1, 2, 3, 4, 6, 8, 11 and the last, and the target's 10 of one run.
+    // A row per curve, seed and moment: 1, 2, 3, 4, 6, 8, 11 and the last, and the target's 10 of one run. Three of the
+    // four runs have a curve of finished pictures.
     let csv = text(&folder, "out/points.csv");
     let mut lines = csv.lines();
-    let header = "run,method,seed,iterations,light_paths,seconds,cpu_seconds,finish_seconds,figure,relmse,relmse_trimmed,mse,mean_ratio,estimated_error";
+    let header = "run,method,seed,iterations,light_paths,seconds,cpu_seconds,finish_seconds,figure,relmse,relmse_trimmed,mse,mean_ratio,estimated_error,fireflies";
     assert_eq!(lines.next(), Some(header));
-    assert_eq!(lines.clone().count(), 2 * (4 * 8 + 1));
+    assert_eq!(lines.clone().count(), 2 * (7 * 8 + 2));
     let json: Value = serde_json::from_str(&text(&folder, "out/points.json")).expect("it is JSON");
     let points = json["points"].as_array().expect("a list");
-    assert_eq!(points.len(), 2 * (4 * 8 + 1));
+    assert_eq!(points.len(), 2 * (7 * 8 + 2));
     let of = |run: &str, key: &str| -> Vec<f64> {
         let mine = points.iter().filter(|p| p["run"] == run && p["seed"] == 1);
         mine.map(|p| p[key].as_f64().unwrap_or_else(|| panic!("{key}: {p}"))).collect()
     };
     assert_eq!(of("one", "iterations"), [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 11.0, 12.0]);
     assert_eq!(of("five", "iterations"), [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 12.0]);
-    for run in ["path", "one", "\"a<b\" & 'c'", "five"] {
+    for run in ["path", "path, finished", "one", "one, finished", "\"a<b\" & 'c'", "five", "five, finished"] {
         for key in ["seconds", "cpu_seconds"] {
             let times = of(run, key);
             assert!(times[0] > 0.0 && times.is_sorted(), "{run} {key} {times:?}");
@@ -85,8 +86,17 @@ fn the_report_of_a_small_comparison() {
         let errors = of(run, "relmse");
         assert!(errors[errors.len() - 1] < errors[0], "{run} {errors:?}");
     }
-    assert!(of("five", "finish_seconds").iter().all(|seconds| *seconds > 0.0));
-    assert!(points.iter().all(|p| p["finish_seconds"].is_null() == (p["run"] != "five" && p["run"] != "one")));
+    assert!(of("five, finished", "finish_seconds").iter().all(|seconds| *seconds > 0.0));
+    let finished = |p: &Value| p["run"].as_str().is_some_and(|name| name.ends_with(", finished"));
+    assert!(
+        points
+            .iter()
+            .all(|p| p["finish_seconds"].is_null() != finished(p) && p["estimated_error"].is_null() >= finished(p))
+    );
+    // The finish's time is added to that of what it finishes.
+    let (raw, whole, finish) =
+        (of("five", "seconds"), of("five, finished", "seconds"), of("five, finished", "finish_seconds"));
+    assert!((0..raw.len()).all(|i| (whole[i] - raw[i] - finish[i]).abs() < 1e-9));
     let own = json["reference"]["error"]["relmse"].as_f64().expect("a number");
     assert!(own > 0.0 && own < of("five", "relmse")[0], "{own}");
     for point in points {
@@ -102,15 +112,18 @@ fn the_report_of_a_small_comparison() {
     assert_eq!(json["targets"][0]["runs"][1]["because"], "below the reference's error");
     assert_eq!(json["targets"][1]["of"], "one after 10 iterations");
     assert_eq!(json["runs"][0]["theory"]["exponent"], -1.0);
-    assert!(json["runs"][3]["finish"].as_str().is_some_and(|name| name.starts_with("Open Image Denoise 2.")));
-    assert_eq!(json["runs"][3]["levels"], 5);
-    assert!(json["runs"][3]["overhead"]["finish_seconds"].as_f64().is_some_and(|seconds| seconds > 0.0));
+    let last = &json["runs"][6];
+    assert_eq!((&last["name"], &last["theory"]), (&"five, finished".into(), &Value::Null));
+    assert!(last["finish"].as_str().is_some_and(|name| name.starts_with("Open Image Denoise 2.")));
+    assert_eq!(last["no_fit"], "denoised pictures follow no power");
+    assert_eq!(json["runs"][6]["levels"], 5);
+    assert!(json["runs"][5]["overhead"]["finish_seconds"].as_f64().is_some_and(|seconds| seconds > 0.0));
 
     // The page holds everything, fetches nothing, and shows names as they are.
     let page = text(&folder, "out/index.html");
     let names = elements(&page);
     let count = |name: &str| names.iter().filter(|n| n.as_str() == name).count();
-    assert_eq!((count("svg"), count("html"), count("script"), count("link")), (2, 1, 0, 0));
+    assert_eq!((count("svg"), count("html"), count("script"), count("link")), (6, 1, 0, 0));
     assert!(count("table") >= 5 && count("figure") >= 2 * 5, "tables or figures are missing");
     assert_eq!(page.matches("http").count(), page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
     assert_eq!(page.matches("src=").count(), page.matches("src=\"data:image/png;base64,").count());
@@ -144,9 +157,19 @@ fn pictures_are_those_of_render_and_references_know_their_error() {
         let render = format!("render scene.glb --width 48 --height 36 --iterations 5 --seed 3 -o {name}.exr {options}");
         assert_eq!(folder.run(&render).code, Some(0));
         let (alone, _) = folder.read(&format!("{name}.exr"));
-        let (raced, header) = folder.read(&format!("out/{name}.exr"));
-        assert_eq!(values(&raced, ""), values(&alone, ""), "{name}");
-        assert_eq!((&header["iterations"], &header["name"]), (&5.into(), &name.into()));
+        let (estimate, header) = folder.read(&format!("out/{name}.exr"));
+        assert_eq!(
+            (&header["iterations"], &header["name"], &header["combined"]),
+            (&5.into(), &name.into(), &Value::Null)
+        );
+        if options.contains("--no-combine") {
+            assert_eq!(values(&estimate, ""), values(&alone, ""), "{name}");
+        } else {
+            let (finished, of) = folder.read(&format!("out/{name}-finished.exr"));
+            assert_eq!(values(&finished, ""), values(&alone, ""), "{name}");
+            assert_eq!(values(&estimate, ""), values(&alone, "Noisy"), "{name}");
+            assert!(of["name"] == format!("{name}, finished") && !of["combined"].is_null());
+        }
         let history = header["history"].as_array().expect("a list");
         let last = &history[history.len() - 1];
         let (error, variance) = (last["error"].as_f64().expect("known"), last["variance"].as_f64().expect("known"));
@@ -179,7 +202,7 @@ fn what_is_refused_word_for_word() {
     folder.render("-o depth.exr --iterations 1 --no-combine --layers depth");
     let small = "converge scene.glb --width 48 --height 36 -o out --iterations 1";
     let help = "'--help' explains every option";
-    let cases: [(&str, &[&str], i32, &str, &str); 14] = [
+    let cases: [(&str, &[&str], i32, &str, &str); 15] = [
         (
             "converge scene.glb",
             &[],
@@ -228,6 +251,13 @@ fn what_is_refused_word_for_word() {
             2,
             "--target-of: 4 iterations are more than the 1 of --iterations",
             "use --iterations 4 or a smaller number here",
+        ),
+        (
+            &format!("{small} --methods path --with mitsuba"),
+            &[],
+            2,
+            "command line: --with needs --time: other renderers count no iterations",
+            "add --time SECONDS",
         ),
         (
             small,

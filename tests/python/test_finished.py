@@ -14,8 +14,10 @@ import support
 sys.path.append(str(support.ROOT / "scripts" / "figures"))
 import _goals  # noqa: E402
 import _pictures  # noqa: E402
-import _translate  # noqa: E402
 import _twins  # noqa: E402
+import gltf  # noqa: E402
+import pictures  # noqa: E402
+import plain  # noqa: E402
 
 SCENES = support.ROOT / "scenes"
 
@@ -95,20 +97,32 @@ class Goals(unittest.TestCase):
 
 class Translation(unittest.TestCase):
     def test_what_drivers_lack_is_named(self):
-        self.assertEqual(_translate.Translation(SCENES / "cornell.glb").blockers, [])
-        self.assertIn('material "glass" absorbs', _translate.Translation(SCENES / "torus.glb").blockers)
-        self.assertIn("a medium fills the space", _translate.Translation(SCENES / "fog.glb").blockers)
-        self.assertIn("depth of field", _translate.Translation(SCENES / "gems.glb").blockers)
+        def blockers(name):
+            return plain.Scene(SCENES / f"{name}.glb").blockers
+
+        self.assertEqual(blockers("cornell"), [])
+        self.assertEqual(blockers("torus"), [])
+        self.assertIn("a medium fills the space", blockers("fog"))
+        self.assertIn("KHR_materials_dispersion", blockers("prism")[0])
+
+    def test_glass_keeps_what_it_absorbs(self):
+        found = plain.Scene(SCENES / "torus.glb")
+        document, _ = gltf.chunks((SCENES / "torus.glb").read_bytes())
+        volumes = [gltf.extension(material, "KHR_materials_volume") for material in document["materials"]]
+        volume = next(volume for volume in volumes if volume and "attenuationColor" in volume)
+        glass = next(of for _, of in found.meshes if of.absorption.any())
+        passed = np.exp(-glass.absorption * volume["attenuationDistance"])
+        np.testing.assert_allclose(passed, volume["attenuationColor"], rtol=1e-12)
 
     def test_twins_are_what_drivers_take(self):
         with tempfile.TemporaryDirectory() as folder, mock.patch.object(_twins, "CACHE", Path(folder)):
             for name in ("torus", "prism", "interior", "cornell"):
                 twin = _twins.twin(SCENES / f"{name}.glb")
-                found = _translate.Translation(twin)
+                found = plain.Scene(twin)
                 self.assertEqual(found.blockers, [], name)
                 self.assertFalse([text for text in found.approximations if "material" in text], name)
                 kinds = {m["name"]: m.get("extensions", {}) for m in found.document["materials"]}
-                self.assertEqual(set.union(*map(set, kinds.values())) - _translate.PLAIN, set())
+                self.assertEqual(set.union(*map(set, kinds.values())) - plain.PLAIN, set())
                 said = json.loads(support.run(["info", twin, "--json"], check=0).stdout)
                 original = json.loads(support.run(["info", SCENES / f"{name}.glb", "--json"], check=0).stdout)
                 self.assertEqual(said["triangles"], original["triangles"], name)
@@ -117,33 +131,26 @@ class Translation(unittest.TestCase):
             self.assertIsNone(_twins.twin(SCENES / "fog.glb"))
 
     def test_a_lamp_keeps_its_light_as_a_ball(self):
-        found = _translate.Translation(SCENES / "interior.glb")
-        with tempfile.TemporaryDirectory() as folder:
-            found.save(Path(folder) / "interior", 64, 36)
-            scene = _translate.gltf.read(Path(folder) / "interior" / "interior.glb")
-        self.assertEqual(scene.lights, [])
-        balls = [mesh for mesh in scene.meshes if mesh.name == "lamp" and len(mesh.triangles) == 1280]
-        before = _translate.gltf.read(SCENES / "interior.glb").lights
+        found = plain.Scene(SCENES / "interior.glb")
+        self.assertEqual(found.lights, [])
+        balls = [(mesh, of) for mesh, of in found.meshes if mesh.name == "lamp" and len(mesh.triangles) == 1280]
+        before = gltf.read(SCENES / "interior.glb").lights
         self.assertEqual(len(balls), len(before))
-        for ball, light in zip(balls, before):
+        for (ball, of), light in zip(balls, before):
             a, b, c = ball.positions[ball.triangles].transpose(1, 0, 2)
             surface = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-            material = scene.document["materials"][ball.material]
-            strength = material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"]
-            np.testing.assert_allclose(
-                np.array(material["emissiveFactor"]) * strength * surface / 4, light.intensity, rtol=1e-5
-            )
+            np.testing.assert_allclose(of.emission * surface / 4, light.intensity, rtol=1e-5)
             self.assertAlmostEqual(surface / (4 * np.pi * light.radius**2), 1, delta=0.01)
             np.testing.assert_allclose(ball.positions.mean(0), light.to_world[:3, 3], atol=1e-5)
 
     def test_a_ball_is_closed_and_faces_outward(self):
-        points, triangles = _translate.icosphere(2)
+        points, triangles = plain.icosphere(2)
         self.assertEqual(len(triangles), 320)
         self.assertGreater(np.linalg.det(points[triangles]).min(), 0)
 
     def test_the_sun_stands_where_it_shines_from(self):
         toward = np.array([0.6, 0.64, -0.48])
-        sun = _translate.disc(toward, np.radians(0.265), np.array([1.0, 2.0, 3.0]), 512, 1024)
+        sun = plain.disc(toward, np.radians(0.265), np.array([1.0, 2.0, 3.0]), 512, 1024)
         polar, turn = (np.arange(512) + 0.5) / 512 * np.pi, (np.arange(1024) + 0.5) / 1024 * 2 * np.pi
         solid = np.sin(polar)[:, None] * (np.pi / 512) * (2 * np.pi / 1024)
         np.testing.assert_allclose((sun * solid[..., None]).sum((0, 1)), [1, 2, 3])
@@ -157,7 +164,7 @@ class Translation(unittest.TestCase):
         image = np.zeros((4, 64, 3), np.float32)
         image[:, 32] = 1
         at = (np.arange(64) + 0.5) / 64
-        turned = _translate.sample(image, at + 0.25, (np.arange(4) + 0.5) / 4)
+        turned = pictures.sample(image, at + 0.25, (np.arange(4) + 0.5) / 4)
         self.assertEqual(int(turned[0, :, 0].argmax()), 16)
 
 

@@ -17,7 +17,7 @@ use caustique::render::{Control, Method, Settings, Spent};
 use caustique::report::crop::Look;
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
-use caustique::report::race::{Rules, race};
+use caustique::report::race::{Field, Rules, race};
 use caustique::report::reference::{Halves, Reference};
 use caustique::report::summary::{Subject, Wishes, summarize};
 use caustique::scene::Scene as Built;
@@ -190,9 +190,10 @@ impl Comparison {
         // Where pictures of the race are kept meanwhile.
         let folder = tempfile::tempdir().map_err(|cause| caustique::error::Error::io(&std::env::temp_dir(), &cause))?;
         let stage = (built, camera);
-        let mut outcome = race(stage, &entries, &mut finishes, &rules, &reference, folder.path(), |step| {
+        let field = Field { entries: &entries, finishes: &mut finishes, guests: None };
+        let mut outcome = race(stage, field, &rules, &reference, folder.path(), |step| {
             told.tell(json!({
-                "run": entries[step.run].name,
+                "run": step.name,
                 "iterations": step.iterations,
                 "seconds": step.seconds,
                 "fraction": step.fraction,
@@ -205,6 +206,8 @@ impl Comparison {
             machine: Vec::new(),
             settings: Vec::new(),
             metric: self.metric,
+            lines: outcome.lines.clone(),
+            guests: Vec::new(),
             entries,
             rules,
             reference,

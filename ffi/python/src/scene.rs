@@ -273,7 +273,7 @@ impl Scene {
     ///
     /// 'points' is a list of dicts with run, seed, iterations, light_paths, seconds, cpu_seconds, relmse, mse, and
     /// figure, the metric without the reference's own error. 'runs' tells of each method what theory expects and what
-    /// is fitted.
+    /// is fitted. A run that finishes its picture is two: NAME, the estimate, and 'NAME, finished'.
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, methods=None, runs=None, iterations=None, time=None, reference=None, \

@@ -7,10 +7,13 @@ use caustique::film::{Layer, LayerSet};
 use caustique::image::atomic;
 use caustique::image::exr::{self, Attributes};
 use caustique::report::curve::Axis;
-use caustique::report::race::{Outcome, Point};
+use caustique::report::entry::{Line, Metric, Of};
+use caustique::report::page::Plots;
+use caustique::report::point::Point;
+use caustique::report::race::Outcome;
 use caustique::report::summary::{Subject, Summary};
 use caustique::report::{data, page, plot};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// Checks that files can be written to the folder, or that it can be made.
@@ -50,17 +53,25 @@ pub fn write(
     bytes("points.csv", &data::csv(subject, outcome)?)?;
     bytes("points.json", format!("{:#}\n", data::json(subject, outcome, summary)).as_bytes())?;
     let mut plots = Vec::new();
+    let beside = &summary.beside;
+    let trimmed = if beside.metric == Metric::RelMseTrimmed { "trimmed" } else { "all" };
     for (axis, heading, name) in [
-        (Axis::Seconds, "Error against seconds", "error-seconds.svg"),
-        (Axis::Iterations, "Error against iterations", "error-iterations.svg"),
+        (Axis::Seconds, "Error against seconds", "seconds"),
+        (Axis::CoreSeconds, "Error against core-seconds", "core-seconds"),
+        (Axis::Iterations, "Error against iterations", "iterations"),
     ] {
-        if let Some(svg) = plot::svg(subject, summary, axis)? {
-            bytes(name, svg.as_bytes())?;
-            plots.push((heading, svg));
+        let mut row = Plots { heading, plots: Vec::new() };
+        for (what, metric, curves) in
+            [("error", subject.metric, &summary.curves), (trimmed, beside.metric, &beside.curves)]
+        {
+            if let Some(svg) = plot::svg(subject, summary, metric, curves, axis)? {
+                bytes(&format!("{what}-{name}.svg"), svg.as_bytes())?;
+                row.plots.push((metric, svg));
+            }
         }
+        plots.push(row);
     }
-    let plots: Vec<(&str, &str)> = plots.iter().map(|(heading, svg)| (*heading, svg.as_str())).collect();
-    bytes("index.html", page::html(subject, summary, &plots)?.as_bytes())?;
+    bytes("index.html", page::html(subject, outcome, summary, &plots)?.as_bytes())?;
     pictures(folder, subject, outcome, threads)?;
     if args.progress.for_people() {
         say(&format!(
@@ -71,22 +82,18 @@ pub fn write(
     Ok(())
 }
 
-/// The last picture of every run with the first seed, as EXR.
+/// The last picture of every curve with the first seed, as EXR.
 fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: usize) -> Result<()> {
     let mut names: Vec<String> = Vec::new();
-    for run in 0..outcome.renders.len() {
-        let entry = &subject.entries[run];
-        let mut name = slug(&entry.name);
+    for (line, of) in subject.lines.iter().enumerate() {
+        let mut name = slug(&of.name);
         if name == "reference" || names.contains(&name) {
-            name += &format!("-{}", run + 1);
+            name += &format!("-{}", line + 1);
         }
-        let mine = |point: &&Point| point.run == run && point.picture.is_some();
+        let mine = |point: &&Point| point.line == line && point.picture.is_some();
         let Some(point) = outcome.points.iter().rfind(mine).cloned() else { continue };
         let Some(picture) = outcome.picture(&point)? else { continue };
-        let mut header = outcome.renders[run].account(Some(threads));
-        header.insert("name".into(), entry.name.as_str().into());
-        header.insert("options".into(), entry.options.as_str().into());
-        header.insert("combined".into(), entry.finish.as_ref().map(|name| json!({"finish": name})).into());
+        let header = header(subject, outcome, of, threads);
         let mut set = LayerSet::new(subject.reference.width, subject.reference.height);
         set.push(Layer::interleaved("", "RGB", picture))?;
         let path = folder.join(format!("{name}.exr"));
@@ -94,6 +101,27 @@ fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: us
         names.push(name);
     }
     Ok(())
+}
+
+/// What the header of a curve's picture says.
+fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> Value {
+    let mut header = match line.of {
+        Of::Estimate(run) | Of::Finished(run) => {
+            let mut header = outcome.renders[run].account(Some(threads));
+            header.insert("options".into(), subject.entries[run].options.as_str().into());
+            Value::Object(header)
+        }
+        Of::Guest(guest) | Of::Denoised(guest) => {
+            json!({"renderer": subject.guests[guest].name, "renderer_version": outcome.guests[guest].version})
+        }
+    };
+    header["name"] = line.name.as_str().into();
+    header["combined"] = match line.of {
+        Of::Finished(run) => json!({"finish": subject.entries[run].finish}),
+        Of::Denoised(_) => json!({"finish": "Open Image Denoise"}),
+        _ => Value::Null,
+    };
+    header
 }
 
 /// A name as a file's: small letters, digits and hyphens.

@@ -1,6 +1,7 @@
 //! `caustique converge`: accuracy against time.
 
 mod files;
+mod guests;
 mod options;
 mod progress;
 mod reference;
@@ -20,7 +21,7 @@ use caustique::render::auto::{Choice, choose};
 use caustique::render::{Control, Settings};
 use caustique::report::crop::{Look, Window};
 use caustique::report::entry::Entry;
-use caustique::report::race::{Rules, race};
+use caustique::report::race::{Field, Rules, race};
 use caustique::report::summary::{Subject, Wishes, find, summarize};
 use caustique::scene::{Scene, View};
 use progress::Reporter;
@@ -66,13 +67,16 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let mut notes = Vec::new();
     let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;
     let (entries, mut finishes) = open(args, runs, &choices, (&scene, &camera), &removed)?;
+    let guests = guests::all(args, (&scene, &camera), threads, &interrupt, &mut notes)?;
+    let peers = guests.as_ref().map_or_else(Vec::new, |guests| guests.peers.clone());
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
-    let reference = reference::get(args, source, (&scene, &camera), &interrupt, &mut notes)?;
+    let reference = reference::get(args, source, (&scene, &camera), &interrupt, &mut notes, entries.len())?;
     let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
     let mut reporter = Reporter::new(args.progress);
-    let mut outcome = race((&scene, &camera), &entries, &mut finishes, &rules, &reference, &args.output, |step| {
-        reporter.step(&entries, step);
+    let field = Field { entries: &entries, finishes: &mut finishes, guests };
+    let mut outcome = race((&scene, &camera), field, &rules, &reference, &args.output, |step| {
+        reporter.step(step);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     })?;
     reporter.finish();
@@ -83,6 +87,8 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         machine: machine(threads, &entries),
         settings: settings(args, &rules),
         metric: args.error_metric.into(),
+        lines: outcome.lines.clone(),
+        guests: peers,
         entries,
         rules,
         reference,
@@ -185,6 +191,10 @@ fn open(
             error
         })?;
         entry.finish = ready.as_ref().map(Ready::name);
+        let missing = ready.as_ref().and_then(|ready| ready.missing.as_ref()).map(ToString::to_string);
+        if let Some(missing) = missing.filter(|missing| told.insert(missing.clone())) {
+            say(&format!("warning: {missing}; pictures are finished by our own denoiser"));
+        }
         entries.push(entry);
         finishes.push(ready.map(Ready::into_finish));
     }
@@ -202,6 +212,7 @@ fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
     put("iterations of each run", rules.iterations.map(|n| n.to_string()));
     let seeds: Vec<String> = rules.seeds.iter().map(u64::to_string).collect();
     put("seeds", Some(seeds.join(", ")));
+    put("other renderers", (!args.with.is_empty()).then(|| "budgets that double up to the seconds of each run".into()));
     put("moments", Some(format!("iterations growing by {:.3}", rules.ratio)));
     settings
 }

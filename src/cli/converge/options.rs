@@ -5,6 +5,7 @@ use crate::cli::output::Tonemap;
 use crate::cli::progress::Form;
 use crate::cli::render::Method;
 use crate::cli::scene::SceneArgs;
+use caustique::peers::Renderer;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::MAX_SIZE;
@@ -21,8 +22,9 @@ use std::str::FromStr;
 /// points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the running iteration and writes what
 /// there is.
 ///
-/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. Where levels are combined, the
-/// combiner's time is added once, as if the run stopped at that moment.
+/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. A run has two curves: NAME is
+/// the estimate, 'NAME, finished' the picture that is finished from it, the finish's time added once, as if the run
+/// stopped at that moment. With --with other renderers take turns with ours, each point a render of its own.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
 pub struct ConvergeArgs {
@@ -30,14 +32,20 @@ pub struct ConvergeArgs {
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
 
-    /// Methods, each with its defaults and a single image: one bandwidth level, no combiner [default:
-    /// path,sppm,cppm,vcm, unless there is a --run]
+    /// Methods, each with its defaults and one bandwidth level [default: path,sppm,cppm,vcm, unless there is a --run]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
     pub methods: Vec<Method>,
     /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5';
-    /// may be repeated. As there, levels are combined unless --no-combine is given
+    /// may be repeated. As there, the picture is finished unless --no-combine is given
     #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
     pub runs: Vec<String>,
+    /// Estimates alone, no finished pictures
+    #[arg(long, help_heading = "Runs")]
+    pub no_finish: bool,
+    /// Other renderers on the same scene, at budgets that double up to --time, with and without Open Image Denoise
+    /// ('scripts/compare/setup.sh peers' installs them)
+    #[arg(long = "with", value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
+    pub with: Vec<RendererChoice>,
     /// Stop each run after so many seconds of its own [default: 60, without --iterations]
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
@@ -114,12 +122,33 @@ pub struct ConvergeArgs {
     pub progress: Form,
 }
 
+/// `--with`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RendererChoice {
+    /// Mitsuba 3: path tracing
+    Mitsuba,
+    /// LuxCore: path tracing, the same with its caustic cache, and bidirectional
+    Luxcore,
+    /// Blender's Cycles: path tracing
+    Cycles,
+}
+
+impl From<RendererChoice> for Renderer {
+    fn from(choice: RendererChoice) -> Renderer {
+        match choice {
+            RendererChoice::Mitsuba => Renderer::Mitsuba,
+            RendererChoice::Luxcore => Renderer::Luxcore,
+            RendererChoice::Cycles => Renderer::Cycles,
+        }
+    }
+}
+
 /// `--error-metric`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MetricChoice {
     /// Squared error over the squared reference plus 0.01
     Relmse,
-    /// The same without the worst 0.1 % of pixels, which fireflies rule
+    /// The same without the worst 0.5 % of pixels, which fireflies rule
     RelmseTrimmed,
     /// Squared error
     Mse,

@@ -3,7 +3,6 @@
 use crate::cli::progress::{Bar, Form, PLAIN_EVERY, Waiting, duration};
 use crate::cli::say;
 use caustique::render::Clock;
-use caustique::report::entry::Entry;
 use caustique::report::number::short;
 use caustique::report::race::Step;
 use serde_json::json;
@@ -32,10 +31,15 @@ impl Reporter {
     }
 
     /// A run has made a step.
-    pub fn step(&mut self, entries: &[Entry], step: &Step<'_>) {
-        let name = &entries[step.run].name;
+    pub fn step(&mut self, step: &Step<'_>) {
+        let name = step.name;
         let relmse = step.point.map(|point| point.errors.relmse);
-        let mut sentence = format!("{name}: iteration {}, {}", step.iterations, duration(step.seconds));
+        let count = match (step.is_ours, step.iterations) {
+            (true, n) => format!("iteration {n}"),
+            (false, 0) => "no picture".into(),
+            (false, n) => format!("{n} samples a pixel"),
+        };
+        let mut sentence = format!("{name}: {count}, {}", duration(step.seconds));
         sentence += &relmse.map_or(String::new(), |relmse| format!(", relMSE {}", short(relmse)));
         let line = json!({
             "run": name, "iteration": step.iterations, "seconds": step.seconds, "fraction": step.fraction, "relmse": relmse,

@@ -85,6 +85,24 @@ fn own(args: &ConvergeArgs, scene: &Scene, camera: &Camera) -> Result<Box<Settin
     Ok(Box::new(settings))
 }
 
+/// Says what a reference will take, and what comes after it.
+fn announce(args: &ConvergeArgs, settings: &Settings, runs: usize) {
+    let method = settings.method.name();
+    let count = settings.iterations.map(|n| format!("{n} iterations each"));
+    let time = settings.time.map(|time| format!("{} together", duration(time)));
+    let ends: Vec<String> = [count, time].into_iter().flatten().collect();
+    let rest = super::time(args).map(|time| (runs as f64 * time * args.seeds as f64, args.iterations));
+    let then = match rest {
+        Some((time, None)) => format!(", then {} for {runs} runs", duration(time)),
+        Some((time, Some(_))) => format!(", then at most {} for {runs} runs", duration(time)),
+        None => String::new(),
+    };
+    say(&format!(
+        "reference: two halves by {method}, {}{then}; --reference takes one that is there, --reference-time sets its time",
+        ends.join(" or ")
+    ));
+}
+
 /// The reference; one that is made here is also written to the folder.
 ///
 /// # Errors
@@ -95,17 +113,14 @@ pub fn get(
     (scene, camera): (&Scene, &Camera),
     interrupt: &Interrupt,
     notes: &mut Vec<String>,
+    runs: usize,
 ) -> Result<Reference> {
     let settings = match source {
         Source::File(reference) => return Ok(reference),
         Source::Own(settings) => settings,
     };
     if args.progress.for_people() {
-        let time = settings.time.map(|time| format!("in {}", duration(time)));
-        let count = settings.iterations.map(|n| format!("of {n} iterations each"));
-        let ends: Vec<String> = [count, time].into_iter().flatten().collect();
-        let method = settings.method.name();
-        say(&format!("reference: two halves by {method}, {}; --reference takes one that is there", ends.join(" or ")));
+        announce(args, &settings, runs);
     }
     let mut reporter = Reporter::new(args.progress);
     let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {

@@ -57,14 +57,13 @@ pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
     Ok(runs)
 }
 
-/// A method with its defaults, one level and no finish.
+/// A method with its defaults and one level.
 pub fn by_method(args: &ConvergeArgs, method: Method) -> Result<Run> {
     let name = method.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
     let mut words = vec!["--method".to_string(), name.clone()];
     if method.chosen().has_levels() {
         words.extend(["--levels".into(), "1".into()]);
     }
-    words.push("--no-combine".into());
     parse(args, &name, &words.join(" "), words)
 }
 
@@ -89,7 +88,9 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         ..render.settings()?
     };
     let entry = Entry { name: name.into(), options: options.into(), settings, decided: Spent::default(), finish: None };
-    Ok(Run { entry, args: render.job })
+    let mut job = render.job;
+    job.no_combine |= args.no_finish;
+    Ok(Run { entry, args: job })
 }
 
 /// Errors: an option that is not about the method or the finish of one run.

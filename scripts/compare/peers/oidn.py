@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Intel OIDN alone on one picture: _denoise.py IN.exr OUT.exr THREADS. Needs pyoidn (see peers.sh).
+"""Intel OIDN alone on one picture: oidn.py IN.exr OUT.exr THREADS. Needs pyoidn (scripts/compare/setup.sh peers).
 
 IN.exr holds R G B and, where there are guides, albedo and normal, which are taken to be free of noise. Prints the
 seconds of the filter.

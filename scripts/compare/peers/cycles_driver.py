@@ -1,0 +1,253 @@
+"""Blender's Cycles as a peer (see driver.py), on the processor, its scene made by script: `path`, and `path_guiding`
+(Open PGL).
+
+Runs in the Python of Blender's module (.venv-bpy), with OpenEXR from .venv-peers/bpy.
+"""
+
+import os
+import re
+import sys
+import tempfile
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+import driver
+import pictures
+import plain
+
+#: From +Y up to +Z up.
+TURN = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+#: Cycles keeps images in half precision; this is near the largest number of that.
+HALF = 30000.0
+#: Width of the map that directions to the environment are drawn by.
+IMPORTANCE = 2048
+#: Samples that a render begins with where it is told by time when to stop.
+ENOUGH = 1 << 20
+
+
+class Nodes:
+    """A node tree under construction."""
+
+    def __init__(self, tree):
+        self.tree = tree
+        tree.nodes.clear()
+
+    def add(self, kind, **inputs):
+        """A node, its inputs set by name (spaces for underscores)."""
+        node = self.tree.nodes.new(f"ShaderNode{kind}")
+        for name, value in inputs.items():
+            node.inputs[name.replace("_", " ")].default_value = value
+        return node
+
+    def link(self, source, target):
+        self.tree.links.new(source, target)
+
+
+def material(of, folder):
+    """A Blender material."""
+    made = bpy.data.materials.new(of.name)
+    made.use_nodes = True
+    nodes = Nodes(made.node_tree)
+    output = nodes.add("OutputMaterial")
+    colour = (*of.base, 1.0)
+    if of.kind == "matte":
+        shader = nodes.add("BsdfDiffuse", Color=colour, Roughness=0.0)
+    elif of.kind == "glass":
+        shader = nodes.add("BsdfGlass", Color=colour, Roughness=of.roughness, IOR=of.ior)
+        shader.distribution = "MULTI_GGX"
+        if of.absorption.any():
+            most = of.absorption.max()
+            volume = nodes.add("VolumeAbsorption", Color=(*(1 - of.absorption / most), 1.0), Density=most)
+            nodes.link(volume.outputs[0], output.inputs["Volume"])
+    else:
+        shader = nodes.add("BsdfPrincipled", Base_Color=colour, Roughness=of.roughness, IOR=of.ior,
+                           Metallic=float(of.kind == "metal"), Specular_IOR_Level=of.specular / 2)
+        shader.distribution = "MULTI_GGX"
+    if of.texture:
+        file = os.path.join(folder, f"{made.name}.image")
+        with open(file, "wb") as sink:
+            sink.write(of.texture)
+        image = nodes.add("TexImage")
+        image.image = bpy.data.images.load(file)
+        nodes.link(image.outputs["Color"], shader.inputs["Base Color" if of.kind in ("coated", "metal") else "Color"])
+    surface = shader.outputs[0]
+    if of.emission.any():
+        surface = shining(nodes, surface, of.emission)
+    nodes.link(surface, output.inputs["Surface"])
+    return made
+
+
+def shining(nodes, surface, radiance):
+    """A surface that also shines, from its front."""
+    most = float(radiance.max())
+    shine = nodes.add("Emission", Color=(*(radiance / most), 1.0), Strength=most)
+    side, total = nodes.add("MixShader"), nodes.add("AddShader")
+    nodes.link(nodes.add("NewGeometry").outputs["Backfacing"], side.inputs[0])
+    nodes.link(shine.outputs[0], side.inputs[1])
+    nodes.link(nodes.add("Emission", Strength=0.0).outputs[0], side.inputs[2])
+    nodes.link(surface, total.inputs[0])
+    nodes.link(side.outputs[0], total.inputs[1])
+    return total.outputs[0]
+
+
+def add(scene, data, to_world, name):
+    """An object in the scene."""
+    made = bpy.data.objects.new(name, data)
+    made.matrix_world = Matrix((TURN @ to_world).tolist())
+    scene.collection.objects.link(made)
+    return made
+
+
+def mesh(of):
+    """A Blender mesh in Blender's axes."""
+    made = bpy.data.meshes.new(of.name)
+    made.from_pydata((of.positions @ TURN[:3, :3].T).tolist(), [], of.triangles.tolist())
+    if of.uvs is not None:
+        uvs = np.stack([of.uvs[:, 0], 1 - of.uvs[:, 1]], 1)[of.triangles.reshape(-1)]
+        made.uv_layers.new()
+        made.uv_layers[0].data.foreach_set("uv", uvs.astype("f4").ravel())
+    if of.normals is not None:
+        made.polygons.foreach_set("use_smooth", np.ones(len(made.polygons), bool))
+        made.normals_split_custom_set_from_vertices((of.normals @ TURN[:3, :3].T).tolist())
+    return made
+
+
+def camera(scene, of):
+    """The scene's camera."""
+    data = bpy.data.cameras.new("camera")
+    data.sensor_fit, data.angle_y, data.clip_start, data.clip_end = "VERTICAL", of.yfov, 1e-3, 1e6
+    if of.aperture_radius:
+        data.dof.use_dof, data.dof.focus_distance = True, of.focus_distance
+        # Blender's focal length is in millimetres.
+        data.dof.aperture_fstop = 1e-3 * data.lens / (2 * of.aperture_radius)
+    scene.camera = add(scene, data, of.to_world, "camera")
+
+
+def world(scene, image, folder):
+    """The environment; black where there is none."""
+    made = scene.world = bpy.data.worlds.new("world")
+    made.use_nodes = True
+    nodes = Nodes(made.node_tree)
+    background = nodes.add("Background", Color=(0, 0, 0, 1))
+    nodes.link(background.outputs[0], nodes.add("OutputWorld").inputs["Surface"])
+    if image is None:
+        return
+    scale = max(float(image.max()) / HALF, 1.0)
+    file = os.path.join(folder, "environment.exr")
+    pictures.write(file, image / scale)
+    background.inputs["Strength"].default_value = scale
+    texture = nodes.add("TexEnvironment")
+    texture.image = bpy.data.images.load(file)
+    texture.image.colorspace_settings.name = "Non-Color"
+    # Blender's u is 1/2 - atan2(y, x) / 2 pi, the scene's atan2(x, -z) / 2 pi: a quarter turn.
+    turn = nodes.add("Mapping", Rotation=(0, 0, np.pi / 2))
+    turn.vector_type = "POINT"
+    nodes.link(nodes.add("TexCoord").outputs["Generated"], turn.inputs["Vector"])
+    nodes.link(turn.outputs[0], texture.inputs["Vector"])
+    nodes.link(texture.outputs[0], background.inputs["Color"])
+    made.cycles.sampling_method, made.cycles.sample_map_resolution = "MANUAL", IMPORTANCE
+
+
+def lamp(scene, light):
+    """A lamp without a body."""
+    most = float(light.intensity.max())
+    if most == 0:
+        return
+    if light.kind == "point":
+        data = bpy.data.lights.new("point", "POINT")
+        # From intensity to watts.
+        data.energy, data.shadow_soft_size = 4 * np.pi * most, 0
+    else:
+        data = bpy.data.lights.new("sun", "SUN")
+        data.energy, data.angle = most, 0
+    data.color = light.intensity / most
+    add(scene, data, light.to_world, "lamp")
+
+
+def build(of, folder):
+    """The Blender scene."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene, known = bpy.context.scene, {}
+    for part, surface in of.meshes:
+        if id(surface) not in known:
+            known[id(surface)] = material(surface, folder)
+        made = mesh(part)
+        made.materials.append(known[id(surface)])
+        made.update()
+        scene.collection.objects.link(bpy.data.objects.new(part.name, made))
+    camera(scene, of.camera)
+    world(scene, of.environment, folder)
+    for light in of.lights:
+        lamp(scene, light)
+    return scene
+
+
+def approximations(scene):
+    """What Cycles says in another way."""
+    found = list(scene.approximations)
+    if any(of.kind == "glass" and of.base.min() < 1 for _, of in scene.meshes):
+        found.append("glass also tints what it reflects")
+    return found
+
+
+def settle(scene, options):
+    """Settings of the render."""
+    render, cycles = scene.render, scene.cycles
+    render.engine, cycles.device, render.threads_mode, render.threads = "CYCLES", "CPU", "FIXED", options.threads
+    render.resolution_x, render.resolution_y, render.resolution_percentage = options.width, options.height, 100
+    for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_max_bounces"):
+        setattr(cycles, name, driver.DEPTH)
+    cycles.caustics_reflective = cycles.caustics_refractive = True
+    cycles.use_guiding, cycles.blur_glossy = options.mode == "path_guiding", 0
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
+    cycles.pixel_filter_type, cycles.samples = "BOX", ENOUGH
+    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
+    render.use_persistent_data = render.film_transparent = False
+
+
+def render(scene, seconds, seed, folder):
+    """The picture after so many seconds, and its samples per pixel, which Cycles tells on its standard output alone."""
+    scene.cycles.time_limit, scene.cycles.seed = max(seconds, 0.05), seed
+    scene.render.filepath = os.path.join(folder, "picture.exr")
+    with tempfile.TemporaryFile() as log:
+        sys.stdout.flush()
+        terminal = os.dup(1)
+        os.dup2(log.fileno(), 1)
+        try:
+            bpy.ops.render.render(write_still=True)
+        finally:
+            sys.stdout.flush()
+            os.dup2(terminal, 1)
+            os.close(terminal)
+        log.seek(0)
+        samples = max([int(found) for found in re.findall(rb"Sample (\d+)/", log.read())] or [1])
+    return pictures.read(scene.render.filepath).astype(float), samples
+
+
+def main():
+    options = driver.options(["path", "path_guiding"])
+    of = plain.Scene(options.scene, options.camera)
+    if of.blockers:
+        driver.say(cannot=of.blockers)
+        return
+    with tempfile.TemporaryDirectory(prefix="caustique-cycles-") as folder:
+        scene = build(of, folder)
+        settle(scene, options)
+        watch, total = driver.Stopwatch(options), 0.0
+
+        def one(number):
+            nonlocal total
+            # Cycles knows the wall clock alone: on the other one it goes on with what is left.
+            picture, samples = render(scene, watch.left(), options.seed + 7919 * number, folder)
+            total = total + samples * picture
+            return samples
+
+        samples = one(0) if options.clock == "wall" else driver.passes(watch, one)
+        driver.done(watch, samples, bpy.app.version_string, approximations(of))
+        pictures.write(options.output, total / samples)
+
+
+main()

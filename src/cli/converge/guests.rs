@@ -1,0 +1,74 @@
+//! Other renderers, from the words of the command line.
+
+use super::options::ConvergeArgs;
+use crate::cli::say;
+use crate::cli::scene::{Glass, LightUnits, SceneArgs};
+use crate::cli::signals::Interrupt;
+use caustique::camera::Camera;
+use caustique::error::{Error, Kind, Result};
+use caustique::finish::{Denoiser, DenoiserChoice};
+use caustique::peers::{Drivers, Renderer};
+use caustique::report::guests::{Denoising, Driving, Guests};
+use caustique::scene::{Scene, usd};
+
+/// The guests that are asked for; `None` where there are none.
+///
+/// # Errors
+/// A renderer is not installed; no `--time` says how long they render.
+pub fn all(
+    args: &ConvergeArgs,
+    (scene, camera): (&Scene, &Camera),
+    threads: usize,
+    interrupt: &Interrupt,
+    notes: &mut Vec<String>,
+) -> Result<Option<Guests>> {
+    let mut renderers: Vec<Renderer> = args.with.iter().map(|choice| Renderer::from(*choice)).collect();
+    renderers.dedup();
+    if renderers.is_empty() {
+        return Ok(None);
+    }
+    let Some(time) = super::time(args) else {
+        let error = Error::new(Kind::Usage, "command line", "--with needs --time: other renderers count no iterations");
+        return Err(error.hint("add --time SECONDS"));
+    };
+    let drivers = Drivers::new(&renderers, &args.scene.path, args.camera.as_deref(), camera.size(), threads)?;
+    let driving = match refused(args) {
+        Some(why) => {
+            say(&format!("warning: --with: {why}; other renderers are left out"));
+            Driving::Refused(why)
+        }
+        None => Driving::By(drivers),
+    };
+    let denoising = match Denoiser::open(DenoiserChoice::Oidn) {
+        Ok((denoiser, _)) if matches!(driving, Driving::By(_)) => {
+            Some(Denoising::new(denoiser, scene, camera, args.seed)?)
+        }
+        Ok(_) => None,
+        Err(error) => {
+            say(&format!("warning: --with: {error}; other renderers' pictures are not denoised"));
+            notes.push(format!("Other renderers' pictures are not denoised: {error}."));
+            None
+        }
+    };
+    let interrupt = interrupt.clone();
+    let stop = Box::new(move || interrupt.asked());
+    let peers = renderers.into_iter().flat_map(Renderer::peers).collect();
+    Ok(Some(Guests { peers, driving, denoising, time, stop }))
+}
+
+/// An option or a kind of file that drivers do not know, so that they would render another scene.
+fn refused(args: &ConvergeArgs) -> Option<String> {
+    let SceneArgs { path, frames, env, env_rotation, env_strength, light_units, glass, effects, .. } = &args.scene;
+    let option = [
+        ("--env", env.is_some()),
+        ("--env-rotation", env_rotation.is_some()),
+        ("--env-strength", env_strength.is_some()),
+        ("--light-units", *light_units != LightUnits::Auto),
+        ("--glass", *glass != Glass::Auto),
+        ("--effects", effects.is_some()),
+        ("--frames", frames.is_some()),
+        ("--max-depth", args.max_depth.is_some()),
+    ];
+    let given = option.iter().find(|(_, given)| *given).map(|(name, _)| format!("drivers do not know {name}"));
+    given.or_else(|| usd::is_stage(path).then(|| "drivers read no stages of USD".into()))
+}

@@ -1,0 +1,189 @@
+//! The drivers, and what is asked of them.
+
+use super::process::{self, End, Stop};
+use super::python::Interpreter;
+use super::{Peer, Renderer};
+use crate::error::{Error, Kind, Result};
+use crate::image::exr;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The drivers' files, as they lie below `scripts/compare`.
+const SOURCES: [(&str, &str); 11] = [
+    ("gltf.py", include_str!("../../scripts/compare/gltf.py")),
+    ("lobes.py", include_str!("../../scripts/compare/lobes.py")),
+    ("materials.py", include_str!("../../scripts/compare/materials.py")),
+    ("variant.py", include_str!("../../scripts/compare/variant.py")),
+    ("world.py", include_str!("../../scripts/compare/world.py")),
+    ("peers/cycles_driver.py", include_str!("../../scripts/compare/peers/cycles_driver.py")),
+    ("peers/driver.py", include_str!("../../scripts/compare/peers/driver.py")),
+    ("peers/luxcore_driver.py", include_str!("../../scripts/compare/peers/luxcore_driver.py")),
+    ("peers/mitsuba_driver.py", include_str!("../../scripts/compare/peers/mitsuba_driver.py")),
+    ("peers/pictures.py", include_str!("../../scripts/compare/peers/pictures.py")),
+    ("peers/plain.py", include_str!("../../scripts/compare/peers/plain.py")),
+];
+
+/// What a render may take beyond its budget: seconds, and so many times the budget. Starting up and converting a large
+/// scene takes half a minute, a photon map its time.
+const LIMIT: (f64, f64) = (300.0, 5.0);
+
+/// A render that is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Task {
+    /// Seconds of rendering.
+    pub budget: f64,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// A render that was made.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// The picture, row by row from the top.
+    pub picture: Vec<[f32; 3]>,
+    /// Wall-clock seconds of rendering.
+    pub seconds: f64,
+    /// Core-seconds of rendering.
+    pub core_seconds: f64,
+    /// Wall-clock seconds before it: starting up, reading and converting the scene.
+    pub startup_seconds: f64,
+    /// Samples per pixel.
+    pub passes: f64,
+    /// Version of the renderer.
+    pub version: String,
+    /// What of the scene means something else there, in words.
+    pub approximations: Vec<String>,
+}
+
+/// What a driver answers.
+#[derive(Clone, Debug)]
+pub enum Answer {
+    /// A render.
+    Rendered(Box<Rendering>),
+    /// The renderer cannot say the scene, in words.
+    Cannot(Vec<String>),
+    /// It was stopped.
+    Stopped,
+}
+
+/// The line of a driver.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Said {
+    Cannot {
+        cannot: Vec<String>,
+    },
+    Rendered {
+        seconds: f64,
+        core_seconds: f64,
+        startup_seconds: f64,
+        passes: f64,
+        version: String,
+        approximations: Vec<String>,
+    },
+}
+
+/// The drivers of some renderers on a scene, laid out in a folder that ends with them.
+pub struct Drivers {
+    scene: PathBuf,
+    camera: Option<String>,
+    size: (u32, u32),
+    threads: usize,
+    interpreters: Vec<(Renderer, Interpreter)>,
+    folder: tempfile::TempDir,
+}
+
+impl Drivers {
+    /// Finds the Pythons of some renderers. `size`: width and height in pixels.
+    ///
+    /// # Errors
+    /// A renderer is not installed; the file system.
+    pub fn new(
+        renderers: &[Renderer],
+        scene: &Path,
+        camera: Option<&str>,
+        size: (u32, u32),
+        threads: usize,
+    ) -> Result<Drivers> {
+        let interpreters = renderers.iter().map(|&of| Ok((of, Interpreter::find(of)?))).collect::<Result<Vec<_>>>()?;
+        let folder = tempfile::Builder::new().prefix("caustique-peers-").tempdir();
+        let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))?;
+        for (name, source) in SOURCES {
+            let path = folder.path().join(name);
+            let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+            made.and_then(|()| std::fs::write(&path, source)).map_err(|cause| Error::io(&path, &cause))?;
+        }
+        Ok(Drivers { scene: scene.into(), camera: camera.map(Into::into), size, threads, interpreters, folder })
+    }
+
+    /// Lets a peer render.
+    ///
+    /// # Errors
+    /// The driver fails, takes far too long, or does not answer.
+    pub fn render(&self, peer: &Peer, task: Task, stop: Stop<'_>) -> Result<Answer> {
+        let failed = |cause: &dyn std::fmt::Display| {
+            Error::new(Kind::Library, peer.name, cause)
+                .hint(format!("its driver is scripts/compare/peers/{}", peer.renderer.driver()))
+        };
+        let Some((_, python)) = self.interpreters.iter().find(|(of, _)| *of == peer.renderer) else {
+            return Err(failed(&"its Python was not looked for"));
+        };
+        let file = self.folder.path().join("picture.exr");
+        // What an earlier render has left is no answer.
+        let _ = std::fs::remove_file(&file);
+        let (width, height) = self.size;
+        let mut command = python.command();
+        command.arg(self.folder.path().join("peers").join(peer.renderer.driver())).arg(&self.scene).arg(&file);
+        for (name, value) in [
+            ("mode", peer.mode.to_string()),
+            ("width", width.to_string()),
+            ("height", height.to_string()),
+            ("budget", task.budget.to_string()),
+            ("threads", self.threads.to_string()),
+            // Some take no more than 31 bits.
+            ("seed", (task.seed % (1 << 16)).to_string()),
+        ] {
+            command.arg(format!("--{name}={value}"));
+        }
+        command.args(self.camera.iter().map(|name| format!("--camera={name}")));
+        let limit = LIMIT.0 + LIMIT.1 * task.budget;
+        let (status, [out, err]) = match process::run(command, limit, stop).map_err(|cause| failed(&cause))? {
+            End::Exit(status, said) => (status, said),
+            End::Stopped => return Ok(Answer::Stopped),
+            End::TooLong => return Err(failed(&format!("it was ended after {limit:.0} s of {:.1} s", task.budget))),
+        };
+        // Some crash when all is done, while they shut down.
+        let said = out.lines().rev().find_map(|line| serde_json::from_str::<Said>(line.strip_prefix("PEER ")?).ok());
+        match said {
+            Some(Said::Cannot { cannot }) => Ok(Answer::Cannot(cannot)),
+            Some(Said::Rendered { seconds, core_seconds, startup_seconds, passes, version, approximations })
+                if file.exists() =>
+            {
+                let picture = self.picture(&file).map_err(|error| failed(&error))?;
+                Ok(Answer::Rendered(Box::new(Rendering {
+                    picture,
+                    seconds,
+                    core_seconds,
+                    startup_seconds,
+                    passes,
+                    version,
+                    approximations,
+                })))
+            }
+            _ => {
+                let last = err.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing").trim();
+                Err(failed(&format!("it ended ({status}) without a picture: {last}")))
+            }
+        }
+    }
+
+    fn picture(&self, file: &Path) -> Result<Vec<[f32; 3]>> {
+        let (set, _) = exr::read(file)?;
+        let (width, height) = (self.size.0 as usize, self.size.1 as usize);
+        if (set.width, set.height) != (width, height) {
+            let cause = format!("a picture of {} x {} pixels, not {width} x {height}", set.width, set.height);
+            return Err(Error::new(Kind::Image, "", cause));
+        }
+        set.beauty()
+    }
+}

@@ -1,0 +1,185 @@
+//! Other renderers in a race: renders of their own at growing budgets, for they give no pictures in between.
+//!
+//! A render takes place when ours have got as far, so that all meet the same machine.
+
+use super::point::Point;
+use super::reference::Reference;
+use crate::camera::Camera;
+use crate::error::Result;
+use crate::film::Layer;
+use crate::finish::{Denoiser, Estimate, Quality, Size};
+use crate::image::errors;
+use crate::peers::{Answer, Drivers, Peer, Rendering, Task};
+use crate::render::{Method, Session, Settings, Spent, Stage};
+use crate::scene::Scene;
+
+/// Budgets double from this share of the whole time.
+const FIRST: f64 = 1.0 / 16.0;
+/// Iterations of path tracing that the denoiser's guides are the mean of.
+const GUIDES: u64 = 32;
+
+/// What is known of a guest in the end.
+#[derive(Clone, Debug, Default)]
+pub struct Account {
+    /// Version of the renderer.
+    pub version: String,
+    /// Seconds of starting up, of each render.
+    pub startups: Vec<f64>,
+    /// What of the scene means something else there.
+    pub approximations: Vec<String>,
+    /// Renders that ended before every pixel had a sample.
+    pub unfinished: usize,
+    /// Why it does not take part, or stopped to.
+    pub out: Option<String>,
+}
+
+/// The denoiser of guests' pictures, and its guides.
+pub struct Denoising {
+    /// Open Image Denoise.
+    pub denoiser: Denoiser,
+    /// Albedo.
+    pub albedo: Option<Vec<[f32; 3]>>,
+    /// Normal.
+    pub normal: Option<Vec<[f32; 3]>>,
+}
+
+impl Denoising {
+    /// With guides by our own path tracing, the same for all and not counted.
+    ///
+    /// # Errors
+    /// Memory's alone.
+    pub fn new(denoiser: Denoiser, scene: &Scene, camera: &Camera, seed: u64) -> Result<Denoising> {
+        let settings = Settings { method: Method::Path, seed, ..Settings::default() };
+        let stage = Stage::new(scene, camera, &settings);
+        let mut session = Session::new(&stage);
+        (0..GUIDES).for_each(|_| {
+            session.step();
+        });
+        let set = session.layers(|name| ["albedo", "normal"].contains(&name))?;
+        let [albedo, normal] = ["albedo", "normal"].map(|name| set.get(name).map(Layer::triples));
+        Ok(Denoising { denoiser, albedo, normal })
+    }
+
+    /// The denoised picture, and what that took.
+    fn run(&mut self, picture: &[[f32; 3]], (width, height): (usize, usize)) -> Result<(Vec<[f32; 3]>, Spent)> {
+        let estimate = Estimate {
+            size: Size { width, height },
+            mean: picture.to_vec(),
+            deviation: vec![[0.0; 3]; picture.len()],
+            albedo: self.albedo.clone(),
+            normal: self.normal.clone(),
+        };
+        let mut spent = Spent::default();
+        let denoised = spent.during(|| self.denoiser.run(&estimate, Quality::High))?;
+        Ok((denoised, spent))
+    }
+}
+
+/// Who drives the guests.
+pub enum Driving {
+    /// Their drivers.
+    By(Drivers),
+    /// Nobody, for a reason that holds for all.
+    Refused(String),
+}
+
+/// The guests of a race.
+pub struct Guests {
+    /// Who they are.
+    pub peers: Vec<Peer>,
+    /// Who drives them.
+    pub driving: Driving,
+    /// What denoises their pictures.
+    pub denoising: Option<Denoising>,
+    /// Seconds of the longest renders.
+    pub time: f64,
+    /// Whether to stop, asked while one of them renders.
+    pub stop: Box<dyn Fn() -> bool>,
+}
+
+/// A render to come: a guest by number, and its seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn {
+    /// Which guest.
+    pub guest: usize,
+    /// Seconds of rendering.
+    pub budget: f64,
+}
+
+/// What came of a turn.
+pub enum Made {
+    /// Points without their lines and pictures' numbers: of the picture, and of the denoised one.
+    Points(Vec<(Point, Vec<[f32; 3]>)>),
+    /// Nothing that can be measured.
+    Nothing,
+    /// It was stopped.
+    Stopped,
+}
+
+impl Guests {
+    /// All turns of a seed, by budget.
+    pub fn turns(&self) -> Vec<Turn> {
+        let doublings = (1.0 / FIRST).log2().round() as i32;
+        let budgets = (0..=doublings).map(|i| self.time * FIRST * f64::from(i).exp2());
+        budgets.flat_map(|budget| (0..self.peers.len()).map(move |guest| Turn { guest, budget })).collect()
+    }
+
+    /// Makes a render and measures it. What goes wrong ends the guest's part, and `account` says why.
+    pub fn take(&mut self, turn: Turn, seed: u64, reference: &Reference, account: &mut Account) -> Made {
+        let task = Task { budget: turn.budget, seed };
+        let answer = match &self.driving {
+            Driving::Refused(why) => {
+                account.out = Some(why.clone());
+                return Made::Nothing;
+            }
+            Driving::By(drivers) => drivers.render(&self.peers[turn.guest], task, &*self.stop),
+        };
+        match answer {
+            Ok(Answer::Rendered(rendering)) => self.measure(*rendering, seed, reference, account),
+            Ok(Answer::Cannot(why)) => {
+                account.out = Some(format!("cannot say the scene: {}", why.join("; ")));
+                Made::Nothing
+            }
+            Ok(Answer::Stopped) => Made::Stopped,
+            Err(error) => {
+                account.out = Some(error.to_string());
+                Made::Nothing
+            }
+        }
+    }
+
+    fn measure(&mut self, rendering: Rendering, seed: u64, reference: &Reference, account: &mut Account) -> Made {
+        let Rendering { picture, seconds, core_seconds, startup_seconds, passes, version, approximations } = rendering;
+        account.version = version;
+        account.approximations = approximations;
+        account.startups.push(startup_seconds);
+        if passes < 1.0 {
+            account.unfinished += 1;
+            return Made::Nothing;
+        }
+        let point = |picture: &[[f32; 3]], denoised: Option<Spent>| {
+            let more = denoised.unwrap_or_default();
+            Some(Point {
+                line: 0,
+                seed,
+                iterations: passes as u64,
+                light_paths: 0,
+                seconds: seconds + more.seconds,
+                cpu_seconds: core_seconds + more.cpu_seconds,
+                finish_seconds: denoised.map(|spent| spent.seconds),
+                errors: errors(picture, &reference.picture)?,
+                estimate: None,
+                picture: None,
+            })
+        };
+        let mut made = Vec::new();
+        made.extend(point(&picture, None).map(|point| (point, picture.clone())));
+        if let Some(denoising) = &mut self.denoising {
+            match denoising.run(&picture, (reference.width, reference.height)) {
+                Ok((denoised, spent)) => made.extend(point(&denoised, Some(spent)).map(|point| (point, denoised))),
+                Err(error) => account.out = Some(error.to_string()),
+            }
+        }
+        Made::Points(made)
+    }
+}

@@ -1,0 +1,141 @@
+//! Crops of all curves beside each other.
+
+use super::crop::{self, Look, Window};
+use super::curve::Curve;
+use super::entry::Metric;
+use super::number::{iterations, short};
+use super::outcome::Outcome;
+use super::point::Point;
+use super::reference::Reference;
+use crate::error::Result;
+
+/// A picture of the report as PNG, with what stands below it.
+pub struct Shown {
+    /// The run's name, or the reference's.
+    pub name: String,
+    /// Iterations, seconds, error; empty for the reference.
+    pub caption: String,
+    /// A PNG per window.
+    pub pictures: Vec<Vec<u8>>,
+    /// A heat map per window; none for the reference.
+    pub heat_maps: Vec<Vec<u8>>,
+}
+
+/// Crops of all runs at moments that have something in common.
+pub struct Strip {
+    /// What it is.
+    pub title: String,
+    /// The runs.
+    pub runs: Vec<Shown>,
+    /// The relative error that is palest in the heat maps.
+    pub largest: f64,
+}
+
+/// The points of a curve whose pictures are kept.
+fn kept(points: &[Point], line: usize) -> impl Iterator<Item = &Point> {
+    points.iter().filter(move |point| point.line == line && point.picture.is_some())
+}
+
+/// Where runs are beside each other: at about the same time, and at about the same error.
+struct Meeting {
+    time: f64,
+    error: f64,
+    at_time: Vec<Point>,
+    at_error: Vec<Point>,
+}
+
+impl Meeting {
+    fn of(runs: usize, outcome: &Outcome, metric: Metric) -> Meeting {
+        let raw = |point: &Point| metric.of(&point.errors);
+        // The time that all runs have.
+        let last = |run: usize| kept(&outcome.points, run).last();
+        let ends: Vec<&Point> = (0..runs).filter_map(last).collect();
+        let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
+        // Of the errors that runs end with the one that most runs pass, and of several the smallest.
+        let passes = |error: f64, run: usize| {
+            let errors = || kept(&outcome.points, run).map(raw);
+            errors().any(|e| e >= error) && errors().any(|e| e <= error)
+        };
+        let count = |error: f64| (0..runs).filter(|&run| passes(error, run)).count();
+        let mut finals: Vec<f64> = ends.iter().map(|p| raw(p)).collect();
+        finals.sort_by(f64::total_cmp);
+        let error = finals.iter().rev().copied().max_by_key(|&error| count(error)).unwrap_or(0.0);
+        let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
+            let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
+            (0..runs).filter_map(of_run).collect()
+        };
+        let at_time = nearest(&|p| (p.seconds / time).ln().abs());
+        let at_error = nearest(&|p| (raw(p) / error).ln().abs());
+        Meeting { time, error, at_time, at_error }
+    }
+}
+
+/// The windows, the reference, and the crops. `wanted`: windows that are asked for; where curves differ most otherwise.
+///
+/// # Errors
+/// Pictures that cannot be read again.
+pub(super) fn pictures(
+    (metric, reference): (Metric, &Reference),
+    outcome: &mut Outcome,
+    (wanted, look): (&[Window], Look),
+    curves: &[Curve],
+) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
+    let (width, height) = (reference.width, reference.height);
+    let lines = outcome.lines.clone();
+    let Meeting { time, error, at_time, at_error } = Meeting::of(lines.len(), outcome, metric);
+    let mut load = |points: &[Point]| -> Result<Vec<Vec<[f32; 3]>>> {
+        points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
+    };
+    let (timed, equal) = (load(&at_time)?, load(&at_error)?);
+    let mut windows = wanted.to_vec();
+    if windows.is_empty() && !timed.is_empty() {
+        windows = crop::choose(&timed, &reference.picture, (width, height), 2);
+    }
+    let strip = |title: String, points: &[Point], pictures: &[Vec<[f32; 3]>]| -> Result<Strip> {
+        let largest = crop::scale(pictures, &reference.picture, width, &windows);
+        let shown = |(point, picture): (&Point, &Vec<[f32; 3]>)| -> Result<Shown> {
+            let spot = curves[point.line]
+                .by_seed
+                .first()
+                .and_then(|curve| curve.iter().find(|spot| spot.iterations == point.iterations && spot.reported));
+            let figure = spot.map_or("below the reference's error".into(), |spot| {
+                format!("{} {}", metric.name(), short(spot.figure))
+            });
+            let seconds = short(point.seconds);
+            let line = &lines[point.line];
+            let count = match line.of.is_ours() {
+                true => iterations(point.iterations),
+                false => format!("{} samples a pixel", point.iterations),
+            };
+            Ok(Shown {
+                name: line.name.clone(),
+                caption: format!("{count}, {seconds} s, {figure}"),
+                pictures: windows.iter().map(|w| crop::picture(picture, width, *w, look)).collect::<Result<_>>()?,
+                heat_maps: windows
+                    .iter()
+                    .map(|w| crop::heat_map(picture, &reference.picture, width, *w, largest))
+                    .collect::<Result<_>>()?,
+            })
+        };
+        Ok(Strip { title, runs: points.iter().zip(pictures).map(shown).collect::<Result<_>>()?, largest })
+    };
+    let mut strips = Vec::new();
+    if !timed.is_empty() {
+        strips.push(strip(format!("At equal time: about {} s", short(time)), &at_time, &timed)?);
+        let own = reference.error.of(metric).unwrap_or(0.0);
+        let title = format!("At equal error: {} about {}", metric.name(), short((error - own).max(0.0)));
+        strips.push(strip(title, &at_error, &equal)?);
+    }
+    let mut parts = vec![Window::whole(width, height)];
+    parts.extend(&windows);
+    let truth = Shown {
+        name: "reference".into(),
+        caption: String::new(),
+        pictures: parts
+            .into_iter()
+            .map(|part| crop::picture(&reference.picture, width, part, look))
+            .collect::<Result<_>>()?,
+        heat_maps: Vec::new(),
+    };
+    Ok((windows, truth, strips))
+}
