@@ -6,7 +6,7 @@ use crate::render::{Phases, Spent};
 /// A curve measured at a moment.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Which curve of [`Outcome::lines`], from 0.
+    /// Which curve of [`Outcome::lines`](super::race::Outcome), from 0.
     pub line: usize,
     /// Its seed.
     pub seed: u64,
