@@ -96,9 +96,12 @@ pub struct Worst {
     pub tiles: Vec<Tile>,
 }
 
-/// Squared errors of objects, with their materials, and lights.
+/// An object with its material, if there is one, and the index of a kind of light.
+type Holder = (Option<[u32; 2]>, usize);
+
+/// Squared errors of holders.
 #[derive(Clone, Default)]
-struct Holders(BTreeMap<(Option<[u32; 2]>, usize), f64>);
+struct Holders(BTreeMap<Holder, f64>);
 
 impl Holders {
     fn add(&mut self, object: Option<[u32; 2]>, squared: f64, shares: [f32; LIGHTS.len()]) {
@@ -108,7 +111,7 @@ impl Holders {
     }
 
     /// The worst first.
-    fn sorted(&self) -> Vec<((Option<[u32; 2]>, usize), f64)> {
+    fn sorted(&self) -> Vec<(Holder, f64)> {
         let mut sorted: Vec<_> = self.0.iter().map(|(key, squared)| (*key, *squared)).collect();
         sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
         sorted
@@ -134,7 +137,7 @@ impl Worst {
             whole.add(object(i), squared, shares[i]);
         }
         let total = relative.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let place = |(of, light): (Option<[u32; 2]>, usize), squared: f64| {
+        let place = |(of, light): Holder, squared: f64| {
             let [object, material] = of.and_then(|of| seen.names(of)).unwrap_or_default().map(String::from);
             Place { share: squared / total, object, material, light: LIGHTS[light].1.into() }
         };

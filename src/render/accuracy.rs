@@ -69,7 +69,7 @@ impl Accuracy {
     pub fn of(history: &[History]) -> Option<Accuracy> {
         let judged = || history.iter().filter_map(|moment| Some((moment.iterations, moment.finished?)));
         let moments: Vec<Moment> = judged().filter_map(|(n, verdict)| Moment::of(n, &verdict)).collect();
-        let (last, verdict) = judged().last()?;
+        let (last, verdict) = judged().next_back()?;
         let latest = &moments[moments.len().saturating_sub(LATEST)..];
         let doubt = latest.last()?.doubt;
         let mean = |of: &[Moment], value: &dyn Fn(&Moment) -> f64| {
