@@ -135,6 +135,12 @@ fn accuracy_text(object: &Map<String, Value>) -> String {
         let confidence = accuracy.and_then(|accuracy| number(accuracy, "confidence")).unwrap_or(f64::NAN);
         text += &format!("the error lies between {low} and {high} in {} of all pictures\n", percent(confidence));
     }
+    let bias = accuracy.and_then(|accuracy| number(accuracy, "bias")).filter(|bias| *bias > 0.0);
+    if let Some(bias) = bias {
+        let bias = percent(bias);
+        text +=
+            &format!("its bandwidths have a bias of {bias}: errors below that are cheaper by a method without one\n");
+    }
     let rows = |of: &str| object.get("worst").and_then(|worst| worst[of].as_array()).into_iter().flatten();
     let name = |value: &Value, key: &str| value[key].as_str().unwrap_or_default().to_string();
     let place_of = |value: &Value| {

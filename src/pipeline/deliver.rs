@@ -182,6 +182,7 @@ impl Reached {
             "interval": self.interval(),
             "confidence": CONFIDENCE,
             "rare": self.rare(),
+            "bias": self.accuracy.squared_bias.sqrt(),
             "exponent": self.accuracy.exponent,
             "halving": halving,
         });

@@ -33,7 +33,7 @@ pub struct Accuracy {
     /// Logarithm of the squared error of noise after one iteration, as the latest moments tell it.
     level: f64,
     /// Squared bias, which is taken to stay.
-    squared_bias: f64,
+    pub squared_bias: f64,
     /// Standard error of the logarithm of the latest squared error, of what judges add.
     doubt: f64,
     /// Share of the noise that few bright samples hold ([`Verdict::rare`]).

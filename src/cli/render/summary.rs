@@ -146,7 +146,7 @@ pub fn tell_finish(name: &str, delivery: &Delivery, told: Told) {
     if let Some(rare) = reached.map(Reached::rare).filter(|rare| *rare > RARE) {
         let share = percent(rare);
         say(&format!(
-            "warning: few bright samples hold {share} of the noise: light that is rarely found may be missing, and the error larger than told; another --method may find it"
+            "warning: few bright samples hold {share} of the noise: with all pixels the error is larger than told, and light that is rarely found may be missing; another --method may find it"
         ));
     }
     if let Some(worst) = delivery.worst.as_ref().filter(|worst| !worst.by.is_empty()) {
