@@ -15,7 +15,7 @@ FACTOR = 1.5
 
 def main():
     stored = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
-    rows = [entry["values"]["rows"] for entry in stored if entry["name"] == "calibration"][-1]
+    rows = [row for entry in stored if entry["name"] == "calibration" for row in entry["values"]["rows"]]
     rows = [row for row in rows if row[3] and row[4]]
     figure, axes = pyplot.subplots(figsize=(6.4, 5))
     for index, name in enumerate(dict.fromkeys(row[0] for row in rows)):

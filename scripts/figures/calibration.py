@@ -6,6 +6,7 @@ docs/calibration.svg from what is stored, where there is .venv-python (scripts/p
   BUDGETS   seconds [2,4,8,16]
   SEEDS     [3]
   METHODS   [auto]
+  NAME      a name for what is stored, beside what is stored without one
 
 A picture counts as told right where the error is within a factor of 1.5 of the truth; the interval should hold the truth
 in nine of ten. Where more than half of the noise lies in half a per cent of the pixels the render itself warns: such
@@ -13,6 +14,7 @@ pictures are counted apart.
 """
 
 import math
+import os
 import subprocess
 import sys
 
@@ -98,6 +100,7 @@ def main():
         print(line(label, one))
     values = {"program": program(), "width": WIDTH, "threads": THREADS, "seeds": SEEDS, "budgets": BUDGETS}
     values |= {"methods": METHODS, "parts": summaries}
+    values |= {"set": os.environ["NAME"]} if "NAME" in os.environ else {}
     values["rows"] = [[r["scene"], r["budget"], r["seed"], *map(short, (r["told"], r["true"], r["rare"]))] for r in found]
     record("calibration", values)
     python = ROOT / ".venv-python" / "bin" / "python"

@@ -122,12 +122,7 @@ impl Estimate {
     /// The estimate by the first two quarters alone.
     #[must_use]
     pub fn first_half(&self, quarters: &[Vec<[f32; 3]>; QUARTERS]) -> Estimate {
-        self.half([&quarters[0], &quarters[1]])
-    }
-
-    /// The estimate by two quarters.
-    fn half(&self, quarters: [&[[f32; 3]]; 2]) -> Estimate {
-        self.of_some(told::mean(quarters), 2.0)
+        self.of_some(told::mean([&quarters[0], &quarters[1]]), 2.0)
     }
 
     /// The estimate by some of the iterations, whose mean is given; all are `fewer` times as many.
@@ -161,8 +156,7 @@ pub struct Finish {
 pub struct Account {
     /// Levels that equation (6) has combined, if it has.
     pub combined: Option<usize>,
-    /// The error of a picture finished from half of the iterations at the least quality, which the delivered one is
-    /// better than; where the picture has quarters.
+    /// The error of a picture finished from half of the iterations, where the picture has quarters.
     pub verdict: Option<Verdict>,
     /// The errors of its pixels, where the layer `Error` is wanted.
     pub errors: Option<Errors>,
@@ -270,18 +264,13 @@ impl Finish {
         of_pixels: bool,
     ) -> Result<Option<(Verdict, Option<Errors>)>> {
         let Some(quarters) = quarters(set) else { return Ok(None) };
-        let quality = std::mem::replace(&mut self.quality, Quality::Fast);
-        let [a, b, c, d] = &quarters;
-        let halves = [[a, b], [c, d]].map(|[a, b]| self.picture(&estimate.half([a, b])));
-        self.quality = quality;
-        let [first, second] = halves;
-        let (first, second) = (first?, second?);
+        let half = self.picture(&estimate.first_half(&quarters))?;
         let own = own_level(set);
         let levels = [own, own + 1].map(|level| set.get(&format!("Level{level}")).map(Layer::triples));
         let [own, larger] = &levels;
         let trial = Trial {
             size: estimate.size,
-            halves: [&first, &second],
+            half: &half,
             quarters: &quarters,
             deviation: &estimate.deviation,
             levels: own.as_deref().zip(larger.as_deref()).map(|(own, larger)| [own, larger]),

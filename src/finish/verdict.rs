@@ -1,14 +1,14 @@
 //! How wrong a finished picture is, and where, told by its quarters without a reference.
 //!
-//! Two pictures are finished from half of the iterations each, `F` from quarters 1 and 2, `G` from 3 and 4; either is
-//! judged by the quarters that it has not seen ([`super::told`]). The mean of
+//! A picture `F` is finished from quarters 1 and 2 as the whole one will be, and judged by those that it has not seen
+//! ([`super::told`]). The mean of
 //!
 //! ```text
-//! p = ((F - Q3)(F - Q4) + (G - Q1)(G - Q2)) / 2
+//! p = (F - Q3)(F - Q4)
 //! ```
 //!
 //! is the squared error of half the iterations. Beside it stands what its noise alone would tell: the mean of
-//! `q = (Q1 - Q2)(Q3 - Q4)` is zero whatever the picture is, and `q` has eight times the variance of the judges' part of
+//! `q = (Q1 - Q2)(Q3 - Q4)` is zero whatever the picture is, and `q` has four times the variance of the judges' part of
 //! `p`. Over blocks of pixels it tells how sure the number is, and over windows how far the window's own mean is to be
 //! believed.
 //!
@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 /// Pixels to each side of the windows in which errors of pixels are averaged.
 const REACH: usize = 7;
 /// What `q` has of the variance of `p`.
-const VARIANCES: f64 = 8.0;
+const VARIANCES: f64 = 4.0;
 /// Relative variance of what nothing is known of.
 const UNKNOWN: f64 = 1e30;
 /// A pixel's squared error is no smaller share of what its variance lets expect.
@@ -77,8 +77,8 @@ impl Errors {
 pub struct Trial<'a> {
     /// Width and height of all planes.
     pub size: Size,
-    /// The pictures finished from quarters 1 and 2, and from 3 and 4.
-    pub halves: [&'a [[f32; 3]]; 2],
+    /// The picture finished from quarters 1 and 2.
+    pub half: &'a [[f32; 3]],
     /// The quarters.
     pub quarters: &'a [Vec<[f32; 3]>; 4],
     /// Standard error of the estimate by all iterations.
@@ -190,9 +190,8 @@ struct Evidence {
 impl Evidence {
     fn of(trial: &Trial<'_>) -> Evidence {
         let pixels = trial.size.pixels();
-        let [f, g] = trial.halves;
-        let q = trial.quarters;
-        let value = |i: usize| (0..3).map(|c| 0.5 * (f64::from(f[i][c]) + f64::from(g[i][c]))).sum::<f64>() / 3.0;
+        let (f, q) = (trial.half, trial.quarters);
+        let value = |i: usize| mean(&f[i]);
         let floor = floor::relative((0..pixels).map(value));
         let weight: Vec<f64> = (0..pixels).into_par_iter().map(|i| 1.0 / (value(i).powi(2) + floor)).collect();
         let plane = |of: &(dyn Fn([f64; 4], usize, usize) -> f64 + Sync)| -> Vec<[f32; 3]> {
@@ -200,10 +199,7 @@ impl Evidence {
             let of_pixel = |i: usize| std::array::from_fn(|c| (of(at(i, c), i, c) * weight[i]) as f32);
             (0..pixels).into_par_iter().map(of_pixel).collect()
         };
-        let told = plane(&|q, i, c| {
-            let (f, g) = (f64::from(f[i][c]), f64::from(g[i][c]));
-            0.5 * ((f - q[2]) * (f - q[3]) + (g - q[0]) * (g - q[1]))
-        });
+        let told = plane(&|q, i, c| (f64::from(f[i][c]) - q[2]) * (f64::from(f[i][c]) - q[3]));
         let control = plane(&|q, _, _| (q[0] - q[1]) * (q[2] - q[3]));
         // By the variance, which is blind to the signs of the judges' errors: by how far these are apart, or off the
         // picture, those of one sign would be left out more often, and the mean of their products would be off.
@@ -249,10 +245,10 @@ mod tests {
         (0..SIZE.pixels()).map(|i| [1.0 + sigma(i) * 12f32.sqrt() * (draw(i) - 0.5); 3]).collect()
     }
 
-    fn judged(halves: [&[[f32; 3]]; 2], sigma: impl Fn(usize) -> f32 + Copy, seed: u64) -> (Verdict, Errors) {
+    fn judged(half: &[[f32; 3]], sigma: impl Fn(usize) -> f32 + Copy, seed: u64) -> (Verdict, Errors) {
         let quarters = [1, 2, 3, 4].map(|k| noisy(10 * seed + k, sigma));
         let deviation: Vec<[f32; 3]> = (0..SIZE.pixels()).map(|i| [0.5 * sigma(i); 3]).collect();
-        Trial { size: SIZE, halves, quarters: &quarters, deviation: &deviation, levels: None }.judge()
+        Trial { size: SIZE, half, quarters: &quarters, deviation: &deviation, levels: None }.judge()
     }
 
     /// Pictures that are off by a tenth, judged by quarters whose noise is three times that: the number is right, and
@@ -261,7 +257,7 @@ mod tests {
     fn the_number_is_right_and_knows_how_sure_it_is() {
         let picture = vec![[1.1; 3]; SIZE.pixels()];
         let truth = 0.01 / (1.01 * 1.21);
-        let told: Vec<Verdict> = (0..12).map(|seed| judged([&picture, &picture], |_| 0.3, seed).0).collect();
+        let told: Vec<Verdict> = (0..12).map(|seed| judged(&picture, |_| 0.3, seed).0).collect();
         let apart: Vec<f64> = told.iter().map(|verdict| (verdict.noise - truth) / verdict.deviation).collect();
         // Mean of twelve normal draws, and their mean square, chi-squared of twelve: four standard errors.
         let mean = apart.iter().sum::<f64>() / 12.0;
@@ -278,7 +274,7 @@ mod tests {
     fn pixels_tell_where() {
         let left = |i: usize| i % SIZE.width < SIZE.width / 2;
         let picture: Vec<[f32; 3]> = (0..SIZE.pixels()).map(|i| [if left(i) { 1.2 } else { 1.0 }; 3]).collect();
-        let (_, errors) = judged([&picture, &picture], |_| 0.1, 3);
+        let (_, errors) = judged(&picture, |_| 0.1, 3);
         let inside = |i: &usize| (i % SIZE.width).abs_diff(SIZE.width / 2) > REACH;
         let mean = |of_left: bool| {
             let chosen: Vec<usize> = (0..SIZE.pixels()).filter(inside).filter(|i| left(*i) == of_left).collect();
@@ -293,7 +289,7 @@ mod tests {
     fn variance_tells_where_windows_do_not() {
         let sigma = |i: usize| if i % SIZE.width < SIZE.width / 2 { 8.0 } else { 2.0 };
         let picture = vec![[1.0; 3]; SIZE.pixels()];
-        let (_, errors) = judged([&picture, &picture], sigma, 4);
+        let (_, errors) = judged(&picture, sigma, 4);
         let mean = |low: usize, high: usize| {
             let chosen = (0..SIZE.pixels()).filter(|i| (low..high).contains(&(i % SIZE.width)));
             chosen.map(|i| f64::from(errors.noise[i][0])).sum::<f64>()
@@ -310,9 +306,8 @@ mod tests {
         quarters[2][777] = [1e5; 3];
         let mut deviation = vec![[0.025; 3]; SIZE.pixels()];
         deviation[777] = [2.5e4; 3];
-        let halves: [&[[f32; 3]]; 2] = [&picture, &picture];
         let (verdict, _) =
-            Trial { size: SIZE, halves, quarters: &quarters, deviation: &deviation, levels: None }.judge();
+            Trial { size: SIZE, half: &picture, quarters: &quarters, deviation: &deviation, levels: None }.judge();
         assert!(verdict.rare > 0.99, "{}", verdict.rare);
         assert!((verdict.noise / (0.01 / (1.01 * 1.21)) - 1.0).abs() < 0.05, "{}", verdict.noise);
         assert!(verdict.noise.is_finite() && verdict.deviation.is_finite());
@@ -326,10 +321,9 @@ mod tests {
         let larger: Vec<[f32; 3]> = own.iter().map(|v| v.map(|v| v + 0.1)).collect();
         let deviation = vec![[0.1; 3]; SIZE.pixels()];
         let picture = vec![[1.0; 3]; SIZE.pixels()];
-        let halves: [&[[f32; 3]]; 2] = [&picture, &picture];
         let levels: Option<[&[[f32; 3]]; 2]> = Some([&own, &larger]);
         let (verdict, errors) =
-            Trial { size: SIZE, halves, quarters: &quarters, deviation: &deviation, levels }.judge();
+            Trial { size: SIZE, half: &picture, quarters: &quarters, deviation: &deviation, levels }.judge();
         assert!((verdict.bias / (0.01 / 1.01) - 1.0).abs() < 1e-3, "{}", verdict.bias);
         assert!(errors.bias.iter().flatten().all(|b| (b / 0.01 - 1.0).abs() < 1e-3));
         let fall = 2f32.powf(-0.7);

@@ -101,8 +101,8 @@ impl Ready {
             }
         }
         self.finish.quality = picture.0;
-        // The picture, two halves of it for its error, and its parts.
-        Ok((picture.1 + fast * (2.0 + parts as f64)).min(MOST * seconds))
+        // The picture, half of it for its error, and its parts.
+        Ok((2.0 * picture.1 + fast * parts as f64).min(MOST * seconds))
     }
 
     /// Finishes a picture that is looked at for some seconds: the quickest way, without its error and its parts.

@@ -17,9 +17,9 @@ const RANGE: (f64, f64) = (0.1, 0.55);
 const LATEST: usize = 3;
 /// Spread of the logarithm of squared errors from moment to moment, what judges add apart.
 const SCATTER: f64 = 0.2;
-/// Spread of the logarithm of an error that is told from what it is, what judges add apart: fitted on one set of scenes,
-/// and checked on another (`docs/accuracy.md`).
-const MODEL: f64 = 0.15;
+/// Spread of the logarithm of an error that is told from what it is, what judges add apart: fitted on twelve scenes, and
+/// checked on others (`docs/accuracy.md`).
+const MODEL: f64 = 0.25;
 /// The share of pictures whose error lies in the interval.
 pub const CONFIDENCE: f64 = 0.9;
 /// Standard deviations to each side of a normal distribution that hold that share.
