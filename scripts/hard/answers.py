@@ -117,6 +117,27 @@ class Black(Answer):
 
 
 @dataclass(frozen=True)
+class Warned(Answer):
+    """What has no right answer is said: the program's warning matches, and no pixel is outside of low to high."""
+
+    match: str
+    low: float
+    high: float
+    derivation: str
+    scene: str = "scene"
+
+    def judge(self, stage):
+        pictures = stage.pictures(self.scene)
+        least, most = float(pictures.min()), float(pictures.max())
+        said = re.search(self.match, stage.said, re.IGNORECASE)
+        return judge.Verdict(bool(said) and self.low <= least and most <= self.high,
+                             f"pixels from {least:.3g} to {most:.3g}; {'a warning' if said else 'no warning'}")
+
+    def shown(self):
+        return [self.scene]
+
+
+@dataclass(frozen=True)
 class Sweep(Answer):
     """Scenes in order, whose means change smoothly, and fall where `monotone`."""
 

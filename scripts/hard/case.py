@@ -28,7 +28,6 @@ class Case:
     fails: dict = field(default_factory=dict)
     long: bool = False
     family: str = ""
-    written: set = field(default_factory=set, repr=False)
 
     def file(self, label):
         """The file of a scene."""
@@ -51,8 +50,5 @@ class Case:
     def write(self, folder):
         """Writes NAME.json and the scenes."""
         for label, made in self.scenes.items():
-            path = folder / self.file(label)
-            if path not in self.written:
-                made().write(path)
-                self.written.add(path)
+            made().write(folder / self.file(label))
         (folder / f"{self.name}.json").write_text(json.dumps(self.document(), indent=1) + "\n")

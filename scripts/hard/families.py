@@ -3,7 +3,7 @@
 import importlib
 
 #: Modules of cases; each has a TITLE and CASES.
-MODULES = ("furnace", "scale", "lights", "refraction", "media", "determinism")
+MODULES = ("scale", "lights", "roughness", "refraction", "grazing", "geometry", "furnace", "media", "determinism")
 
 
 def cases():

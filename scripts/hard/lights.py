@@ -89,7 +89,7 @@ CASES = [
          {label: partial(shrinking, half) for label, half in SIZES.items()},
          Values({label: lit_by_square(0.25 / half**2, half) for label, half in SIZES.items()},
                 "Albedo times radiance times the form factor of a square parallel to a point below its middle."),
-         ("path", "bdpt", "vcm", "sppm"), size=8),
+         ("path", "bdpt", "vcm", "sppm"), size=8, iterations=16),
     Case("light-point", "A point light of the intensity that the shrinking lamp tends to",
          {"scene": lambda: ground().point((0, HEIGHT, 0), 1.0)},
          Value(ALBEDO / pi / HEIGHT**2, "Albedo / pi times I / d²."), size=8),
@@ -106,8 +106,8 @@ CASES = [
          Values({"delta": PANE, "half": PANE},
                 "Perpendicular Fresnel reflectance is R = 0.04; with all inner reflections a pane passes (1 - R) / (1 + R). "
                 "L = albedo / pi E times that. The floor's own light that the pane returns is below 0.05 %.",
-                bound=0.005, resolves=0.06), ("vcm", "sppm", "bpm"), size=8, iterations={None: 32, "sppm": 8},
-         options={None: ("--initial-bandwidth", "0.03"), "path": ()}),
+                bound=0.005, resolves=0.06), ("vcm", "sppm", "cppm"), size=16, iterations={None: 8, "vcm": 200}, photons=50000,
+         options={None: ("--initial-bandwidth", "0.03"), "vcm": ("--initial-bandwidth", "0.03", "--guide", "on")}),
     Case("light-many", "100,489 tiny lamps with the power of one square",
          {"scene": partial(many, 317)},
          Value(lit_by_square(1.0, 1.0), "Lamps this dense are an even square: the sum over them is the integral but for "

@@ -13,6 +13,7 @@ from case import Case
 TITLE = "Media"
 WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
 METHODS = ("path", "bdpt", "vcm", "sppm")
+EYE = METHODS[:3]
 
 
 def cloud(of, half=0.5, eye=(0, 0, 4), field_deg=8):
@@ -57,13 +58,15 @@ CASES = [
          Value([exp(-0.1), exp(-1), exp(-3)], "Beer and Lambert by channel.", bound=0.01), METHODS, iterations=16),
     Case("media-albedo-1", "A box that scatters and absorbs nothing, g = 0, 0.999 and -0.999, in a white furnace",
          {f"g{g:g}": partial(cloud, s.medium(0, 3, g)) for g in G},
-         Values({f"g{g:g}": 1.0 for g in G}, WHITE, bound=0.005, resolves=0.06), METHODS, iterations={None: 16, "sppm": 4}),
+         Values({f"g{g:g}": 1.0 for g in G}, WHITE, bound=0.005, resolves=0.06), METHODS, iterations={None: 40, "sppm": 4}),
     Case("media-dense", "Albedo 1 at 10^6 scatterings a metre, in a box of 0.1 mm, in a white furnace",
          {"scene": partial(cloud, s.medium(0, 1e6), 5e-5, (0, 0, 4e-4))},
          Value(1.0, WHITE, bound=0.005, resolves=0.06), ("path", "bdpt", "vcm"), iterations=8, size=8),
-    Case("media-half-space", "10^6 scatterings a metre in a metre, albedo 0.5 and 0.9",
-         {f"{a:g}": partial(cloud, s.medium((1 - a) * 1e6, a * 1e6)) for a in (0.5, 0.9)},
-         Values({f"{a:g}": half_space(a) for a in (0.5, 0.9)}, "A metre is as good as infinite depth: a plane in a white "
-                "furnace shows 1 - H(1) sqrt(1 - albedo), with Chandrasekhar's H for even scattering.", bound=0.005,
-                resolves=0.08), ("path", "bdpt", "vcm"), iterations=32, size=8),
+    *(Case(f"media-half-space-{density:.0e}".replace("e+0", "e"),
+           f"A metre of {density:g} scatterings and absorptions a metre, albedo 0.5 and 0.9",
+           {f"{a:g}": partial(cloud, s.medium((1 - a) * density, a * density)) for a in (0.5, 0.9)},
+           Values({f"{a:g}": half_space(a) for a in (0.5, 0.9)}, "So dense, a metre is as good as infinite depth: a plane in "
+                  "a white furnace shows 1 - H(1) sqrt(1 - albedo), with Chandrasekhar's H for even scattering.",
+                  bound=0.01, resolves=0.08), EYE, iterations={None: 64, "vcm": 96, "bdpt": 96}, size=8)
+      for density in (1e2, 1e4, 1e6)),
 ]

@@ -5,7 +5,7 @@ from math import asin, cos, pi, radians, sin, sqrt, tan
 
 import scene as s
 import shapes
-from answers import Black, Equal, Value, Values
+from answers import Black, Equal, Value, Values, Warned
 from case import Case
 
 TITLE = "Refraction"
@@ -38,6 +38,13 @@ def furnace(*solids, eye=(0, 0.5, 4), field_deg=12):
     for mesh, material in solids:
         made = made.add(mesh, material)
     return made.seen(eye, (0, 0, 0), field_deg)
+
+
+def outdoors(material):
+    """A floor under a white sky, a black post on it, and a ball between them and the eye."""
+    made = s.Scene().within(1).add(shapes.floor(1.5), s.diffuse((0.8, 0.6, 0.4)))
+    made = made.add(shapes.box((-0.1, 0, -0.6), (0.1, 0.8, -0.5)), s.diffuse(0))
+    return (made.add(ball(), material) if material else made).seen((0, 1.5, 3), (0, 0.3, 0), 30)
 
 
 def ball(radius=0.5, middle=(0, 0.5, 0)):
@@ -82,9 +89,10 @@ def shell(inner):
 
 
 def lantern():
-    """A point light of 1 W/sr in a ball of glass, 2 m above a floor."""
-    made = s.Scene().add(shapes.floor(2), s.diffuse(0.8)).add(shapes.sphere((0, 2, 0), 0.3, rings=64), s.glass(1.5))
-    return made.point((0, 2, 0), 1.0).seen((2, 2, 0), (0, 0, 0), 1)
+    """A point light of 1 W/sr in a ball of glass, in the middle of a matte sphere of radius 1 and albedo 1/2."""
+    made = s.Scene().add(shapes.sphere((0, 0, 0), 1, 64).flipped(), s.diffuse(0.5))
+    made = made.add(shapes.sphere((0, 0, 0), 0.3, 64), s.glass(1.5))
+    return made.point((0, 0, 0), 1.0).seen((0.5, 0.1, 0.5), (0.9, 0.5, -0.4), 60)
 
 
 GUIDE = reflectance(cos(radians(30)), 1.5)
@@ -97,9 +105,9 @@ CASES = [
          {"smooth": partial(furnace, (block(0.3), s.glass(1.0))), "rough": partial(furnace, (block(0.3), s.glass(1.0, 0.5)))},
          Values({"smooth": 1.0, "rough": 1.0}, WHITE), EYE),
     Case("ior-1.0001", "A solid of index 1.0001 all but vanishes",
-         {"without": stage, "with": partial(stage, (ball(), s.glass(1.0001)))},
+         {"without": partial(outdoors, None), "with": partial(outdoors, s.glass(1.0001))},
          Equal("without", ("with",), "Reflectance is 2.5e-9 and light is bent by less than 1e-3 at all but the outline.",
-               bound=0.01, resolves=0.08), ("path", "vcm", "sppm"), iterations={None: 8, "path": 64}, fails={}),
+               bound=0.01, resolves=0.05), EYE, iterations=64),
     Case("ior-range", "Solids of index 1.0001, 1.33, 2.4 and 4 in a white furnace",
          {f"{ior:g}": partial(furnace, (block(0.3), s.glass(ior))) for ior in (1.0001, 1.33, 2.4, 4)},
          Values({f"{ior:g}": 1.0 for ior in (1.0001, 1.33, 2.4, 4)}, WHITE), EYE),
@@ -108,7 +116,8 @@ CASES = [
          Value(1.0, WHITE, bound=0.005), EYE),
     Case("critical-above", "Above the critical angle glass reflects everything: a black tank below stays black",
          {"scene": partial(under_water, 41.9)},
-         Black(1e-6, "The critical angle is asin(1 / 1.5) = 41.81°. At 41.9° no light comes from outside."), EYE),
+         Black(1e-6, "The critical angle is asin(1 / 1.5) = 41.81°. At 41.9° no light comes from outside."), EYE,
+         seeds=2, iterations=1, size=8),
     Case("nested", "Glass in water in glass in a white furnace, by priorities",
          {"scene": lambda: furnace(*nested(0.0))}, Value(1.0, WHITE, bound=0.005), EYE),
     Case("coincident", "Liquid and glass whose faces coincide, in a white furnace",
@@ -116,22 +125,23 @@ CASES = [
          Value(1.0, WHITE, bound=0.005), EYE),
     Case("mesh-open", "A box of glass that lacks a face, in a white furnace",
          {"scene": lambda: furnace((block(0.3).without([0, 1]), s.glass(1.5)))},
-         Value(1.0, WHITE + " A missing face takes no light away.", bound=0.005), EYE),
+         Warned("not closed|open", 1 / 2.25, 2.25, "What is inside of an open solid is undefined. Radiance may be off by n² "
+                "where a ray enters glass and leaves through the hole, by no more, and the mesh is named."), EYE),
     Case("mesh-inverted", "A box of glass whose faces point in, in a white furnace",
          {"scene": lambda: furnace((block(0.3).flipped(), s.glass(1.5)))},
          Value(1.0, WHITE + " Nor does which way a face was wound.", bound=0.005), EYE),
     Case("eye-in-glass", "The eye in a ball of glass, lit from everywhere",
          {"scene": lambda: furnace((shapes.sphere((0, 0, 0), 1), s.glass(1.5)), eye=(0, 0.1, 0.3), field_deg=40)},
-         Value(1.0, "At equilibrium the basic radiance L / n² is the same everywhere: 1. The eye is given that, as if it "
-               "were in air; radiance itself is n² L = 2.25.", bound=0.005), EYE),
-    Case("lamp-in-glass", "A point light in the middle of a ball of glass lights a floor below",
-         {"scene": lantern},
-         Value(0.8 / pi / 4, "Every ray meets the ball along its normal, and what is reflected passes the middle again: all "
-               "light gets out, unbent. L = albedo / pi I / d², as without the ball.", bound=0.01, resolves=0.06),
-         ("vcm", "sppm", "bpm"), size=8, iterations={None: 32, "sppm": 8},
-         options=("--initial-bandwidth", "0.03")),
+         Value(2.25, "At equilibrium the basic radiance L / n² is the same everywhere, so radiance in glass is n² = 2.25.",
+               bound=0.005), EYE),
+    Case("lamp-in-glass", "A point light in a ball of glass, in the middle of a matte sphere", {"scene": lantern},
+         Value(1 / pi, "Every ray of the light meets the ball along its normal, and what is reflected passes the middle again: "
+               "all light gets out, unbent. Light between walls finds the ball as transparent as nothing, for radiance is the "
+               "same all around. L = albedo / pi I / r² / (1 - albedo). Facets stand for the spheres within the bound.",
+               bound=0.015, resolves=0.06), ("vcm", "sppm", "cppm", "bpm"), size=16, iterations={None: 4, "vcm": 32, "bpm": 32},
+         options=("--initial-bandwidth", "0.2")),
     Case("guide-60", "A rod of glass in which light is totally reflected 60 times",
          {"scene": partial(guide, 60)},
          Value((1 - GUIDE) / (1 + GUIDE), "The rod's sides reflect everything, so unfolded it is a pane: it passes "
-               "(1 - R) / (1 + R) of the lamp's radiance, with Fresnel's R at 30°.", bound=0.005), EYE, size=8, iterations=32),
+               "(1 - R) / (1 + R) of the lamp's radiance, with Fresnel's R at 30°.", bound=0.005), EYE, size=8, iterations=160),
 ]

@@ -2,15 +2,17 @@
 
 import argparse
 import json
+import os
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import families
 import judge
 import page
-from stage import Broken, Stage, clear, read
+from stage import Broken, Stage, read
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -18,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 @dataclass
 class Result:
     """What became of a case with a method. state: met, failed, known (fails as it is known to) or passed (although it
-    is known to fail)."""
+    is known to fail); seconds: of its renders."""
 
     case: object
     method: str
@@ -44,7 +46,7 @@ def play(case, method, program, folder, threads):
     state = ("passed" if known else "met") if verdict.passed else ("known" if known else "failed")
     shown = {label: read(stage.picture(f"{label}-0")) for label in case.answer.shown()
              if stage.picture(f"{label}-0").is_file()}
-    clear(folder)
+    stage.clear()
     return Result(case, method, state, verdict, stage.seconds, stage.commands, shown)
 
 
@@ -68,6 +70,7 @@ def parser():
     made.add_argument("--list", action="store_true", help="print the names of the cases and end")
     made.add_argument("--scenes", action="store_true", help="write the scenes and their answers, and end")
     made.add_argument("--threads", type=int, default=1, help="of a render [default: 1]")
+    made.add_argument("--jobs", type=int, default=os.cpu_count(), help="renders at a time [default: all cores]")
     made.add_argument("--program", type=Path, default=ROOT / "target/release/caustique", help="caustique")
     made.add_argument("-o", "--output", type=Path, default=ROOT / "out/hard", help="folder [default: out/hard]")
     return made
@@ -75,7 +78,7 @@ def parser():
 
 def line(result):
     """A result in one line."""
-    return f"{result.state:7} {result.case.name} {result.method}: {result.verdict.figure}"
+    return f"{result.state:7} {result.seconds:5.1f} s {result.case.name} {result.method}: {result.verdict.figure}"
 
 
 def main(arguments=None):
@@ -91,11 +94,12 @@ def main(arguments=None):
         return 0
     started, results = time.monotonic(), []
     wanted = options.methods.split(",") if options.methods else None
-    for case in cases:
-        for method in case.methods:
-            if wanted is None or method in wanted:
-                results.append(play(case, method, options.program, options.output, options.threads))
-                print(line(results[-1]), flush=True)
+    pairs = [(case, method) for case in cases for method in case.methods if wanted is None or method in wanted]
+    where = (options.program, options.output, options.threads)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for result in pool.map(lambda pair: play(*pair, *where), pairs):
+            results.append(result)
+            print(line(result), flush=True)
     return finish(results, options.output, time.monotonic() - started)
 
 

@@ -1,6 +1,5 @@
-"""Where cases are played: writes their scenes, runs the program, and keeps the pictures of a case while it is judged."""
+"""Where cases are played: runs the program, and keeps the pictures of a case while it is judged."""
 
-import os
 import subprocess
 import time
 from pathlib import Path
@@ -23,20 +22,21 @@ class Stage:
 
     def __init__(self, program, folder, case, method, threads=1):
         self.program, self.folder, self.case, self.method, self.threads = Path(program), Path(folder), case, method, threads
-        self.kept, self.commands, self.seconds = {}, [], 0.0
+        self.kept, self.commands, self.seconds, self.said = {}, [], 0.0, ""
         (self.folder / "pictures").mkdir(parents=True, exist_ok=True)
 
     def scene(self, label):
-        """The path of a scene of the case, which is written where it is not there."""
-        path = self.folder / self.case.file(label)
-        if path not in self.case.written:
-            self.case.scenes[label]().write(path)
-            self.case.written.add(path)
-        return path
+        """The path of a scene of the case, which Case.write() has written."""
+        return self.folder / self.case.file(label)
 
     def picture(self, name):
         """The path of a picture of this case and method."""
         return self.folder / "pictures" / f"{self.case.name}-{self.method}-{name}.exr"
+
+    def clear(self):
+        """Removes the pictures of this case and method."""
+        for path in self.folder.glob(f"pictures/{self.case.name}-{self.method}-*"):
+            path.unlink()
 
     def run(self, *arguments, stop_after=None):
         """Runs the program; (exit code, what it said on stderr). stop_after: seconds until it is killed."""
@@ -67,6 +67,7 @@ class Stage:
         """Renders a scene into the file that is returned."""
         path = self.picture(name or f"{label}-{seed}")
         code, said = self.run(*self.arguments(label, seed, threads), *more, "-o", path)
+        self.said += said
         if code:
             raise Broken(said.strip() or f"exit code {code}")
         return path
@@ -86,9 +87,3 @@ def read(path):
     if "RGB" in channels:
         return channels["RGB"].pixels
     return np.stack([channels[c].pixels for c in "RGB"], axis=-1)
-
-
-def clear(folder):
-    """Removes the pictures."""
-    for path in Path(folder, "pictures").glob("*"):
-        os.remove(path)
