@@ -75,7 +75,7 @@ CASES = [
     Case("rough-lobe", "The share of a lobe that a lamp takes up, against quadrature", lobes(SHARP),
          Values({f"{r:g}": lobe_share(r * r) for r in SHARP}, "GGX with Smith's height-correlated shadowing, integrated "
                 "over the lamp. White metal has no Fresnel effect. Light between facets adds less than 1 %.", bound=0.01,
-                resolves=0.04), EYE, iterations=16, size=8, photons=20000),
+                resolves=0.04), EYE, iterations=40, size=8, photons=20000),
     Case("rough-sweep", "Roughness from 0.2 to 1 in steps of 0.05: smooth and falling", lobes(SWEEP),
          Sweep(tuple(f"{r:g}" for r in SWEEP), "A wider lobe has less of itself within the lamp; the integral is smooth "
                "in alpha, and its second difference over these steps below 3 % of the largest value.", bound=0.03,
