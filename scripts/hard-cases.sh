@@ -5,6 +5,7 @@
 #   scripts/hard-cases.sh                   the short form
 #   scripts/hard-cases.sh --long            the cases that take long as well
 #   scripts/hard-cases.sh --only NAME...    cases whose names begin so; --list prints all
+#   scripts/hard-cases.sh --with LIST       other renderers as well: mitsuba,luxcore,luxcore-vm,cycles
 #   scripts/hard-cases.sh --scenes -o DIR   the scenes and their answers alone, for other renderers
 #
 # CAUSTIQUE_BIN names a program to take instead of building one.
@@ -19,4 +20,7 @@ if [ -z "${CAUSTIQUE_BIN:-}" ]; then
     (cd "$ROOT" && cargo build --release --quiet)
     CAUSTIQUE_BIN=$(realpath -m "${CARGO_TARGET_DIR:-$ROOT/target}/release/caustique")
 fi
+for option in "$@"; do
+    case $option in --with | --with=*) "$ROOT/scripts/compare/setup.sh" peers ;; esac
+done
 exec "$ROOT/.venv/bin/python" "$ROOT/scripts/hard" --program "$CAUSTIQUE_BIN" "$@"

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from itertools import permutations
 
 import judge
-from stage import Broken
+from stage import Broken, read
 
 
 class Answer:
@@ -57,8 +57,10 @@ class Values(Answer):
     resolves: float = 0.03
 
     def judge(self, stage):
-        found = {label: judge.value(stage.pictures(label), value, self.bound, self.resolves)
-                 for label, value in self.values.items()}
+        found = {
+            label: judge.value(stage.pictures(label), value, self.bound, self.resolves)
+            for label, value in self.values.items()
+        }
         return worst(found)
 
     def shown(self):
@@ -77,8 +79,9 @@ class Equal(Answer):
 
     def judge(self, stage):
         like = stage.pictures(self.like)
-        return worst({label: judge.equal(stage.pictures(label), like, self.bound, self.resolves)
-                      for label in self.scenes})
+        return worst(
+            {label: judge.equal(stage.pictures(label), like, self.bound, self.resolves) for label in self.scenes}
+        )
 
     def shown(self):
         return [self.like, *self.scenes]
@@ -94,8 +97,9 @@ class Exact(Answer):
 
     def judge(self, stage):
         like = stage.pictures(self.like)
-        return worst({label: judge.exact(stage.pictures(label), like, 2.0 ** power)
-                      for label, power in self.powers.items()})
+        return worst(
+            {label: judge.exact(stage.pictures(label), like, 2.0**power) for label, power in self.powers.items()}
+        )
 
     def shown(self):
         return [self.like, *self.powers]
@@ -130,8 +134,10 @@ class Warned(Answer):
         pictures = stage.pictures(self.scene)
         least, most = float(pictures.min()), float(pictures.max())
         said = re.search(self.match, stage.said, re.IGNORECASE)
-        return judge.Verdict(bool(said) and self.low <= least and most <= self.high,
-                             f"pixels from {least:.3g} to {most:.3g}; {'a warning' if said else 'no warning'}")
+        return judge.Verdict(
+            bool(said) and self.low <= least and most <= self.high,
+            f"pixels from {least:.3g} to {most:.3g}; {'a warning' if said else 'no warning'}",
+        )
 
     def shown(self):
         return [self.scene]
@@ -186,8 +192,12 @@ class Threads(Answer):
     peers = False
 
     def judge(self, stage):
-        return judge.same({f"{n} threads": stage.render(self.scene, 0, name=f"threads-{n}", threads=n).read_bytes()
-                           for n in self.counts})
+        return judge.same(
+            {
+                f"{n} threads": stage.render(self.scene, 0, name=f"threads-{n}", threads=n).read_bytes()
+                for n in self.counts
+            }
+        )
 
     def shown(self):
         return []
@@ -195,24 +205,28 @@ class Threads(Answer):
 
 @dataclass(frozen=True)
 class Shards(Answer):
-    """Shards merged in any order are equal files."""
+    """Shards merged in any order are the picture of a render that was not divided, to the last bit; with `files` their
+    headers are equal as well, among orders."""
 
     derivation: str
+    files: bool = False
     count: int = 3
     scene: str = "scene"
     peers = False
 
     def judge(self, stage):
-        shards = [stage.render(self.scene, 0, "--shard", f"{i}/{self.count}", name=f"shard-{i}")
-                  for i in range(self.count)]
-        merged = {}
+        shards = [
+            stage.render(self.scene, 0, "--shard", f"{i}/{self.count}", name=f"shard-{i}") for i in range(self.count)
+        ]
+        found = {} if self.files else {"whole": read(stage.render(self.scene, 0, name="whole")).tobytes()}
         for order in permutations(range(self.count)):
-            path = stage.picture("merged-" + "".join(map(str, order)))
+            name = "".join(map(str, order))
+            path = stage.picture(f"merged-{name}")
             code, said = stage.run("merge", *(shards[i] for i in order), "-o", path, "--no-combine")
             if code:
                 raise Broken(said.strip())
-            merged["order " + "".join(map(str, order))] = path.read_bytes()
-        return judge.same(merged)
+            found[f"order {name}"] = path.read_bytes() if self.files else read(path).tobytes()
+        return judge.same(found)
 
     def shown(self):
         return []
@@ -234,8 +248,9 @@ class Resumed(Answer):
         # A share of the time of the whole render, and longer where nothing had been saved by then.
         after = 0.4 * stage.seconds
         for _ in range(8):
-            code, said = stage.run(*arguments, "--checkpoint", saved, "--checkpoint-every", "0.05", "-o", path,
-                                   stop_after=after)
+            code, said = stage.run(
+                *arguments, "--checkpoint", saved, "--checkpoint-every", "0.05", "-o", path, stop_after=after
+            )
             if saved.is_file():
                 break
             after *= 1.5
@@ -256,5 +271,8 @@ def worst(verdicts):
     """The verdict of several, {scene: verdict}: the one nearest to its limit, or beyond it."""
     label = max(verdicts, key=lambda label: (not verdicts[label].passed, verdicts[label].share))
     one = verdicts[label]
-    return judge.Verdict(all(v.passed for v in verdicts.values()), f"{label}: {one.figure}" if len(verdicts) > 1 else
-                         one.figure, one.share)
+    return judge.Verdict(
+        all(v.passed for v in verdicts.values()),
+        f"{label}: {one.figure}" if len(verdicts) > 1 else one.figure,
+        one.share,
+    )

@@ -11,8 +11,8 @@ METHODS = ("path", "bdpt", "vcm", "sppm")
 class Case:
     """name: of files and on the command line; title: what it tests; scenes: {label: function that makes a Scene}.
 
-    iterations, photons and options: of every method, or {method: ...} with those of the others at None. fails: {method: why the program
-    is known not to meet the answer}. long: whether it is part of the long form alone.
+    iterations, photons and options: of every method, or {method: ...} with those of the others at None.
+    fails: {method: why the program is known not to meet the answer}. long: whether the long form alone has it.
     """
 
     name: str
@@ -40,12 +40,21 @@ class Case:
 
     def document(self):
         """All that others need to play the case, as JSON: NAME.json beside the scenes."""
-        return {"name": self.name, "family": self.family, "title": self.title,
-                "scenes": {label: self.file(label) for label in self.scenes}, "width": self.size, "height": self.size,
-                "seeds": self.seeds,
-                "methods": {method: {key: self.of(key, method) for key in ("iterations", "photons", "options")}
-                            for method in self.methods},
-                "answer": self.answer.document(), "fails": self.fails}
+        return {
+            "name": self.name,
+            "family": self.family,
+            "title": self.title,
+            "scenes": {label: self.file(label) for label in self.scenes},
+            "width": self.size,
+            "height": self.size,
+            "seeds": self.seeds,
+            "methods": {
+                method: {key: self.of(key, method) for key in ("iterations", "photons", "options")}
+                for method in self.methods
+            },
+            "answer": self.answer.document(),
+            "fails": self.fails,
+        }
 
     def write(self, folder):
         """Writes NAME.json and the scenes."""

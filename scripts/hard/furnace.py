@@ -28,27 +28,53 @@ WIDE = {None: (), "sppm": ("--initial-bandwidth", "0.3"), "vcm": ("--initial-ban
 
 
 def _closed(albedo, iterations, photons, resolves=0.1):
-    return Case(f"furnace-albedo-{albedo}", f"A closed box of albedo {albedo} whose walls emit",
-                {"scene": partial(closed, albedo)},
-                Value(1 / (1 - albedo), f"L = 1 + {albedo} L on every wall, so L = 1 / (1 - {albedo}).", bound=0.005,
-                      resolves=resolves),
-                iterations=iterations, photons=photons, options=WIDE, size=8)
+    return Case(
+        f"furnace-albedo-{albedo}",
+        f"A closed box of albedo {albedo} whose walls emit",
+        {"scene": partial(closed, albedo)},
+        Value(
+            1 / (1 - albedo),
+            f"L = 1 + {albedo} L on every wall, so L = 1 / (1 - {albedo}).",
+            bound=0.005,
+            resolves=resolves,
+        ),
+        iterations=iterations,
+        photons=photons,
+        options=WIDE,
+        size=8,
+    )
 
 
 def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, **more):
     scenes = {f"roughness-{r:g}": partial(white, material(r)) for r in ROUGHNESS}
-    return Case(f"furnace-{name}", f"{title} in a white furnace, roughness 0 to 1", scenes,
-                Values({label: 1.0 for label in scenes}, WHITE, bound=bound), methods=methods, **more)
+    return Case(
+        f"furnace-{name}",
+        f"{title} in a white furnace, roughness 0 to 1",
+        scenes,
+        Values({label: 1.0 for label in scenes}, WHITE, bound=bound),
+        methods=methods,
+        **more,
+    )
 
 
 CASES = [
-    _closed(0.5, {None: 64, "sppm": 8}, 10000), _closed(0.9, {None: 64, "sppm": 8}, 5000),
-    _closed(0.99, {None: 96, "sppm": 16}, 500), _closed(0.999, {None: 96, "sppm": 8}, 100, resolves=0.25),
-    Case("furnace-diffuse", "A white Lambertian sphere in a white furnace", {"scene": partial(white, s.diffuse(1))},
-         Value(1.0, WHITE)),
+    _closed(0.5, {None: 64, "sppm": 8}, 10000),
+    _closed(0.9, {None: 64, "sppm": 8}, 5000),
+    _closed(0.99, {None: 96, "sppm": 16}, 500),
+    _closed(0.999, {None: 96, "sppm": 8}, 100, resolves=0.25),
+    Case(
+        "furnace-diffuse",
+        "A white Lambertian sphere in a white furnace",
+        {"scene": partial(white, s.diffuse(1))},
+        Value(1.0, WHITE),
+    ),
     _lobe("metal", "White metal", lambda r: s.metal(1, r), bound=0.01),
     _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01),
     _lobe("plastic", "A dielectric coat over a white base", lambda r: s.plastic(1, r), bound=0.01),
-    Case("furnace-glass-box", "A closed box of clear glass, through its edges and corners",
-         {"scene": partial(white, s.glass(1.5), shapes.box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3)))}, Value(1.0, WHITE)),
+    Case(
+        "furnace-glass-box",
+        "A closed box of clear glass, through its edges and corners",
+        {"scene": partial(white, s.glass(1.5), shapes.box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3)))},
+        Value(1.0, WHITE),
+    ),
 ]

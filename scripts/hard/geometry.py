@@ -14,8 +14,10 @@ TITLE = "Geometry"
 EYE = ("path", "bdpt", "vcm", "sppm")
 GREY = s.diffuse((0.7, 0.6, 0.5))
 #: A triangle whose corners are one point, one whose corners are on a line, and one with a corner taken twice.
-DEGENERATE = shapes.Mesh(np.array([[0, 0.2, 0], [0, 0.2, 0], [0, 0.2, 0], [0.1, 0.2, 0], [0.2, 0.2, 0]], float),
-                         np.array([[0, 1, 2], [0, 3, 4], [0, 0, 4]]))
+DEGENERATE = shapes.Mesh(
+    np.array([[0, 0.2, 0], [0, 0.2, 0], [0, 0.2, 0], [0.1, 0.2, 0], [0.2, 0.2, 0]], float),
+    np.array([[0, 1, 2], [0, 3, 4], [0, 0, 4]]),
+)
 
 
 def stage(mesh, material=GREY, **node):
@@ -35,8 +37,9 @@ def slivers(count=1000):
     near, far = (np.stack([x, np.zeros_like(x), np.full_like(x, z)], 1) for z in (1.5, -1.5))
     a = np.arange(len(x) - 1)
     b = a + len(x)
-    return shapes.Mesh(np.concatenate([near, far]),
-                       np.concatenate([np.stack([a, a + 1, b + 1], 1), np.stack([a, b + 1, b], 1)]))
+    return shapes.Mesh(
+        np.concatenate([near, far]), np.concatenate([np.stack([a, a + 1, b + 1], 1), np.stack([a, b + 1, b], 1)])
+    )
 
 
 def ground(*meshes):
@@ -51,11 +54,10 @@ def floor_of(*meshes, eye=(0, 2, 0.01)):
 
 
 def cracked():
-    """A closed box of white walls with T-junctions: one wall is of squares whose corners the next wall does not have."""
+    """A closed box of grey walls with T-junctions: one wall is of squares whose corners the next ones do not have."""
     top = shapes.grid(1, 7, 1.0).flipped()
     sides = shapes.box((-1, -1, -1), (1, 1, 1)).flipped().without([4, 5])
-    return (s.Scene().add(shapes.joined(sides, top), s.glowing(s.diffuse(0.5), 1))
-            .seen((0.1, 0.2, 0.3), (1, 1, 0), 40))
+    return s.Scene().add(shapes.joined(sides, top), s.glowing(s.diffuse(0.5), 1)).seen((0.1, 0.2, 0.3), (1, 1, 0), 40)
 
 
 def normals(factor):
@@ -92,50 +94,144 @@ SAME = "The surface is the same set of points."
 NOTHING = "A triangle without area is met by no ray."
 
 CASES = [
-    Case("degenerate", "Triangles without area, in a mesh of their own and among others",
-         {"without": partial(stage, ball(smooth=False)), "own": lambda: stage(ball(smooth=False)).add(DEGENERATE, GREY),
-          "among": lambda: stage(shapes.joined(ball(smooth=False), DEGENERATE))},
-         Equal("without", ("own", "among"), NOTHING, resolves=0.06), EYE, iterations=8),
-    Case("slivers", "A floor of slivers, some 10^6 times as long as wide",
-         {"two": lambda: ground(shapes.floor(1.5)), "slivers": lambda: ground(slivers())},
-         Equal("two", ("slivers",), SAME, bound=0.005, resolves=0.06), EYE, iterations=8),
-    Case("duplicated", "A mesh without shared vertices",
-         {"shared": lambda: stage(ball(smooth=False)), "own": lambda: stage(ball(smooth=False).flat())},
-         Equal("shared", ("own",), SAME, bound=1e-5), EYE),
-    Case("huge-and-tiny", "A floor of 100 km and of 0.1 mm in one mesh, in a white furnace",
-         {"scene": lambda: floor_of(shapes.floor(5e4, -0.01), shapes.floor(5e-5), eye=(0, 1e-3, 1e-6))},
-         Value(1.0, "Two white planes, one far below the other, in a white furnace: radiance is 1.", bound=0.01,
-               resolves=0.05), EYE, iterations={None: 128, "sppm": 16}),
-    Case("coplanar", "Two floors in one place",
-         {"one": lambda: ground(shapes.floor(1.5)), "two": lambda: ground(shapes.floor(1.5), shapes.floor(1.5))},
-         Equal("one", ("two",), SAME + " Which of the two is met does not matter.", resolves=0.06), EYE, iterations=8),
-    Case("cracks", "A closed box with T-junctions, whose walls emit", {"scene": cracked},
-         Value(2.0, "L = 1 + L / 2. What gets out through a crack is missing.", bound=0.01, resolves=0.06),
-         ("path", "bdpt", "vcm"), iterations={None: 64, "vcm": 160, "bdpt": 160}, size=8),
-    Case("normals-zero", "Normals of length zero", {"flat": lambda: stage(ball(smooth=False)), "zero": partial(normals, 0.0)},
-         Equal("flat", ("zero",), "A normal without a direction says nothing; faces have their own.", bound=0.02, resolves=0.06), EYE,
-         iterations=8),
-    Case("normals-long", "Normals of length 1000 and 0.001",
-         {"unit": partial(normals, 1.0), "long": partial(normals, 1000.0), "short": partial(normals, 0.001)},
-         Equal("unit", ("long", "short"), "A normal is a direction; its length means nothing.", bound=1e-4), EYE),
-    Case("nan-position", "A position that is not a number", {"scene": partial(broken, "positions", np.nan)},
-         Refused("position.*(finite|nan|not a number)|(finite|nan|not a number).*position", "Nothing can be drawn there, and a "
-                 "guess would be a silent fault."), ("path",)),
-    Case("nan-normal", "A normal that is not a number", {"scene": partial(broken, "normals", np.nan)},
-         Refused("normal.*(finite|nan|not a number)|(finite|nan|not a number).*normal", "As a position's."), ("path",),
-         fails={"path": "It is replaced, with a warning that names the mesh; --strict refuses it."}),
-    Case("scale-negative", "A node that mirrors, and one that mirrors three times",
-         {"by-hand": mirrored, "x": partial(scaled, -1, 1, 1), "xyz": partial(scaled, -1, -1, -1)},
-         Equal("by-hand", ("x", "xyz"), "A ball is symmetrical, and flat faces have a front whatever the node does.",
-               bound=0.002, resolves=0.06), EYE, iterations=8),
-    Case("scale-singular", "A node that flattens a ball to a disc is the disc",
-         {"thin": partial(scaled, 1, 1e-4, 1), "flat": partial(scaled, 1, 0, 1)},
-         Equal("thin", ("flat",), "A scale of zero is the limit of small ones.", bound=0.01, resolves=0.06), EYE, iterations=16,
-         fails=dict.fromkeys(EYE, "The node is left out, with a warning that names it.")),
-    Case("mesh-empty", "A mesh without triangles",
-         {"without": partial(stage, None), "with": lambda: stage(None).add(
-             shapes.Mesh(np.zeros((3, 3)), np.zeros((0, 3), int)), GREY)},
-         Exact("without", {"with": 0}, "Nothing is nothing."), EYE, seeds=2),
-    Case("triangles-10^7", "A floor of ten million triangles in a white furnace", {"scene": million},
-         Value(1.0, "A white plane in a white furnace."), ("path", "vcm"), seeds=2, size=8, long=True),
+    Case(
+        "degenerate",
+        "Triangles without area, in a mesh of their own and among others",
+        {
+            "without": partial(stage, ball(smooth=False)),
+            "own": lambda: stage(ball(smooth=False)).add(DEGENERATE, GREY),
+            "among": lambda: stage(shapes.joined(ball(smooth=False), DEGENERATE)),
+        },
+        Equal("without", ("own", "among"), NOTHING, resolves=0.06),
+        EYE,
+        iterations=8,
+    ),
+    Case(
+        "slivers",
+        "A floor of slivers, some 10^6 times as long as wide",
+        {"two": lambda: ground(shapes.floor(1.5)), "slivers": lambda: ground(slivers())},
+        Equal("two", ("slivers",), SAME, bound=0.005, resolves=0.06),
+        EYE,
+        iterations=8,
+    ),
+    Case(
+        "duplicated",
+        "A mesh without shared vertices",
+        {"shared": lambda: stage(ball(smooth=False)), "own": lambda: stage(ball(smooth=False).flat())},
+        Equal("shared", ("own",), SAME, bound=1e-5),
+        EYE,
+    ),
+    Case(
+        "huge-and-tiny",
+        "A floor of 100 km and of 0.1 mm in one mesh, in a white furnace",
+        {"scene": lambda: floor_of(shapes.floor(5e4, -0.01), shapes.floor(5e-5), eye=(0, 1e-3, 1e-6))},
+        Value(
+            1.0,
+            "Two white planes, one far below the other, in a white furnace: radiance is 1.",
+            bound=0.01,
+            resolves=0.05,
+        ),
+        EYE,
+        iterations={None: 128, "sppm": 16},
+    ),
+    Case(
+        "coplanar",
+        "Two floors in one place",
+        {"one": lambda: ground(shapes.floor(1.5)), "two": lambda: ground(shapes.floor(1.5), shapes.floor(1.5))},
+        Equal("one", ("two",), SAME + " Which of the two is met does not matter.", resolves=0.06),
+        EYE,
+        iterations=8,
+    ),
+    Case(
+        "cracks",
+        "A closed box with T-junctions, whose walls emit",
+        {"scene": cracked},
+        Value(2.0, "L = 1 + L / 2. What gets out through a crack is missing.", bound=0.01, resolves=0.06),
+        ("path", "bdpt", "vcm"),
+        iterations={None: 64, "vcm": 160, "bdpt": 160},
+        size=8,
+    ),
+    Case(
+        "normals-zero",
+        "Normals of length zero",
+        {"flat": lambda: stage(ball(smooth=False)), "zero": partial(normals, 0.0)},
+        Equal(
+            "flat",
+            ("zero",),
+            "A normal without a direction says nothing; faces have their own.",
+            bound=0.02,
+            resolves=0.06,
+        ),
+        EYE,
+        iterations=8,
+    ),
+    Case(
+        "normals-long",
+        "Normals of length 1000 and 0.001",
+        {"unit": partial(normals, 1.0), "long": partial(normals, 1000.0), "short": partial(normals, 0.001)},
+        Equal("unit", ("long", "short"), "A normal is a direction; its length means nothing.", bound=1e-4),
+        EYE,
+    ),
+    Case(
+        "nan-position",
+        "A position that is not a number",
+        {"scene": partial(broken, "positions", np.nan)},
+        Refused(
+            "position.*(finite|nan|not a number)|(finite|nan|not a number).*position",
+            "Nothing can be drawn there, and a guess would be a silent fault.",
+        ),
+        ("path",),
+    ),
+    Case(
+        "nan-normal",
+        "A normal that is not a number",
+        {"scene": partial(broken, "normals", np.nan)},
+        Refused("normal.*(finite|nan|not a number)|(finite|nan|not a number).*normal", "As a position's."),
+        ("path",),
+        fails={"path": "It is replaced, with a warning that names the mesh; --strict refuses it."},
+    ),
+    Case(
+        "scale-negative",
+        "A node that mirrors, and one that mirrors three times",
+        {"by-hand": mirrored, "x": partial(scaled, -1, 1, 1), "xyz": partial(scaled, -1, -1, -1)},
+        Equal(
+            "by-hand",
+            ("x", "xyz"),
+            "A ball is symmetrical, and flat faces have a front whatever the node does.",
+            bound=0.002,
+            resolves=0.06,
+        ),
+        EYE,
+        iterations=8,
+    ),
+    Case(
+        "scale-singular",
+        "A node that flattens a ball to a disc is the disc",
+        {"thin": partial(scaled, 1, 1e-4, 1), "flat": partial(scaled, 1, 0, 1)},
+        Equal("thin", ("flat",), "A scale of zero is the limit of small ones.", bound=0.01, resolves=0.06),
+        EYE,
+        iterations=16,
+        fails=dict.fromkeys(EYE, "The node is left out, with a warning that names it."),
+    ),
+    Case(
+        "mesh-empty",
+        "A mesh without triangles",
+        {
+            "without": partial(stage, None),
+            "with": lambda: stage(None).add(shapes.Mesh(np.zeros((3, 3)), np.zeros((0, 3), int)), GREY),
+        },
+        Exact("without", {"with": 0}, "Nothing is nothing."),
+        EYE,
+        seeds=2,
+    ),
+    Case(
+        "triangles-10^7",
+        "A floor of ten million triangles in a white furnace",
+        {"scene": million},
+        Value(1.0, "A white plane in a white furnace."),
+        ("path", "vcm"),
+        seeds=2,
+        size=8,
+        long=True,
+    ),
 ]

@@ -113,8 +113,11 @@ def same(files):
     """Whether all of these bytes are equal; files: {what it is: bytes}."""
     first, *others = files
     differ = [name for name in others if files[name] != files[first]]
-    return Verdict(not differ, f"{len(files)} files alike" if not differ else f"unlike {first}: {', '.join(differ)}",
-                   float(len(differ)))
+    return Verdict(
+        not differ,
+        f"{len(files)} files alike" if not differ else f"unlike {first}: {', '.join(differ)}",
+        float(len(differ)),
+    )
 
 
 def _percent(share):

@@ -20,13 +20,18 @@ OWNER = 0.2**0.5
 def plate(roughness, half=0.4, height=2.0):
     """White metal that the eye sees along its normal, and a square lamp around the eye, which is no obstacle: what
     shows is the share of the lobe that the lamp takes up."""
-    return (s.Scene().add(shapes.floor(0.2), s.metal(1, roughness)).add(shapes.ceiling(half, height), s.emitter(1))
-            .seen((0, 1.5, 0), (0, 0, 0), 1, up=(0, 0, -1)))
+    return (
+        s.Scene()
+        .add(shapes.floor(0.2), s.metal(1, roughness))
+        .add(shapes.ceiling(half, height), s.emitter(1))
+        .seen((0, 1.5, 0), (0, 0, 0), 1, up=(0, 0, -1))
+    )
 
 
 def lobe_share(alpha, half=0.4, height=2.0, count=1500):
     """What plate() shows but for light that facets hand on: the integral of the GGX reflection at normal view over the
-    lamp, D(h) G2(o, i) / (4 cos o cos i) cos i, as a sum over `count`² parts of the lamp; Smith's height-correlated G2."""
+    lamp, D(h) G2(o, i) / (4 cos o cos i) cos i, as a sum over `count`² parts; Smith's height-correlated G2.
+    """
     at = (np.arange(count) + 0.5) / count * 2 * half - half
     x, z = np.meshgrid(at, at)
     square = x**2 + z**2 + height**2
@@ -42,15 +47,25 @@ def behind_glass(roughness):
     """A pane of glass before a step from dark to bright, under a grey sky."""
     pane = shapes.box((-1, -1, -0.05), (1, 1, 0.05))
     card = shapes.quad((1.0, 0, -1), (1, 0, 0), (0, 2, 0))
-    return (s.Scene().within(0.3).add(card, s.emitter(2)).add(pane, s.glass(1.5, roughness))
-            .seen((0.2, 0.3, 3), (0, 0, 0), 20))
+    return (
+        s.Scene()
+        .within(0.3)
+        .add(card, s.emitter(2))
+        .add(pane, s.glass(1.5, roughness))
+        .seen((0.2, 0.3, 3), (0, 0, 0), 20)
+    )
 
 
 def mirror(roughness):
     """A metal ball under a sky with a card."""
     card = shapes.quad((1.5, 1, 1), (0, 0, 1), (0, 1, 0)).flipped()
-    return (s.Scene().within(0.3).add(card, s.emitter(2)).add(shapes.sphere((0, 0, 0), 0.5, 48), s.metal(0.9, roughness))
-            .seen((0, 0.3, 3), (0, 0, 0), 20))
+    return (
+        s.Scene()
+        .within(0.3)
+        .add(card, s.emitter(2))
+        .add(shapes.sphere((0, 0, 0), 0.5, 48), s.metal(0.9, roughness))
+        .seen((0, 0.3, 3), (0, 0, 0), 20)
+    )
 
 
 def _tiny(made):
@@ -67,20 +82,74 @@ SWEEP = tuple(round(float(r), 3) for r in np.linspace(0.2, 1, 17))
 SEAM = tuple(round(OWNER + step, 4) for step in (-0.006, -0.004, -0.002, 0.0, 0.002, 0.004, 0.006))
 
 CASES = [
-    Case("rough-delta-metal", "Metal of roughness 1e-6 to 1e-3 is a mirror", _tiny(mirror),
-         Equal("0", tuple(f"{r:g}" for r in TINY), "The lobe tends to a delta: at an alpha of 1e-6 it is narrower than a pixel "
-               "by far.", bound=0.005, resolves=0.05), EYE, iterations=16),
-    Case("rough-delta-glass", "Glass of roughness 1e-6 to 1e-3 is clear", _tiny(behind_glass),
-         Equal("0", tuple(f"{r:g}" for r in TINY), "As metal's.", bound=0.005, resolves=0.05), EYE, iterations=16),
-    Case("rough-lobe", "The share of a lobe that a lamp takes up, against quadrature", lobes(SHARP),
-         Values({f"{r:g}": lobe_share(r * r) for r in SHARP}, "GGX with Smith's height-correlated shadowing, integrated "
-                "over the lamp. White metal has no Fresnel effect. Light between facets adds less than 1 %.", bound=0.01,
-                resolves=0.04), EYE, iterations=40, size=8, photons=20000),
-    Case("rough-sweep", "Roughness from 0.2 to 1 in steps of 0.05: smooth and falling", lobes(SWEEP),
-         Sweep(tuple(f"{r:g}" for r in SWEEP), "A wider lobe has less of itself within the lamp; the integral is smooth "
-               "in alpha, and its second difference over these steps below 3 % of the largest value.", bound=0.03,
-               resolves=0.04), EYE, iterations=16, size=8, seeds=6),
-    Case("rough-seam", "Roughness around 0.447, an alpha of 0.2, where photons take over from eye paths", lobes(SEAM),
-         Sweep(tuple(f"{r:g}" for r in SEAM), "The same integral; over steps of 0.002 its second difference is below 1e-4.",
-               bound=0.002, resolves=0.03, monotone=False), ("vcm", "sppm", "path"), iterations=32, size=8, seeds=6),
+    Case(
+        "rough-delta-metal",
+        "Metal of roughness 1e-6 to 1e-3 is a mirror",
+        _tiny(mirror),
+        Equal(
+            "0",
+            tuple(f"{r:g}" for r in TINY),
+            "The lobe tends to a delta: at an alpha of 1e-6 it is narrower than a pixel by far.",
+            bound=0.005,
+            resolves=0.05,
+        ),
+        EYE,
+        iterations=16,
+    ),
+    Case(
+        "rough-delta-glass",
+        "Glass of roughness 1e-6 to 1e-3 is clear",
+        _tiny(behind_glass),
+        Equal("0", tuple(f"{r:g}" for r in TINY), "As metal's.", bound=0.005, resolves=0.05),
+        EYE,
+        iterations=16,
+    ),
+    Case(
+        "rough-lobe",
+        "The share of a lobe that a lamp takes up, against quadrature",
+        lobes(SHARP),
+        Values(
+            {f"{r:g}": lobe_share(r * r) for r in SHARP},
+            "GGX with Smith's height-correlated shadowing, integrated "
+            "over the lamp. White metal has no Fresnel effect. Light between facets adds less than 1 %.",
+            bound=0.01,
+            resolves=0.04,
+        ),
+        EYE,
+        iterations=40,
+        size=8,
+        photons=20000,
+    ),
+    Case(
+        "rough-sweep",
+        "Roughness from 0.2 to 1 in steps of 0.05: smooth and falling",
+        lobes(SWEEP),
+        Sweep(
+            tuple(f"{r:g}" for r in SWEEP),
+            "A wider lobe has less of itself within the lamp; the integral is smooth "
+            "in alpha, and its second difference over these steps below 3 % of the largest value.",
+            bound=0.03,
+            resolves=0.04,
+        ),
+        EYE,
+        iterations=16,
+        size=8,
+        seeds=6,
+    ),
+    Case(
+        "rough-seam",
+        "Roughness around 0.447, an alpha of 0.2, where photons take over from eye paths",
+        lobes(SEAM),
+        Sweep(
+            tuple(f"{r:g}" for r in SEAM),
+            "The same integral; over steps of 0.002 its second difference is below 1e-4.",
+            bound=0.002,
+            resolves=0.03,
+            monotone=False,
+        ),
+        ("vcm", "sppm", "path"),
+        iterations=32,
+        size=8,
+        seeds=6,
+    ),
 ]

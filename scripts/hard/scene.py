@@ -14,29 +14,47 @@ FLOAT, UNSIGNED = 5126, 5125
 
 def diffuse(albedo):
     """A Lambertian surface; albedo: a number, or three."""
-    return {"pbrMetallicRoughness": {"baseColorFactor": [*_rgb(albedo), 1], "metallicFactor": 0, "roughnessFactor": 1},
-            "extensions": {"KHR_materials_specular": {"specularFactor": 0}}}
+    return {
+        "pbrMetallicRoughness": {"baseColorFactor": [*_rgb(albedo), 1], "metallicFactor": 0, "roughnessFactor": 1},
+        "extensions": {"KHR_materials_specular": {"specularFactor": 0}},
+    }
 
 
 def metal(colour, roughness):
     """GGX facets of this reflectance; their alpha is the squared roughness."""
-    return {"pbrMetallicRoughness": {"baseColorFactor": [*_rgb(colour), 1], "metallicFactor": 1,
-                                     "roughnessFactor": roughness}}
+    return {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_rgb(colour), 1],
+            "metallicFactor": 1,
+            "roughnessFactor": roughness,
+        }
+    }
 
 
 def plastic(colour, roughness, ior=1.5):
     """A dielectric coat over a diffuse base."""
-    return {"pbrMetallicRoughness": {"baseColorFactor": [*_rgb(colour), 1], "metallicFactor": 0,
-                                     "roughnessFactor": roughness},
-            "extensions": {"KHR_materials_ior": {"ior": ior}}}
+    return {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_rgb(colour), 1],
+            "metallicFactor": 0,
+            "roughnessFactor": roughness,
+        },
+        "extensions": {"KHR_materials_ior": {"ior": ior}},
+    }
 
 
 def glass(ior, roughness=0.0, priority=None, medium=None):
     """A solid of clear glass; medium: sigma_a, sigma_s (1/m, three numbers each) and g."""
     keys = {key: value for key, value in (("priority", priority), ("medium", medium)) if value is not None}
-    return {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": roughness},
-            "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": ior},
-                           "KHR_materials_volume": {"thicknessFactor": 1}}, **_extras(keys)}
+    return {
+        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": roughness},
+        "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_ior": {"ior": ior},
+            "KHR_materials_volume": {"thicknessFactor": 1},
+        },
+        **_extras(keys),
+    }
 
 
 def emitter(radiance):
@@ -107,8 +125,10 @@ class Scene:
 
     def scaled(self, factor):
         """All lengths times a factor, radiance kept. Single precision throughout, so powers of two are exact."""
-        objects = tuple((replace(mesh, positions=np.float32(mesh.positions) * np.float32(factor)), material, node)
-                        for mesh, material, node in self.objects)
+        objects = tuple(
+            (replace(mesh, positions=np.float32(mesh.positions) * np.float32(factor)), material, node)
+            for mesh, material, node in self.objects
+        )
         eye, target, *rest = self.camera
         eye, target = (tuple(float(np.float32(c) * np.float32(factor)) for c in v) for v in (eye, target))
         # The view keeps its direction to the last bit.
@@ -163,8 +183,11 @@ class _Writer:
         self.buffer = bytearray()
         self.document = {"asset": {"version": "2.0", "generator": "caustique hard cases"}, "scene": 0, "nodes": []}
         keys = {"light_units": "radiometric", **scene.keys}
-        nodes = [self._camera(scene.camera), *(self._light(*light) for light in scene.lights),
-                 *(self._object(*made) for made in scene.objects)]
+        nodes = [
+            self._camera(scene.camera),
+            *(self._light(*light) for light in scene.lights),
+            *(self._object(*made) for made in scene.objects),
+        ]
         if scene.root is not None:
             nodes = [self._append("nodes", {"matrix": _columns(scene.root), "children": nodes})]
         self.document["scenes"] = [{"nodes": nodes, **_extras(keys)}]
@@ -195,8 +218,14 @@ class _Writer:
     def _light(self, light, matrix, keys):
         lights = self.document.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"]
         lights.append(light)
-        return self._append("nodes", {"extensions": {"KHR_lights_punctual": {"light": len(lights) - 1}},
-                                      "matrix": _columns(matrix), **_extras(keys)})
+        return self._append(
+            "nodes",
+            {
+                "extensions": {"KHR_lights_punctual": {"light": len(lights) - 1}},
+                "matrix": _columns(matrix),
+                **_extras(keys),
+            },
+        )
 
     def _object(self, mesh, material, node):
         attributes = {"POSITION": self._accessor(mesh.positions.astype("<f4"), "VEC3", FLOAT)}

@@ -31,8 +31,11 @@ def joined(*meshes):
     """One mesh of several, all with normals or all without."""
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
     normals = None if meshes[0].normals is None else np.concatenate([mesh.normals for mesh in meshes])
-    return Mesh(np.concatenate([mesh.positions for mesh in meshes]),
-                np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts)]), normals)
+    return Mesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts)]),
+        normals,
+    )
 
 
 def quad(middle, right, up):
@@ -82,15 +85,19 @@ def sphere(middle, radius, rings=24, smooth=True):
     t, p = np.meshgrid(polar, around, indexing="ij")
     unit = np.stack([np.sin(t) * np.cos(p), np.cos(t), np.sin(t) * np.sin(p)], axis=-1).reshape(-1, 3)
     unit = np.concatenate([unit, [[0, 1, 0], [0, -1, 0]]])
-    row, column = (index.ravel() for index in np.mgrid[:rings - 2, :2 * rings])
+    row, column = (index.ravel() for index in np.mgrid[: rings - 2, : 2 * rings])
     after = (column + 1) % (2 * rings)
     a, b = row * 2 * rings + column, row * 2 * rings + after
     c, d = (row + 1) * 2 * rings + after, (row + 1) * 2 * rings + column
     top, bottom = len(unit) - 2, len(unit) - 1
     edge, last = np.arange(2 * rings), (rings - 2) * 2 * rings
     following = (edge + 1) % (2 * rings)
-    triangles = np.concatenate([
-        np.stack([a, b, c], 1), np.stack([a, c, d], 1),
-        np.stack([np.full_like(edge, top), following, edge], 1),
-        np.stack([np.full_like(edge, bottom), last + edge, last + following], 1)])
+    triangles = np.concatenate(
+        [
+            np.stack([a, b, c], 1),
+            np.stack([a, c, d], 1),
+            np.stack([np.full_like(edge, top), following, edge], 1),
+            np.stack([np.full_like(edge, bottom), last + edge, last + following], 1),
+        ]
+    )
     return Mesh(unit * radius + np.asarray(middle, float), triangles, unit if smooth else None)

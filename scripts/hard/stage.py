@@ -21,7 +21,13 @@ class Stage:
     """Plays one case with one method. folder: where scenes and pictures go."""
 
     def __init__(self, program, folder, case, method, threads=1):
-        self.program, self.folder, self.case, self.method, self.threads = Path(program), Path(folder), case, method, threads
+        self.program, self.folder, self.case, self.method, self.threads = (
+            Path(program),
+            Path(folder),
+            case,
+            method,
+            threads,
+        )
         self.kept, self.commands, self.seconds, self.said = {}, [], 0.0, ""
         (self.folder / "pictures").mkdir(parents=True, exist_ok=True)
 
@@ -58,10 +64,31 @@ class Stage:
         """The arguments of a render of a scene, but for its output."""
         case, size = self.case, str(self.case.size)
         photons = ["--photons", case.of("photons", self.method)] if self.method in PHOTON_METHODS else []
-        return ["render", self.scene(label), "--method", self.method, "--width", size, "--height", size, "--iterations",
-                case.of("iterations", self.method), "--seed", seed, "--threads", threads or self.threads, *photons,
-                "--no-combine", "--layers", "beauty", "--reproducible", "--progress", "none", "--no-checkpoint",
-                *case.of("options", self.method)]
+        return [
+            "render",
+            self.scene(label),
+            "--method",
+            self.method,
+            "--width",
+            size,
+            "--height",
+            size,
+            "--iterations",
+            case.of("iterations", self.method),
+            "--seed",
+            seed,
+            "--threads",
+            threads or self.threads,
+            *photons,
+            "--no-combine",
+            "--layers",
+            "beauty",
+            "--reproducible",
+            "--progress",
+            "none",
+            "--no-checkpoint",
+            *case.of("options", self.method),
+        ]
 
     def render(self, label, seed, *more, name=None, threads=None):
         """Renders a scene into the file that is returned."""

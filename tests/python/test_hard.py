@@ -14,11 +14,11 @@ sys.path.insert(0, str(ROOT / "scripts" / "hard"))
 import answers  # noqa: E402
 import families  # noqa: E402
 import judge  # noqa: E402
-import page  # noqa: E402
 import run as suite  # noqa: E402
 import scene as s  # noqa: E402
 import shapes  # noqa: E402
 from case import Case  # noqa: E402
+from stage import Stage  # noqa: E402
 from tests.python import support  # noqa: E402
 
 SHAPE = (8, 16, 16, 3)
@@ -54,7 +54,9 @@ class Judges(unittest.TestCase):
         self.assertIn("undecided", verdict.figure)
 
     def test_value_rejects_what_is_right_as_seldom_as_it_says(self):
-        wrong = sum(not judge.value(noisy(100 + i, spread=0.5, shape=(8, 4, 4, 3)), 1.0, 0.0, 9.0).passed for i in range(2000))
+        wrong = sum(
+            not judge.value(noisy(100 + i, spread=0.5, shape=(8, 4, 4, 3)), 1.0, 0.0, 9.0).passed for i in range(2000)
+        )
         self.assertLessEqual(wrong, 3)
 
     def test_equal_sees_a_difference_that_is_smaller_than_the_noise_in_common(self):
@@ -110,7 +112,12 @@ class Shapes(unittest.TestCase):
             self.assertTrue((area[:, 1] * sign > 0).all())
 
     def test_powers_of_two_scale_exactly(self):
-        made = s.Scene().add(shapes.sphere((0.1, 0.2, 0.3), 0.7), s.diffuse(1)).seen((0.1, 2, 3), (0, 0.3, 0), 30).scaled(1)
+        made = (
+            s.Scene()
+            .add(shapes.sphere((0.1, 0.2, 0.3), 0.7), s.diffuse(1))
+            .seen((0.1, 2, 3), (0, 0.3, 0), 30)
+            .scaled(1)
+        )
         twice = made.scaled(2.0**20)
         self.assertTrue((twice.objects[0][0].positions == made.objects[0][0].positions * np.float32(2.0**20)).all())
         self.assertEqual([c * 2.0**20 for c in made.camera[0]], list(twice.camera[0]))
@@ -121,6 +128,7 @@ class Closed(unittest.TestCase):
 
     def test_form_factor_of_a_square(self):
         import lights
+
         at = (np.arange(800) + 0.5) / 800 - 0.5
         x, z = np.meshgrid(at, at)
         summed = np.sum(4.0 / (x**2 + z**2 + 4.0) ** 2) / 800**2 / math.pi
@@ -128,15 +136,18 @@ class Closed(unittest.TestCase):
 
     def test_line_lamp(self):
         import grazing
+
         at = (np.arange(20000) + 0.5) / 20000 - 0.5
         self.assertAlmostEqual(grazing.lit_by_slit(), 0.5 / math.pi * np.mean(0.01 / (at**2 + 0.01) ** 2), delta=1e-4)
 
     def test_ggx_lobe_holds_all_its_light(self):
         import roughness
+
         self.assertAlmostEqual(roughness.lobe_share(0.1, half=40.0, count=4000), 1.0, delta=0.015)
 
     def test_half_space_is_what_walks_find(self):
         import media
+
         random, walks, albedo, back = np.random.default_rng(7), 200_000, 0.5, 0.0
         depth, cosine, alive = np.zeros(walks), np.ones(walks), np.ones(walks)
         for _ in range(30):
@@ -163,15 +174,32 @@ class Suite(unittest.TestCase):
                 said = json.loads(path.read_text())
                 self.assertTrue(all((Path(folder) / file).is_file() for file in said["scenes"].values()))
 
+    def test_the_page_of_docs_lists_the_cases(self):
+        import table
+
+        text = table.DOCS.read_text()
+        self.assertEqual(table.filled(text), text, "run .venv/bin/python scripts/hard/table.py")
+        self.assertIn("| `furnace-albedo-0.5` |", text)
+
     def play(self, folder, case):
         case.family = "Tests"
         case.write(folder)
-        return suite.play(case, "path", support.binary(), folder, 1)
+        return suite.play(Stage(support.binary(), folder, case, "path"))
 
     def case(self, answer, fails=None):
         import furnace
-        return Case("planted", "A white ball", {"scene": lambda: furnace.white(s.diffuse(1))}, answer, ("path",), size=8,
-                    iterations=2, seeds=4, fails=fails or {})
+
+        return Case(
+            "planted",
+            "A white ball",
+            {"scene": lambda: furnace.white(s.diffuse(1))},
+            answer,
+            ("path",),
+            size=8,
+            iterations=2,
+            seeds=4,
+            fails=fails or {},
+        )
 
     def test_the_gate_tells_known_failures_apart_and_none_passes_silently(self):
         right = answers.Value(1.0, "White.", bound=0.3, resolves=9)
@@ -189,10 +217,13 @@ class Suite(unittest.TestCase):
 
     def test_refused_wants_an_error_that_names_the_fault(self):
         import geometry
+
         with tempfile.TemporaryDirectory() as name:
-            for match, made, state in (("finite|nan", lambda: geometry.broken("positions", np.nan), "met"),
-                                       ("no such words", lambda: geometry.broken("positions", np.nan), "failed"),
-                                       ("finite|nan", lambda: geometry.stage(None), "failed")):
+            for match, made, state in (
+                ("finite|nan", lambda: geometry.broken("positions", np.nan), "met"),
+                ("no such words", lambda: geometry.broken("positions", np.nan), "failed"),
+                ("finite|nan", lambda: geometry.stage(None), "failed"),
+            ):
                 case = self.case(answers.Refused(match, "A guess would be silent."))
                 case.scenes = {"scene": made}
                 self.assertEqual(self.play(Path(name), case).state, state)
