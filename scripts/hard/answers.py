@@ -145,19 +145,21 @@ class Warned(Answer):
 
 @dataclass(frozen=True)
 class Sweep(Answer):
-    """Scenes in order, whose means change smoothly, and fall where `monotone`."""
+    """Scenes in order, {scene: what a model says of its mean}: what the model leaves changes smoothly, and the first
+    `falling` means fall."""
 
-    scenes: tuple
+    model: dict
     derivation: str
     bound: float
     resolves: float = 0.03
-    monotone: bool = True
+    falling: int = 0
 
     def judge(self, stage):
-        return judge.sweep([stage.pictures(label) for label in self.scenes], self.bound, self.resolves, self.monotone)
+        series = [stage.pictures(label) for label in self.model]
+        return judge.sweep(series, list(self.model.values()), self.bound, self.resolves, self.falling)
 
     def shown(self):
-        return list(self.scenes)
+        return list(self.model)
 
 
 @dataclass(frozen=True)

@@ -51,14 +51,15 @@ def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, *
         f"furnace-{name}",
         f"{title} in a white furnace, roughness 0 to 1",
         scenes,
-        Values({label: 1.0 for label in scenes}, WHITE, bound=bound),
+        Values({label: 1.0 for label in scenes}, WHITE, bound=bound, resolves=0.06),
         methods=methods,
+        iterations=64,
         **more,
     )
 
 
 CASES = [
-    _closed(0.5, {None: 64, "sppm": 8}, 10000),
+    _closed(0.5, {None: 64, "sppm": 24}, 10000),
     _closed(0.9, {None: 64, "sppm": 8}, 5000),
     _closed(0.99, {None: 96, "sppm": 16}, 500),
     _closed(0.999, {None: 96, "sppm": 8}, 100, resolves=0.25),
@@ -66,7 +67,9 @@ CASES = [
         "furnace-diffuse",
         "A white Lambertian sphere in a white furnace",
         {"scene": partial(white, s.diffuse(1))},
-        Value(1.0, WHITE),
+        Value(1.0, WHITE, resolves=0.05),
+        iterations=64,
+        photons=1000,
     ),
     _lobe("metal", "White metal", lambda r: s.metal(1, r), bound=0.01),
     _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01),

@@ -91,20 +91,22 @@ def black(pictures, most):
     return Verdict(found <= most, f"brightest pixel {found:.3g}; allowed {most:.3g}", found / most)
 
 
-def sweep(series, bound, resolves, monotone=True):
-    """Whether a series of pictures changes smoothly: each one's mean is that of its neighbours but for `bound` (of the
-    largest mean) and noise, and with `monotone` none is above the one before it."""
+def sweep(series, model, bound, resolves, falling=0):
+    """Whether a series of pictures changes smoothly: the mean of each, less what `model` says of it, is that of its
+    neighbours but for `bound` (of the largest mean) and noise, and of the first `falling` none is above the one
+    before it."""
     rows = np.stack([pictures.mean(axis=(1, 2, 3)) for pictures in series], axis=1)
     scale = float(rows.mean(axis=0).max())
     if not scale > 0:
         return Verdict(False, "all pictures are black", np.inf)
-    bent = zero(rows[:, 1:-1] - (rows[:, :-2] + rows[:, 2:]) / 2, scale, bound, resolves)
-    if not monotone or not bent.passed:
+    rest = rows - np.asarray(model)
+    bent = zero(rest[:, 1:-1] - (rest[:, :-2] + rest[:, 2:]) / 2, scale, bound, resolves)
+    if not falling or not bent.passed:
         return bent
-    steps = np.diff(rows, axis=1) / scale
+    steps = np.diff(rows[:, :falling], axis=1) / scale
     noise = student(len(rows) - 1, ERRORS / steps.shape[1]) * steps.std(axis=0, ddof=1) / np.sqrt(len(rows))
     rise = float(np.max(steps.mean(axis=0) - noise))
-    if rise > 0.0:
+    if rise > 0:
         return Verdict(False, f"rises by {_percent(rise)} more than noise explains", np.inf)
     return bent
 

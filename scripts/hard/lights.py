@@ -166,7 +166,8 @@ CASES = [
         ("path", "vcm", "sppm"),
         size=8,
         seeds=5,
-        iterations={None: 32, "sppm": 4},
+        iterations=32,
+        photons=1000,
     ),
     Case(
         "light-black",

@@ -39,7 +39,7 @@ def lit(of):
 
 def half_space(albedo):
     """Radiance of a half-space that scatters evenly, in a white furnace, seen along its normal:
-    1 - H(1) sqrt(1 - albedo) [Chandrasekhar 1950, the albedo of a plane; by reciprocity that is what the furnace shows]."""
+    1 - H(1) sqrt(1 - albedo) [Chandrasekhar 1950, the albedo of a plane; by reciprocity the furnace shows it]."""
     node, weight = np.polynomial.legendre.leggauss(64)
     mu, weight = (node + 1) / 2, weight / 2
     at = np.append(mu, 1.0)

@@ -28,7 +28,7 @@ def plate(roughness, half=0.4, height=2.0):
     )
 
 
-def lobe_share(alpha, half=0.4, height=2.0, count=1500):
+def lobe_share(alpha, half=0.4, height=2.0, count=800):
     """What plate() shows but for light that facets hand on: the integral of the GGX reflection at normal view over the
     lamp, D(h) G2(o, i) / (4 cos o cos i) cos i, as a sum over `count`² parts; Smith's height-correlated G2.
     """
@@ -78,7 +78,7 @@ def lobes(roughness):
 
 #: At these the light that facets hand on is below the bound: the lobe's own albedo is that near to 1.
 SHARP = (0.05, 0.1, 0.2, 0.3, 0.4)
-SWEEP = tuple(round(float(r), 3) for r in np.linspace(0.2, 1, 17))
+SWEEP = tuple(round(float(r), 3) for r in np.linspace(0.2, 1, 9))
 SEAM = tuple(round(OWNER + step, 4) for step in (-0.006, -0.004, -0.002, 0.0, 0.002, 0.004, 0.006))
 
 CASES = [
@@ -94,7 +94,8 @@ CASES = [
             resolves=0.05,
         ),
         EYE,
-        iterations=16,
+        iterations=8,
+        seeds=4,
     ),
     Case(
         "rough-delta-glass",
@@ -102,7 +103,8 @@ CASES = [
         _tiny(behind_glass),
         Equal("0", tuple(f"{r:g}" for r in TINY), "As metal's.", bound=0.005, resolves=0.05),
         EYE,
-        iterations=16,
+        iterations=8,
+        seeds=4,
     ),
     Case(
         "rough-lobe",
@@ -116,20 +118,19 @@ CASES = [
             resolves=0.04,
         ),
         EYE,
-        iterations=40,
+        iterations=64,
         size=8,
         photons=20000,
     ),
     Case(
         "rough-sweep",
-        "Roughness from 0.2 to 1 in steps of 0.05: smooth and falling",
+        "Roughness from 0.2 to 1 in steps of 0.1: smooth, and falling",
         lobes(SWEEP),
         Sweep(
-            tuple(f"{r:g}" for r in SWEEP),
-            "A wider lobe has less of itself within the lamp; the integral is smooth "
-            "in alpha, and its second difference over these steps below 3 % of the largest value.",
-            bound=0.03,
-            resolves=0.04,
+            {f"{r:g}": lobe_share(r * r) for r in SWEEP},
+            "A wider lobe has less of itself within the lamp. What the integral leaves, light between facets, is a"
+            " smooth function of alpha.",
+            bound=0.01,
         ),
         EYE,
         iterations=16,
@@ -140,13 +141,7 @@ CASES = [
         "rough-seam",
         "Roughness around 0.447, an alpha of 0.2, where photons take over from eye paths",
         lobes(SEAM),
-        Sweep(
-            tuple(f"{r:g}" for r in SEAM),
-            "The same integral; over steps of 0.002 its second difference is below 1e-4.",
-            bound=0.002,
-            resolves=0.03,
-            monotone=False,
-        ),
+        Sweep({f"{r:g}": lobe_share(r * r) for r in SEAM}, "As in rough-sweep.", bound=0.002),
         ("vcm", "sppm", "path"),
         iterations=32,
         size=8,

@@ -78,12 +78,12 @@ class Judges(unittest.TestCase):
 
     def test_sweep_sees_a_seam_and_a_rise(self):
         falling = [noisy(10 + i, mean=1 - 0.02 * i, spread=0.1) for i in range(9)]
-        self.assertTrue(judge.sweep(falling, 0.005, 0.03).passed)
+        self.assertTrue(judge.sweep(falling, 0, 0.005, 0.03, 9).passed)
         seam = [*falling[:4], falling[4] * 1.03, *falling[5:]]
-        self.assertFalse(judge.sweep(seam, 0.005, 0.03).passed)
+        self.assertFalse(judge.sweep(seam, 0, 0.005, 0.03, 9).passed)
         rising = falling[::-1]
-        self.assertFalse(judge.sweep(rising, 0.005, 0.03).passed)
-        self.assertTrue(judge.sweep(rising, 0.005, 0.03, monotone=False).passed)
+        self.assertFalse(judge.sweep(rising, 0, 0.005, 0.03, 9).passed)
+        self.assertTrue(judge.sweep(rising, 0, 0.005, 0.03).passed)
 
     def test_black_and_same(self):
         self.assertTrue(judge.black(np.zeros(SHAPE), 1e-6).passed)
