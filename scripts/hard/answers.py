@@ -129,6 +129,7 @@ class Warned(Answer):
     high: float
     derivation: str
     scene: str = "scene"
+    peers = False
 
     def judge(self, stage):
         pictures = stage.pictures(self.scene)

@@ -9,7 +9,7 @@ from case import Case
 
 TITLE = "Furnace"
 WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
-ROUGHNESS = (0.0, 1e-3, 0.1, 0.3, 0.6, 1.0)
+ROUGHNESS = (0.0, 0.05, 0.3, 1.0)
 
 
 def closed(albedo, emitted=1.0):
@@ -45,7 +45,7 @@ def _closed(albedo, iterations, photons, resolves=0.1):
     )
 
 
-def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, **more):
+def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, iterations=64):
     scenes = {f"roughness-{r:g}": partial(white, material(r)) for r in ROUGHNESS}
     return Case(
         f"furnace-{name}",
@@ -53,8 +53,7 @@ def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, *
         scenes,
         Values({label: 1.0 for label in scenes}, WHITE, bound=bound, resolves=0.06),
         methods=methods,
-        iterations=64,
-        **more,
+        iterations=iterations,
     )
 
 
@@ -72,7 +71,7 @@ CASES = [
         photons=1000,
     ),
     _lobe("metal", "White metal", lambda r: s.metal(1, r), bound=0.01),
-    _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01),
+    _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01, iterations=128),
     _lobe("plastic", "A dielectric coat over a white base", lambda r: s.plastic(1, r), bound=0.01),
     Case(
         "furnace-glass-box",
