@@ -129,10 +129,11 @@ CASES = [
             1.0,
             "Two white planes, one far below the other, in a white furnace: radiance is 1.",
             bound=0.01,
-            resolves=0.05,
+            resolves=0.1,
         ),
         EYE,
-        iterations={None: 128, "sppm": 16},
+        iterations={None: 128, "sppm": 64},
+        photons=2000,
     ),
     Case(
         "coplanar",

@@ -80,9 +80,10 @@ CASES = [
         "grazing-eye-matte",
         "A white matte floor in a white furnace, seen at 89.999 degrees",
         {"scene": partial(low_eye, s.diffuse(1))},
-        Value(1.0, WHITE),
+        Value(1.0, WHITE, resolves=0.1),
         size=8,
-        iterations=96,
+        iterations={None: 96, "sppm": 32},
+        photons=2000,
     ),
     Case(
         "grazing-eye-metal",
@@ -105,7 +106,7 @@ CASES = [
         "coarse-white",
         "A smooth-shaded sphere of 6 rings in a white furnace",
         {"scene": partial(coarse, 6, s.diffuse(1))},
-        Value(1.0, WHITE + " Interpolated normals are no loss.", bound=0.01),
+        Value(1.0, WHITE + " Interpolated normals are no loss.", bound=0.01, resolves=0.05),
         iterations=48,
     ),
     Case(
@@ -118,6 +119,7 @@ CASES = [
             "Both stand for the same sphere. The outline of the coarse one takes 1.1 % of the area, "
             "and light ends a face too early at the terminator, where cosines are below 0.26: together below 6 %.",
             bound=0.06,
+            resolves=0.05,
         ),
         iterations={None: 64, "sppm": 16},
     ),
@@ -125,8 +127,13 @@ CASES = [
         "slit",
         "A slit of light, a metre long and 10 µm wide",
         {"scene": partial(slit, 1e-5)},
-        Value(lit_by_slit(), "A line lamp: albedo / pi times the integral of h² / r⁴ over its length.", bound=0.005),
+        Value(
+            lit_by_slit(),
+            "A line lamp: albedo / pi times the integral of h² / r⁴ over its length.",
+            bound=0.005,
+            resolves=0.1,
+        ),
         size=8,
-        iterations=16,
+        iterations=256,
     ),
 ]
