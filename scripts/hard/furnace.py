@@ -5,7 +5,7 @@ from functools import partial
 import scene as s
 import shapes
 from answers import Value, Values
-from case import Case
+from case import METHODS, Case
 
 TITLE = "Furnace"
 WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
@@ -27,9 +27,9 @@ def white(material, mesh=None):
 WIDE = {None: (), "sppm": ("--initial-bandwidth", "0.3"), "vcm": ("--initial-bandwidth", "0.3")}
 
 
-def _closed(albedo, iterations, photons, resolves=0.1):
+def _closed(albedo, iterations, photons, resolves=0.1, methods=METHODS, name="", long=False):
     return Case(
-        f"furnace-albedo-{albedo}",
+        f"furnace-albedo-{albedo}{name}",
         f"A closed box of albedo {albedo} whose walls emit",
         {"scene": partial(closed, albedo)},
         Value(
@@ -38,10 +38,12 @@ def _closed(albedo, iterations, photons, resolves=0.1):
             bound=0.005,
             resolves=resolves,
         ),
+        methods,
         iterations=iterations,
         photons=photons,
         options=WIDE,
         size=8,
+        long=long,
     )
 
 
@@ -61,7 +63,8 @@ CASES = [
     _closed(0.5, {None: 64, "sppm": 24}, 10000),
     _closed(0.9, {None: 64, "sppm": 8}, 5000),
     _closed(0.99, {None: 96, "sppm": 16}, 500),
-    _closed(0.999, {None: 96, "sppm": 8}, 100, resolves=0.25),
+    _closed(0.999, {None: 16, "sppm": 8}, 100, 0.3, ("path", "sppm")),
+    _closed(0.999, 96, 100, 0.3, ("bdpt", "vcm"), "-connected", long=True),
     Case(
         "furnace-diffuse",
         "A white Lambertian sphere in a white furnace",

@@ -82,7 +82,7 @@ CASES = [
         {"scene": partial(low_eye, s.diffuse(1))},
         Value(1.0, WHITE, resolves=0.1),
         size=8,
-        iterations={None: 96, "sppm": 32},
+        iterations=96,
         photons=2000,
     ),
     Case(
