@@ -131,9 +131,10 @@ CASES = [
             lit_by_slit(),
             "A line lamp: albedo / pi times the integral of h² / r⁴ over its length.",
             bound=0.005,
-            resolves=0.1,
+            resolves=0.15,
         ),
         size=8,
         iterations=256,
+        photons=1000,
     ),
 ]

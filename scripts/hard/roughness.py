@@ -115,10 +115,10 @@ CASES = [
             "GGX with Smith's height-correlated shadowing, integrated "
             "over the lamp. White metal has no Fresnel effect. Light between facets adds less than 1 %.",
             bound=0.01,
-            resolves=0.04,
+            resolves=0.05,
         ),
         EYE,
-        iterations=64,
+        iterations=96,
         size=8,
         photons=20000,
     ),
