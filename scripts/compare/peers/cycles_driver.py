@@ -198,7 +198,7 @@ def settle(scene, options):
     render.engine, cycles.device, render.threads_mode, render.threads = "CYCLES", "CPU", "FIXED", options.threads
     render.resolution_x, render.resolution_y, render.resolution_percentage = options.width, options.height, 100
     for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_max_bounces"):
-        setattr(cycles, name, driver.DEPTH)
+        setattr(cycles, name, options.depth)
     cycles.caustics_reflective = cycles.caustics_refractive = True
     cycles.use_guiding, cycles.blur_glossy = options.mode == "path_guiding", 0
     cycles.use_adaptive_sampling = cycles.use_denoising = False

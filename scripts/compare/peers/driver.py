@@ -1,7 +1,7 @@
 """What the drivers of other renderers have in common: their command line, their clocks, and the line they answer with.
 
     PYTHON NAME_driver.py SCENE.glb OUT.exr --mode MODE --width W --height H --budget SECONDS --threads T --seed S
-                            [--camera NAME] [--clock wall|cpu]
+                            [--camera NAME] [--clock wall|cpu] [--depth SEGMENTS]
 
 A driver renders for SECONDS, writes a linear picture, and says in its last line what it did:
 
@@ -63,6 +63,7 @@ def options(modes):
     parser.add_argument("--budget", type=float, required=True)
     parser.add_argument("--threads", type=int, required=True)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--depth", type=int, default=DEPTH)
     parser.add_argument("--clock", choices=("wall", "cpu"), default="wall")
     return parser.parse_args()
 

@@ -150,7 +150,7 @@ def properties(values):
 
 def settings(scene, options):
     """Properties of the render."""
-    depth, mode = driver.DEPTH, options.mode
+    depth, mode = options.depth, options.mode
     found = {
         "renderengine.type": ENGINES[mode], "renderengine.seed": options.seed + 1,
         "native.threads.count": options.threads, "sampler.type": "RANDOM" if mode == "bidirvm" else "SOBOL", "sampler.random.bucketsize": 1,

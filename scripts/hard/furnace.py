@@ -1,0 +1,85 @@
+"""7. Furnaces: what is lit from everywhere alike, and takes no light away, looks like the light."""
+
+from functools import partial
+
+import scene as s
+import shapes
+from answers import Value, Values
+from case import METHODS, Case
+
+TITLE = "Furnace"
+WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
+ROUGHNESS = (0.0, 0.05, 0.3, 1.0)
+
+
+def closed(albedo, emitted=1.0):
+    """A closed box whose walls all emit and reflect; the camera in it looks at a wall."""
+    walls = shapes.box((-1, -1, -1), (1, 1, 1)).flipped()
+    return s.Scene().add(walls, s.glowing(s.diffuse(albedo), emitted)).seen((0.1, 0.2, 0.3), (1, 0.1, 0), 30)
+
+
+def white(material, mesh=None):
+    """A sphere in a white environment, which the picture's middle shows."""
+    return s.Scene().within(1).add(mesh or shapes.sphere((0, 0, 0), 1), material).seen((0, 0.5, 4), (0, 0, 0), 12)
+
+
+#: Light is the same all over the wall, so that wide bandwidths blur nothing.
+WIDE = {None: (), "sppm": ("--initial-bandwidth", "0.3"), "vcm": ("--initial-bandwidth", "0.3")}
+
+
+def _closed(albedo, iterations, photons, resolves=0.1, methods=METHODS, name="", long=False):
+    return Case(
+        f"furnace-albedo-{albedo}{name}",
+        f"A closed box of albedo {albedo} whose walls emit",
+        {"scene": partial(closed, albedo)},
+        Value(
+            1 / (1 - albedo),
+            f"L = 1 + {albedo} L on every wall, so L = 1 / (1 - {albedo}).",
+            bound=0.005,
+            resolves=resolves,
+        ),
+        methods,
+        iterations=iterations,
+        photons=photons,
+        options=WIDE,
+        size=8,
+        long=long,
+    )
+
+
+def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, iterations=64):
+    scenes = {f"roughness-{r:g}": partial(white, material(r)) for r in ROUGHNESS}
+    return Case(
+        f"furnace-{name}",
+        f"{title} in a white furnace, roughness 0 to 1",
+        scenes,
+        Values({label: 1.0 for label in scenes}, WHITE, bound=bound, resolves=0.06),
+        methods=methods,
+        iterations=iterations,
+    )
+
+
+CASES = [
+    _closed(0.5, {None: 64, "sppm": 24}, 10000),
+    _closed(0.9, {None: 64, "sppm": 8}, 5000),
+    _closed(0.99, {None: 96, "sppm": 16}, 500),
+    _closed(0.999, {None: 16, "sppm": 8}, 100, 0.3, ("path", "sppm")),
+    _closed(0.999, 96, 100, 0.3, ("bdpt", "vcm"), "-connected", long=True),
+    Case(
+        "furnace-diffuse",
+        "A white Lambertian sphere in a white furnace",
+        {"scene": partial(white, s.diffuse(1))},
+        Value(1.0, WHITE, resolves=0.05),
+        iterations=64,
+        photons=1000,
+    ),
+    _lobe("metal", "White metal", lambda r: s.metal(1, r), bound=0.01),
+    _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01, iterations=128),
+    _lobe("plastic", "A dielectric coat over a white base", lambda r: s.plastic(1, r), bound=0.01),
+    Case(
+        "furnace-glass-box",
+        "A closed box of clear glass, through its edges and corners",
+        {"scene": partial(white, s.glass(1.5), shapes.box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3)))},
+        Value(1.0, WHITE),
+    ),
+]
