@@ -41,6 +41,9 @@ def knobs(figures):
     for group, label, options, spent, estimate, picture, gain, gain_finished, size in figures.one("knobs")["rows"]:
         errors = [f"{100 * error:.1f} %" for error in (estimate, picture)]
         gains = [f"{gain:.2f}", f"{gain_finished:.2f}"]
+        # Without the layer there is no estimate to measure.
+        if "--layers" in options:
+            errors[0] = gains[0] = "-"
         rows.append([group, label, f"`{options}`", f"{spent:.1f}", *errors, *gains, f"{size:.1f}"])
     columns = ["knob", "", "options", "core-s", "estimate", "finished", "gain", "gain finished", "MB"]
     return table(columns, rows)
