@@ -16,10 +16,11 @@ DEFAULTS = {"SET": "all", "BUDGETS": "6", "METHODS": "auto", "CLOCK": "cpu"}
 for variable, value in DEFAULTS.items():
     os.environ.setdefault(variable, value)
 
+# First, for it finds the interpreters of the others.
+import finished  # noqa: E402, I001
 import _peers  # noqa: E402
 import _references  # noqa: E402
 import _renders  # noqa: E402
-import finished  # noqa: E402
 import numpy as np  # noqa: E402
 from _accuracy import geometric  # noqa: E402
 from _cache import THREADS, WIDTH, Failed, program  # noqa: E402
