@@ -17,7 +17,7 @@ def calibration(figures):
             continue
         spread = f"{of['geometric_mean']:.2f} ({of['least']:.2f} to {of['most']:.2f})"
         counts = [f"{of[key]} of {of['told']}" for key in ("within", "inside")]
-        rows.append([part, of["told"], spread, *counts, percent(of["pixels_within_2"])])
+        rows.append([part, str(of["told"]), spread, *counts, percent(of["pixels_within_2"])])
     columns = ["pictures", "number", "told over true", "within 1.5", "in the interval", "pixels within twice `Error`"]
     return table(columns, rows)
 

@@ -26,11 +26,12 @@ APART = ("scene", "rule", "parameters", "corrected", "set")
 
 
 def commit():
-    """The commit that is checked out, "-dirty" added if files other than the results differ from it: tracked ones, and
-    those of `scripts` and `src` that it does not have at all."""
+    """The commit that is checked out, "-dirty" added if files other than the results and the documentation, which figures
+    fill, differ from it: tracked ones, and those of `scripts` and `src` that it does not have at all."""
     try:
         head = _git("rev-parse", "HEAD")
-        changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", f":!{RESULTS.relative_to(ROOT)}")
+        own = [f":!{RESULTS.relative_to(ROOT)}", ":!docs"]
+        changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", *own)
         changed = changed or _git("ls-files", "--others", "--exclude-standard", "--", "scripts", "src")
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
