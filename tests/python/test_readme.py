@@ -151,7 +151,7 @@ class Text(unittest.TestCase):
     def test_options_that_are_named_exist(self):
         names = ("render", "plan", "combine", "merge", "compare", "converge", "info", "doctor")
         known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
-        for script in ("blender/export.py", "farm/ray_render.py", "farm/slurm.sh"):
+        for script in ("blender/export.py", "farm/ray_render.py", "farm/slurm.sh", "hard/run.py"):
             known += (support.ROOT / "scripts" / script).read_text(encoding="utf-8")
         known = set(re.findall(r"--[a-z][a-z-]*", known))
         for page in PAGES:
