@@ -1,13 +1,13 @@
 """12. Determinism: the same bytes from any number of threads, from shards merged in any order, and after a kill."""
 
-import scale
+import magnitude
 from answers import Resumed, Shards, Threads
 from case import Case
 
 TITLE = "Determinism"
 ALL = ("path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm")
 DIVIDED = ("path", "bdpt", "sppm", "vcm")
-SCENE = {"scene": scale.room}
+SCENE = {"scene": magnitude.room}
 
 CASES = [
     Case(

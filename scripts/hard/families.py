@@ -3,7 +3,7 @@
 import importlib
 
 #: Modules of cases; each has a TITLE and CASES.
-MODULES = ("scale", "lights", "roughness", "refraction", "grazing", "geometry", "furnace", "media", "determinism")
+MODULES = ("magnitude", "lights", "roughness", "refraction", "grazing", "geometry", "furnace", "media", "determinism")
 
 
 def cases():

@@ -12,7 +12,7 @@ from pathlib import Path
 import families
 import judge
 import page
-from peers import PEERS, Cannot, PeerStage
+from guests import PEERS, Cannot, PeerStage
 from stage import Broken, Stage, read
 
 ROOT = Path(__file__).resolve().parents[2]
