@@ -9,11 +9,13 @@ import json
 import math
 import os
 import subprocess
+import sys
 
+import _references
 import numpy as np
-from _cache import BIN, CACHE, THREADS, WIDTH, load, making, program, save, scene_key
+from _cache import BIN, CACHE, THREADS, WIDTH, Failed, load, making, program, save, scene_key
 from _iteration import read
-from _pictures import TRIM, Layers
+from _pictures import Layers, Reference, best
 
 METHODS = os.environ.get("METHODS", "auto").split(",")
 SEEDS = int(os.environ.get("SEEDS", "3"))
@@ -24,29 +26,39 @@ LAYERS = "beauty,Noisy,Error"
 PLACE = CACHE / "accuracy" / program()
 
 
-class Truth:
-    """Two halves of a reference in a folder that _references.py has made."""
+class Truth(Reference):
+    """A reference, with errors relative to what renders take them relative to."""
 
-    def __init__(self, folder):
-        self.halves = [Layers(folder / f"half{half}.exr").get("").astype(float) for half in (1, 2)]
-        self.mean = (self.halves[0] + self.halves[1]) / 2
-        values = np.sort(self.mean.mean(-1).ravel())
+    def __init__(self, first, second):
+        super().__init__(first, second)
+        values = np.sort(self.mean.mean(-1)[self.finite])
         kept = values[: len(values) - int(BRIGHTEST * len(values))]
         self.weight = 1.0 / (self.mean.mean(-1) ** 2 + DARK * kept.mean() ** 2)
         # What is left of the reference's own noise about a pixel: a window's mean of a quarter of the halves' squared
         # difference.
         self.noise = box(np.square(self.halves[0] - self.halves[1]) / 4)
 
-    def error(self, picture):
+    def distance(self, picture):
         """The root of trimmed relMSE, zero where the reference's noise hides it."""
         first, second = (picture - half for half in self.halves)
-        worst = (np.square(picture - self.mean).mean(-1) * self.weight).ravel()
-        kept = np.argsort(worst, kind="stable")[: worst.size - int(TRIM * worst.size)]
-        return math.sqrt(max(((first * second).mean(-1) * self.weight).ravel()[kept].mean(), 0.0))
+        kept = best(np.square(picture - self.mean).mean(-1) * self.weight, self.finite)
+        told = ((first * second).mean(-1) * self.weight)[self.finite][kept]
+        return math.sqrt(max(told.mean(), 0.0))
 
     def within(self, picture, error, times):
         """Share of the pixels and channels where the truth lies within so many times the error told."""
         return float((np.square(picture - self.mean) <= times**2 * (np.square(error) + self.noise)).mean())
+
+
+def truths():
+    """The scenes asked for that have a reference, each with its truth; what keeps others out is said."""
+    for scene in _references.scenes():
+        try:
+            halves, _ = _references.reference(scene)
+        except Failed as failed:
+            print(f"{_references.name(scene)}: no reference: {failed}", file=sys.stderr)
+            continue
+        yield scene, Truth.read(halves)
 
 
 def box(values, reach=4):
@@ -62,7 +74,8 @@ def box(values, reach=4):
 
 
 def rendered(scene, method, stop, seed):
-    """Renders until a stop such as ("--time", 4), unless that is done; returns the folder: picture.exr, progress.jsonl."""
+    """Renders until a stop such as ("--time", 4), unless that is done; returns the folder: picture.exr, run.json and
+    progress.jsonl."""
     name = f"{method}{'-'.join(map(str, stop))}-{THREADS}-seed{seed}-{WIDTH}"
     folder = PLACE / scene_key(scene) / name
     if not (folder / "run.json").exists():
@@ -91,15 +104,20 @@ def judged(folder, truth):
         "told": run["error"] if finished else None,
         "interval": said.get("interval"),
         "rare": said.get("rare"),
-        "true": truth.error(picture),
+        "true": truth.distance(picture),
         "told_noisy": run.get("error_noisy"),
-        "true_noisy": truth.error(layers.get("Noisy").astype(float)),
+        "true_noisy": truth.distance(layers.get("Noisy").astype(float)),
         "pixels_within_2": truth.within(picture, layers.get("Error").astype(float), 2) if finished else None,
         "seconds": run["history"][-1]["seconds"],
         "core_seconds": run["history"][-1]["cpu_seconds"],
         "iterations": run["iterations"],
         "method": run["method"],
     }
+
+
+def short(value):
+    """A figure for the record, to four digits; nothing for what is no number."""
+    return float(f"{value:.4g}") if value is not None and math.isfinite(value) else None
 
 
 def geometric(values):

@@ -97,7 +97,7 @@ def compared(scene, names):
 
 
 def summary(rows):
-    """Ours over each peer, and over the best of all in each figure: geometric means, the worst, and on how many better."""
+    """Ours over each peer, and over the best of all in each figure: geometric mean, worst, and how many are better."""
     found = {}
     peers = list(dict.fromkeys(peer for row in rows for peer in row["ratios"]))
     for peer in [*peers, "best of all"]:
@@ -109,7 +109,8 @@ def summary(rows):
             ]
             if values:
                 better = sum(value < 1 for value in values)
-                found.setdefault(peer, {})[key] = [round(geometric(values), 3), round(max(values), 2), better, len(values)]
+                of = found.setdefault(peer, {})
+                of[key] = [round(geometric(values), 3), round(max(values), 2), better, len(values)]
     return found
 
 

@@ -1,20 +1,18 @@
 #!/usr/bin/env python3
 """What iterations that go where the error is would gain, by the renders of calibration.py: tiles of 16 x 16 pixels get
-eye paths in proportion to e^(1/(1 + 2 s)), the best for errors that fall with e n^(-2 s), by the layer `Error` (at least
-half of what all get on average, so that what is not told is found), and what is left of the true squared error is summed.
-`best` allots by the true errors themselves, which nobody knows. Light paths, which all tiles share, are taken to cost
-nothing: what is gained is less.
+eye paths in proportion to e^(1/(1 + 2 s)), the best for errors that fall with e n^(-2 s), by the layer `Error` (at
+least half of what all get on average, so that what is not told is found), and what is left of the true squared error is
+summed. `best` allots by the true errors themselves, which nobody knows. Light paths, which all tiles share, are taken
+to cost nothing: what is gained is less.
 
   SET, SCENES, WIDTH, THREADS, REFERENCE_SECONDS, METHODS, BUDGETS, SEEDS   as in calibration.py
 """
-
-import sys
 
 import _accuracy
 import _references
 import numpy as np
 from _accuracy import BUDGETS, METHODS, SEEDS, geometric
-from _cache import THREADS, WIDTH, Failed, program
+from _cache import THREADS, WIDTH, program
 from _pictures import TRIM, Layers
 from record import record
 
@@ -49,12 +47,7 @@ def measured(folder, truth):
 def main():
     rows = []
     print(f"{'':<22}{'told':>8}{'best':>8}")
-    for scene in _references.scenes():
-        try:
-            truth = _accuracy.Truth(_references.reference(scene)[0])
-        except Failed as failed:
-            print(f"{_references.name(scene)}: no reference: {failed}", file=sys.stderr)
-            continue
+    for scene, truth in _accuracy.truths():
         for method in METHODS:
             folders = [_accuracy.rendered(scene, method, ["--time", BUDGETS[-1]], seed) for seed in range(1, SEEDS + 1)]
             told, best = (geometric(values) for values in zip(*(measured(folder, truth) for folder in folders)))

@@ -8,20 +8,19 @@ docs/calibration.svg from what is stored, where there is .venv-python (scripts/p
   METHODS   [auto]
   NAME      a name for what is stored, beside what is stored without one
 
-A picture counts as told right where the error is within a factor of 1.5 of the truth; the interval should hold the truth
-in nine of ten. Where more than half of the noise lies in half a per cent of the pixels the render itself warns: such
+A picture counts as told right where the error is within a factor of 1.5 of the truth; the interval should hold the
+truth in nine of ten. Where more than half of the noise lies in half a per cent of the pixels the render itself warns: such
 pictures are counted apart.
 """
 
-import math
 import os
 import subprocess
 import sys
 
 import _accuracy
 import _references
-from _accuracy import BUDGETS, METHODS, SEEDS, geometric
-from _cache import THREADS, WIDTH, Failed, program
+from _accuracy import BUDGETS, METHODS, SEEDS, geometric, short
+from _cache import THREADS, WIDTH, program
 from record import ROOT, record
 
 FACTOR, RARE = 1.5, 0.5
@@ -29,13 +28,7 @@ FACTOR, RARE = 1.5, 0.5
 
 def rows():
     """What is told and true of every picture."""
-    for scene in _references.scenes():
-        try:
-            halves, _ = _references.reference(scene)
-        except Failed as failed:
-            print(f"{_references.name(scene)}: no reference: {failed}", file=sys.stderr)
-            continue
-        truth = _accuracy.Truth(halves)
+    for scene, truth in _accuracy.truths():
         for method in METHODS:
             for budget in BUDGETS:
                 for seed in range(1, SEEDS + 1):
@@ -74,11 +67,6 @@ def line(label, found):
     return text + (f"{found['noisy']:>8.2f}" if found["noisy"] else "")
 
 
-def short(value):
-    """A figure for the record, to four digits."""
-    return None if value is None or math.isnan(value) else float(f"{value:.4g}")
-
-
 def main():
     found = []
     for row in rows():
@@ -93,7 +81,8 @@ def main():
     parts = {f"{budget:g} s": [row for row in usual if row["budget"] == budget] for budget in BUDGETS}
     parts |= {name: [row for row in usual if row["scene"] == name] for name in dict.fromkeys(r["scene"] for r in usual)}
     parts |= {"all": usual, "warned of": [row for row in found if (row["rare"] or 0) > RARE]}
-    columns = {"pictures": 9, "told": 6, "in 1.5": 8, "mean": 8, "least": 7, "most": 7, "inside": 8, "pixels": 9, "noisy": 8}
+    columns = {"pictures": 9, "told": 6, "in 1.5": 8, "mean": 8, "least": 7, "most": 7, "inside": 8, "pixels": 9}
+    columns["noisy"] = 8
     print("\n" + " " * 28 + "".join(f"{name:>{width}}" for name, width in columns.items()))
     summaries = {label: summary(part) for label, part in parts.items() if part}
     for label, one in summaries.items():
@@ -101,13 +90,15 @@ def main():
     values = {"program": program(), "width": WIDTH, "threads": THREADS, "seeds": SEEDS, "budgets": BUDGETS}
     values |= {"methods": METHODS, "parts": summaries}
     values |= {"set": os.environ["NAME"]} if "NAME" in os.environ else {}
-    values["rows"] = [[r["scene"], r["budget"], r["seed"], *map(short, (r["told"], r["true"], r["rare"]))] for r in found]
+    values["rows"] = [
+        [row["scene"], row["budget"], row["seed"], *map(short, (row["told"], row["true"], row["rare"]))] for row in found
+    ]
     record("calibration", values)
     python = ROOT / ".venv-python" / "bin" / "python"
     if python.exists():
         subprocess.run([python, ROOT / "scripts" / "figures" / "_calibration_plot.py"], check=True)
     else:
-        print("docs/calibration.svg is as it was: scripts/python.sh makes .venv-python, which draws it", file=sys.stderr)
+        print("docs/calibration.svg is as it was: scripts/python.sh makes what draws it", file=sys.stderr)
 
 
 if __name__ == "__main__":

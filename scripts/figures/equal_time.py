@@ -10,7 +10,6 @@ that are there already).
 import json
 import os
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import OpenEXR

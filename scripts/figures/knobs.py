@@ -17,7 +17,7 @@ import sys
 
 import _accuracy
 import _references
-from _accuracy import geometric
+from _accuracy import geometric, short
 from _cache import BIN, CACHE, THREADS, WIDTH, Failed, load, making, program, save, scene_key
 from _iteration import read
 from _pictures import Layers
@@ -50,7 +50,8 @@ GROUPS = {
 
 def render(scene, options):
     """Renders unless that is done; returns the folder."""
-    folder = PLACE / scene_key(scene) / f"{'_'.join(options).replace('/', '-') or 'plain'}-{ITERATIONS}-{THREADS}-{WIDTH}"
+    name = "_".join(options).replace("/", "-")
+    folder = PLACE / scene_key(scene) / f"{name}-{ITERATIONS}-{THREADS}-{WIDTH}"
     if not (folder / "run.json").exists():
         with making(folder) as draft:
             file = draft / "picture.exr"
@@ -72,16 +73,14 @@ def measured(scene, options, truth):
     folder = render(scene, options)
     run, layers = load(folder / "run.json"), Layers(folder / "picture.exr")
     noisy = layers.get("Noisy")
-    picture = truth.error(layers.get("").astype(float))
-    estimate = truth.error(noisy.astype(float)) if noisy is not None else picture
+    picture = truth.distance(layers.get("").astype(float))
+    estimate = truth.distance(noisy.astype(float)) if noisy is not None else picture
     return run["core_seconds"], max(estimate, 1e-6), max(picture, 1e-6), run["bytes"]
 
 
 def main():
-    truths = {}
     os.environ.setdefault("SCENES", "torus,pool,second/still")
-    for scene in _references.scenes():
-        truths[scene] = _accuracy.Truth(_references.reference(scene)[0])
+    truths = dict(_accuracy.truths())
     rows = []
     for group, (common, knobs) in GROUPS.items():
         print(f"\n{group:<24}{'core-s':>9}{'estimate':>10}{'finished':>10}{'gain est.':>11}{'gain fin.':>11}{'MB':>7}")
@@ -102,7 +101,7 @@ def main():
                 flush=True,
             )
             figures = [spent, estimate, picture, *gains, size / 1e6]
-            rows.append([group, label, " ".join([*common, *options]), *(float(f"{x:.4g}") for x in figures)])
+            rows.append([group, label, " ".join([*common, *options]), *map(short, figures)])
     names = [_references.name(scene) for scene in truths]
     record("knobs", {"program": program(), "width": WIDTH, "iterations": ITERATIONS, "scenes": names, "rows": rows})
 

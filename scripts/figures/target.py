@@ -4,19 +4,18 @@ done; and what the progress line and `caustique plan` have said of that time bef
 
   SET, SCENES, WIDTH, THREADS, REFERENCE_SECONDS, METHODS, BUDGETS, SEEDS   as in calibration.py
 
-The error asked for is the true one of calibration.py's pictures at the next to last of the budgets, their geometric mean.
-The shortest time follows from the true errors of all its budgets, by interpolation in the logarithms. Clocks count: the
-machine must be quiet. Stores the figures `target` and `prediction`.
+The error asked for is the true one of calibration.py's pictures at the next to last of the budgets, their geometric
+mean. The shortest time follows from the true errors of all its budgets, by interpolation in the logarithms. Clocks
+count: the machine must be quiet. Stores the figures `target` and `prediction`.
 """
 
 import math
 import statistics
-import sys
 
 import _accuracy
 import _references
-from _accuracy import BUDGETS, METHODS, SEEDS, geometric
-from _cache import THREADS, WIDTH, Failed, program
+from _accuracy import BUDGETS, METHODS, SEEDS, geometric, short
+from _cache import THREADS, WIDTH, program
 from _iteration import read
 from record import record
 
@@ -59,7 +58,8 @@ def measure(scene, method, truth):
         # As long again as ought to do ten times over.
         stop = ["--target-error", error, "--time", 10 * BUDGETS[-1]]
         folder = _accuracy.rendered(scene, method, stop, 100 + seed)
-        rows.append(_accuracy.judged(folder, truth) | {"said": predictions(folder, error, _accuracy.progress(folder)[-1]["seconds"])})
+        end = _accuracy.progress(folder)[-1]["seconds"]
+        rows.append(_accuracy.judged(folder, truth) | {"said": predictions(folder, error, end)})
     shortest = crossing(points, error)
     taken = statistics.mean(row["seconds"] for row in rows)
     late = [told for row in rows for share, told in row["said"] if share >= FROM]
@@ -80,22 +80,17 @@ def measure(scene, method, truth):
 
 def main():
     rows = []
-    print(f"{'':<22}{'error':>8}{'true over it':>14}{'seconds':>9}{'over shortest':>15}{'predicted':>11}{'in 30 %':>9}{'plan':>7}")
-    for scene in _references.scenes():
-        try:
-            halves, _ = _references.reference(scene)
-        except Failed as failed:
-            print(f"{_references.name(scene)}: no reference: {failed}", file=sys.stderr)
-            continue
-        truth = _accuracy.Truth(halves)
+    columns = {"error": 8, "true over it": 14, "seconds": 9, "over shortest": 15, "predicted": 11, "in 30 %": 9, "plan": 7}
+    print(" " * 22 + "".join(f"{name:>{width}}" for name, width in columns.items()))
+    for scene, truth in _accuracy.truths():
         for method in METHODS:
             row = measure(scene, method, truth)
             rows.append(row)
-            text = f"{row['scene']:<22}{row['error']:>8.2%}{row['true']:>14.2f}{row['seconds']:>9.1f}{row['longer']:>15.2f}"
+            text = f"{row['scene']:<22}{row['error']:>8.2%}{row['true']:>14.2f}"
+            text += f"{row['seconds']:>9.1f}{row['longer']:>15.2f}"
             text += f"{row['predicted']:>11.2f}{row['right']:>9.0%}" if row["predicted"] else f"{'-':>11}{'-':>9}"
             print(text + (f"{row['planned']:>7.2f}" if row["planned"] else f"{'-':>7}"), flush=True)
     known = [row for row in rows if row["predicted"]]
-    short = [{key: round(v, 4) if isinstance(v, float) and math.isfinite(v) else None if isinstance(v, float) else v for key, v in row.items()} for row in rows]
     said = {"program": program(), "width": WIDTH, "threads": THREADS, "seeds": SEEDS, "budgets": BUDGETS}
     counts = {
         "scenes": len(rows),
@@ -108,10 +103,18 @@ def main():
         "predicted": sum(abs(row["predicted"] - 1) <= WITHIN for row in known),
         "planned": sum(abs(math.log(row["planned"])) <= math.log(2) for row in rows if row["planned"]),
     }
-    print(f"\ntrue within {FACTOR} of it: {counts['true']} of {counts['scenes']}; no more than {LONGER} of the shortest: {counts['longer']}")
-    print(f"predicted within 30 %: {foretold['predicted']} of {foretold['scenes']}; planned within a factor of 2: {foretold['planned']}")
-    record("target", said | counts | {"rows": [{k: row[k] for k in ("scene", "error", "true", "seconds", "longer")} for row in short]})
-    record("prediction", said | foretold | {"rows": [{k: row[k] for k in ("scene", "predicted", "right", "planned")} for row in short]})
+    print(f"\ntrue within {FACTOR} of it: {counts['true']} of {counts['scenes']}")
+    print(f"no more than {LONGER} of the shortest: {counts['longer']} of {counts['scenes']}")
+    print(f"predicted within 30 %: {foretold['predicted']} of {foretold['scenes']}")
+    print(f"planned within a factor of 2: {foretold['planned']} of {foretold['scenes']}")
+
+    def stored(row, *keys):
+        return {"scene": row["scene"], **{key: short(row[key]) for key in keys}}
+
+    stops = [stored(row, "error", "true", "seconds", "longer") for row in rows]
+    record("target", said | counts | {"rows": stops})
+    predictions_of = [stored(row, "predicted", "right", "planned") for row in rows]
+    record("prediction", said | foretold | {"rows": predictions_of})
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import scene as s
 import shapes
 from answers import Equal, Value
 from case import Case
+from furnace import WHITE
 
 TITLE = "Grazing"
 ALBEDO = 0.8
@@ -61,8 +62,6 @@ def lit_by_slit(half=0.5, height=0.1):
     r = hypot(half, height)
     return 0.5 / pi * (half / r**2 + atan2(half, height) / height)
 
-
-WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
 
 CASES = [
     Case(

@@ -8,7 +8,7 @@ use caustique::error::{Error, Kind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
 use caustique::light::Emitter;
-use caustique::pipeline::Place;
+use caustique::pipeline::{FINISHED_PICTURE, Place};
 use caustique::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::fs::File;
@@ -90,7 +90,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
         text += &number("light_paths").map(|n| format!(", {n} light paths")).unwrap_or_default();
         text += &number("seconds").map(|s| format!(", {}", duration(s))).unwrap_or_default();
         let note = match object.get("error_of").and_then(Value::as_str) {
-            Some("finished picture") => " (finished picture, trimmed)".into(),
+            Some(FINISHED_PICTURE) => " (finished picture, trimmed)".into(),
             Some(of) if !of.ends_with("bias") => format!(" ({of} only)"),
             _ => String::new(),
         };

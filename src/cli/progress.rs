@@ -1,6 +1,7 @@
 //! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
 
 use super::say;
+use caustique::pipeline::FINISHED_PICTURE;
 pub use caustique::pipeline::plan::percent;
 use caustique::render::{Progress, Settings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -217,7 +218,7 @@ impl Reporter {
             Form::Json => {
                 let Progress { iteration, iterations, seconds, remaining, light_paths, told, .. } = *progress;
                 let error = progress.finished.or(progress.error);
-                let error_of = if progress.finished.is_some() { "finished picture" } else { told.name() };
+                let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { told.name() };
                 let expected = progress.expected.map(|(error, seconds)| Expected { error, seconds });
                 let frame = self.turn.map(|turn| turn.frame);
                 let line =

@@ -12,6 +12,9 @@ use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
 
+/// What an error is of, where it is not the estimate's (the header's `error_of`).
+pub const FINISHED_PICTURE: &str = "finished picture";
+
 /// A picture with its layers and its header.
 pub struct Delivery {
     /// The layers that were asked for, finished; unfinished with what a finish reads, where that failed.
@@ -167,7 +170,7 @@ impl Reached {
         if let Some(noisy) = header.insert("error".into(), self.error().into()) {
             header.insert("error_noisy".into(), noisy);
         }
-        header.insert("error_of".into(), "finished picture".into());
+        header.insert("error_of".into(), FINISHED_PICTURE.into());
         let mut halving = json!({"error": 0.5 * self.error()});
         if let Some(more) = self.halving() {
             halving["iterations"] = (more * self.last.iterations as f64).ceil().into();

@@ -22,7 +22,7 @@ pub mod shard;
 mod worst;
 
 pub use checkpoint::Saving;
-pub use deliver::{Delivery, Reached, tell_stored};
+pub use deliver::{Delivery, FINISHED_PICTURE, Reached, tell_stored};
 pub use facts::Facts;
 pub use finish::Ready;
 pub use load::Loaded;

@@ -2,6 +2,7 @@
 //! variances and errors. The bandwidth that each has shrunk to stays, and so does the bias.
 
 use super::checkpoint::difference;
+use super::deliver::FINISHED_PICTURE;
 use crate::error::{Error, Kind, Result};
 use crate::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
 use crate::film::{Layer, LayerSet};
@@ -218,7 +219,7 @@ impl Seeds {
 
 /// Whether errors are those of finished pictures.
 fn finished(sources: &[Source]) -> bool {
-    sources.iter().any(|source| source.header["error_of"] == "finished picture")
+    sources.iter().any(|source| source.header["error_of"] == FINISHED_PICTURE)
 }
 
 /// From mean squares of the errors of so many renders to the error of their mean. Variances fall with their number,

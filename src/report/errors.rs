@@ -3,20 +3,15 @@
 
 use super::crop::heat_bar;
 use super::number::short;
-use super::page::data_url;
+use super::page::{data_url, document};
 use crate::error::Result;
 use crate::film::{Layer, LayerSet};
 use crate::finish::ERROR;
 use crate::image::tonemap::ToneMap;
 use crate::image::{Comparison, heat, png};
 use crate::stat::floor;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
-const STYLE: &str = concat!(
-    include_str!("page.css"),
-    ".errors { display: grid; grid-template-columns: repeat(auto-fit, minmax(20rem, 1fr)); gap: 1rem; }\n",
-    ".labels { display: flex; justify-content: space-between; }\n",
-);
 /// Share of the pixels whose errors the scale has room for, so that fireflies do not turn all else black.
 const SHOWN: f64 = 0.95;
 
@@ -58,28 +53,15 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
         figures.push(figure("error that the render has told", &told, Some((&bar, &percents(largest)))));
     }
     figures.push(figure("FLIP", &data_url(&map(&comparison.flip_map, 1.0)?), Some((&bar, &plain))));
-    let title = format!("Errors of {}", names[0]);
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                header { h1 { (title) } p.lead {
-                    "relMSE " (short(comparison.relmse)) ", trimmed " (short(comparison.relmse_trimmed))
-                    ", FLIP " (short(comparison.flip)) ", mean ratio "
-                    (comparison.mean_ratio.map_or("unknown".into(), short))
-                } }
-                section { div.errors { @for figure in &figures { (figure) } } }
-                footer { "caustique " (env!("CARGO_PKG_VERSION")) }
-            }
-        }
-    };
-    Ok(page.into_string())
+    let lead = format!(
+        "relMSE {}, trimmed {}, FLIP {}, mean ratio {}",
+        short(comparison.relmse),
+        short(comparison.relmse_trimmed),
+        short(comparison.flip),
+        comparison.mean_ratio.map_or("unknown".into(), short)
+    );
+    let body = html! { section { div.errors { @for figure in &figures { (figure) } } } };
+    Ok(document(&format!("Errors of {}", names[0]), &lead, &body))
 }
 
 /// A picture with what it shows, and the bar of its scale with the labels of its ends and its middle.

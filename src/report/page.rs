@@ -28,6 +28,27 @@ pub struct Plots {
 pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Plots]) -> Result<String> {
     let bar = data_url(&crop::heat_bar()?);
     let title = format!("Accuracy against time: {}", subject.scene);
+    let body = html! {
+        @for row in plots.iter().filter(|row| !row.plots.is_empty()) {
+            section { h2 { (row.heading) } div.pair {
+                @for (metric, svg) in &row.plots { div.plot { h3 { (meaning(*metric)) } (PreEscaped(svg)) } }
+            } }
+        }
+        (marks(subject, summary))
+        (targets(subject, summary))
+        (fits(subject, summary))
+        (guests(subject, outcome, summary))
+        (overheads(subject, summary))
+        (reference(subject, summary))
+        @for strip in &summary.strips { (crops(strip, summary, &bar)) }
+        (runs(subject))
+        (facts(subject, summary))
+    };
+    Ok(document(&title, &lead(subject), &body))
+}
+
+/// A page with our style: its title, a sentence under that, and what follows.
+pub(super) fn document(title: &str, lead: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -40,27 +61,14 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
             body {
                 header {
                     h1 { (title) }
-                    p.lead { (lead(subject)) }
+                    p.lead { (lead) }
                 }
-                @for row in plots.iter().filter(|row| !row.plots.is_empty()) {
-                    section { h2 { (row.heading) } div.pair {
-                        @for (metric, svg) in &row.plots { div.plot { h3 { (meaning(*metric)) } (PreEscaped(svg)) } }
-                    } }
-                }
-                (marks(subject, summary))
-                (targets(subject, summary))
-                (fits(subject, summary))
-                (guests(subject, outcome, summary))
-                (overheads(subject, summary))
-                (reference(subject, summary))
-                @for strip in &summary.strips { (crops(strip, summary, &bar)) }
-                (runs(subject))
-                (facts(subject, summary))
+                (body)
                 footer { "caustique " (env!("CARGO_PKG_VERSION")) }
             }
         }
     };
-    Ok(page.into_string())
+    page.into_string()
 }
 
 fn lead(subject: &Subject) -> String {

@@ -279,7 +279,6 @@ fn the_error_of_the_finished_picture_is_told() {
         header["worst"]["by"].as_array().expect("places").iter().filter_map(|of| of["share"].as_f64()).sum();
     assert!((0.5..1.001).contains(&shares), "{header}");
     assert!(header["worst"]["tiles"].as_array().is_some_and(|tiles| tiles.len() == 10));
-    // Of the beauty: the root mean square of the layer is near the number where pixels are worth about the same.
     assert!(values(&set, "Error").iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
     let told = folder.run("info out.exr").stdout;
     assert!(told.contains("the error lies between ") && told.contains("where the error is: "), "{told}");

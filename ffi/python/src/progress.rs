@@ -1,5 +1,6 @@
 //! How far a render is.
 
+use caustique::pipeline::FINISHED_PICTURE;
 use pyo3::prelude::*;
 
 /// The state of a render after an iteration.
@@ -33,7 +34,7 @@ impl From<&caustique::render::Progress> for Progress {
     fn from(progress: &caustique::render::Progress) -> Progress {
         let caustique::render::Progress { iteration, iterations, seconds, remaining, light_paths, .. } = *progress;
         let error = progress.finished.or(progress.error);
-        let error_of = if progress.finished.is_some() { "finished picture" } else { progress.told.name() };
+        let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { progress.told.name() };
         Progress { iteration, iterations, seconds, remaining, light_paths, error, error_of }
     }
 }
