@@ -69,19 +69,23 @@ class Values(Answer):
 
 @dataclass(frozen=True)
 class Equal(Answer):
-    """Scenes that look like a first one, within noise."""
+    """Scenes that look like a first one, within noise; `warned`: what the program must say of them."""
 
     like: str
     scenes: tuple
     derivation: str
     bound: float = 0.002
     resolves: float = 0.03
+    warned: str = ""
 
     def judge(self, stage):
         like = stage.pictures(self.like)
-        return worst(
+        verdict = worst(
             {label: judge.equal(stage.pictures(label), like, self.bound, self.resolves) for label in self.scenes}
         )
+        if not re.search(self.warned, stage.said, re.IGNORECASE):
+            return judge.Verdict(False, "no warning", 1.0)
+        return verdict
 
     def shown(self):
         return [self.like, *self.scenes]
@@ -225,7 +229,9 @@ class Shards(Answer):
         for order in permutations(range(self.count)):
             name = "".join(map(str, order))
             path = stage.picture(f"merged-{name}")
-            code, said = stage.run("merge", *(shards[i] for i in order), "-o", path, "--no-combine")
+            code, said = stage.run(
+                "merge", *(shards[i] for i in order), "-o", path, "--no-combine", *["--reproducible"] * self.files
+            )
             if code:
                 raise Broken(said.strip())
             found[f"order {name}"] = path.read_bytes() if self.files else read(path).tobytes()

@@ -21,8 +21,8 @@ class Case:
     answer: object
     methods: tuple = METHODS
     size: int = 16
-    iterations: object = 4
-    seeds: int = 8
+    iterations: object = 2
+    seeds: int = 16
     photons: object = 20000
     options: object = ()
     fails: dict = field(default_factory=dict)

@@ -47,7 +47,7 @@ def _closed(albedo, iterations, photons, resolves=0.1, methods=METHODS, name="",
     )
 
 
-def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, iterations=64):
+def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, iterations=32):
     scenes = {f"roughness-{r:g}": partial(white, material(r)) for r in ROUGHNESS}
     return Case(
         f"furnace-{name}",
@@ -59,23 +59,33 @@ def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, i
     )
 
 
+def _with(material, layer, roughness, strength):
+    """A material below a layer (clearcoat or sheen) of this roughness and strength."""
+    key = {"clearcoat": "clearcoatFactor", "sheen": "sheenColorFactor"}[layer]
+    told = {key: strength, f"{layer}RoughnessFactor": roughness}
+    return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{layer}": told}}
+
+
 CASES = [
-    _closed(0.5, {None: 64, "sppm": 24}, 10000),
-    _closed(0.9, {None: 64, "sppm": 8}, 5000),
-    _closed(0.99, {None: 96, "sppm": 16}, 500),
-    _closed(0.999, {None: 16, "sppm": 8}, 100, 0.3, ("path", "sppm")),
-    _closed(0.999, 96, 100, 0.3, ("bdpt", "vcm"), "-connected", long=True),
+    _closed(0.5, {None: 32, "sppm": 12}, 10000),
+    _closed(0.9, {None: 32, "sppm": 4}, 5000),
+    _closed(0.99, {None: 48, "sppm": 8}, 500, 0.1, ("path", "sppm")),
+    _closed(0.99, 48, 500, 0.1, ("bdpt", "vcm"), "-connected", long=True),
+    _closed(0.999, {None: 8, "sppm": 2}, 100, 0.3, ("path", "sppm")),
+    _closed(0.999, 48, 100, 0.3, ("bdpt", "vcm"), "-connected", long=True),
     Case(
         "furnace-diffuse",
         "A white Lambertian sphere in a white furnace",
         {"scene": partial(white, s.diffuse(1))},
         Value(1.0, WHITE, resolves=0.05),
-        iterations=64,
+        iterations=32,
         photons=1000,
     ),
     _lobe("metal", "White metal", lambda r: s.metal(1, r), bound=0.01),
-    _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01, iterations=128),
+    _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01, iterations=64),
     _lobe("plastic", "A dielectric coat over a white base", lambda r: s.plastic(1, r), bound=0.01),
+    _lobe("clearcoat", "A clear coat over white metal", lambda r: _with(s.metal(1, 0.5), "clearcoat", r, 1.0), bound=0.01),
+    _lobe("sheen", "White sheen over a white base", lambda r: _with(s.diffuse(1), "sheen", r, [1, 1, 1]), bound=0.01),
     Case(
         "furnace-glass-box",
         "A closed box of clear glass, through its edges and corners",

@@ -20,6 +20,14 @@ def low_sun():
     return made.sun((-sin(radians(ANGLE)), -cos(radians(ANGLE)), 0), 1e4).seen((0, 3, 0.5), (0, 0, 0), 2)
 
 
+def reflected_sun():
+    """A floor that a low sun lights, and a mirror across its way, as high as sends the sun back over the whole floor."""
+    low, high = radians(90 - 89.9), 2 * sin(radians(90 - 89.9)) / cos(radians(90 - 89.9))
+    mirror = shapes.quad((1, high / 2, 0), (0, high / 2, 0), (0, 0, 1))
+    made = s.Scene().add(shapes.floor(1), s.diffuse(ALBEDO)).add(mirror, s.metal(1, 0.0))
+    return made.sun((cos(low), -sin(low), 0), 1e3).seen((0, 3, 0.5), (0, 0, 0), 4)
+
+
 def low_eye(material):
     """A floor in a white furnace, seen from 0.001 degrees above it."""
     far = 10.0
@@ -76,12 +84,28 @@ CASES = [
         size=8,
     ),
     Case(
+        "grazing-photons",
+        "Photons that a mirror sends to a floor at 89.9 degrees",
+        {"scene": reflected_sun},
+        Value(
+            2 * ALBEDO / pi * 1e3 * cos(radians(89.9)),
+            "The sun's own light and as much from the mirror: L = 2 albedo / pi E cos.",
+            bound=0.005,
+            resolves=0.1,
+        ),
+        ("sppm",),
+        size=8,
+        iterations=16,
+        photons=100000,
+        options=("--initial-bandwidth", "0.2"),
+    ),
+    Case(
         "grazing-eye-matte",
         "A white matte floor in a white furnace, seen at 89.999 degrees",
         {"scene": partial(low_eye, s.diffuse(1))},
         Value(1.0, WHITE, resolves=0.1),
         size=8,
-        iterations=96,
+        iterations=48,
         photons=2000,
     ),
     Case(
@@ -91,7 +115,7 @@ CASES = [
         Value(1.0, WHITE, bound=0.01),
         ("path", "bdpt", "vcm"),
         size=8,
-        iterations=32,
+        iterations=16,
     ),
     Case(
         "grazing-eye-mirror",
@@ -106,7 +130,7 @@ CASES = [
         "A smooth-shaded sphere of 6 rings in a white furnace",
         {"scene": partial(coarse, 6, s.diffuse(1))},
         Value(1.0, WHITE + " Interpolated normals are no loss.", bound=0.01, resolves=0.05),
-        iterations=48,
+        iterations=24,
     ),
     Case(
         "terminator",
@@ -120,7 +144,7 @@ CASES = [
             bound=0.06,
             resolves=0.05,
         ),
-        iterations={None: 64, "sppm": 16},
+        iterations={None: 32, "sppm": 8},
     ),
     Case(
         "slit",
@@ -130,10 +154,10 @@ CASES = [
             lit_by_slit(),
             "A line lamp: albedo / pi times the integral of h² / r⁴ over its length.",
             bound=0.005,
-            resolves=0.15,
+            resolves=0.06,
         ),
         size=8,
-        iterations=256,
+        iterations=128,
         photons=1000,
     ),
 ]

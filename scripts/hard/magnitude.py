@@ -61,22 +61,18 @@ CASES = [
         _scales({"milli": 1e-3, "kilo": 1e3, "mega": 1e6}),
         Equal("one", ("milli", "kilo", "mega"), SAME, resolves=0.05),
         METHODS,
-        seeds=4,
-        iterations=8,
+        iterations=4,
     ),
     _binary(
         "scale-binary-large",
         "The same room times 2, 2^10 and 2^20, to the last bit",
         LARGE,
-        fails={"bdpt": "One number in 1536 differs."},
+        fails={"bdpt": "One number in 3072 differs at factor 2, by one unit in its last place."},
     ),
     _binary(
         "scale-binary-small",
         "The same room times 2^-10, 2 mm across, to the last bit",
         SMALL,
-        fails=dict.fromkeys(
-            METHODS, "About one number in seven differs, by up to 5e-5 of itself: a length somewhere is fixed."
-        ),
     ),
     Case(
         "far-10km",
@@ -84,8 +80,7 @@ CASES = [
         _places(1e4),
         Equal("here", ("there",), PLACE.format("13 km", "0.5 mm"), bound=0.005, resolves=0.05),
         METHODS,
-        seeds=6,
-        iterations=8,
+        iterations=4,
     ),
     Case(
         "far-1000km",
@@ -101,7 +96,6 @@ CASES = [
             resolves=0.1,
         ),
         METHODS,
-        seeds=6,
-        iterations=8,
+        iterations=4,
     ),
 ]

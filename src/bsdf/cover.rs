@@ -33,14 +33,19 @@ impl Cover {
         }
         let coat_class = class_of(p.clearcoat_alpha, p.clearcoat_alpha);
         let alpha = if coat_class == LobeSet::DELTA { 0.0 } else { p.clearcoat_alpha };
+        // What is not there needs no tables.
+        let nothing = Profile::constant(0.0);
+        let coat_albedo = if p.clearcoat > 0.0 { tables.coat_albedo(Position::new(alpha)) } else { nothing };
+        let has_sheen = p.sheen_color.max_element() > 0.0;
+        let sheen_albedo = if has_sheen { tables.sheen_albedo(Position::new(p.sheen_alpha)) } else { nothing };
         Some(Cover {
             coat: p.clearcoat,
             coat_ggx: Ggx { alpha_x: alpha.max(DELTA_ALPHA), alpha_y: alpha.max(DELTA_ALPHA) },
             coat_class,
-            coat_albedo: tables.coat_albedo(Position::new(alpha)),
+            coat_albedo,
             sheen: p.sheen_color,
             sheen_alpha: p.sheen_alpha,
-            sheen_albedo: tables.sheen_albedo(Position::new(p.sheen_alpha)),
+            sheen_albedo,
         })
     }
 

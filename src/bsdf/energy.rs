@@ -3,10 +3,9 @@
 
 use super::fresnel::{Smooth, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
-use super::profile::{Grid, NODES, Position, Profile, node};
+use super::profile::{Between, Grid, NODES, Position, Profile, node, row};
 use super::sheen;
 use crate::math::{Vec2, Vec3, Vec4, sqr};
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands
@@ -16,14 +15,19 @@ const LATTICE: (usize, usize) = (987, 610);
 /// Index of refraction of clear coats (KHR_materials_clearcoat).
 pub(super) const COAT_ETA: f32 = 1.5;
 
+/// Functions of [`SideTables`] for reflection: of a perfect reflector, of total reflection, of the rest per F0, per F90.
+const REFLECTED: usize = 0;
+/// For reflection and transmission: constant, per F0, per F90; the fourth is unused.
+const SCATTERED: usize = 1;
+
 /// Albedos of single scattering at one side of a rough dielectric, split so that the reflectances F0 at normal and F90
 /// at grazing incidence can be chosen later: everything is linear in them.
 #[derive(Clone, Debug)]
 pub(super) struct SideTables {
-    /// Reflection: of a perfect reflector, of total reflection, of the rest per F0, per F90.
-    pub reflected: Grid,
-    /// Both: constant, per F0, per F90; the fourth is unused.
-    pub scattered: Grid,
+    /// Index of the other side over this one's.
+    eta: f32,
+    /// [`REFLECTED`] and [`SCATTERED`].
+    albedos: Grid<2>,
     /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of
     /// [`Smooth::grazing_weight`].
     pub average_total: f32,
@@ -42,7 +46,11 @@ struct InterfaceTables {
 
 /// What facets lose below a coat or a sheen, beyond its transmittance at `wo`: see [`EnergyTables::covered_loss`].
 #[derive(Clone, Debug)]
-struct CoverTables([Grid; 3]);
+struct CoverTables {
+    /// Albedos of the covering at the nodes of its roughness.
+    covers: OnceLock<[Profile; COVER_NODES]>,
+    losses: Grid<3>,
+}
 
 /// Nodes of a cover's roughness, four to a grid, the ends shared.
 const COVER_NODES: usize = 10;
@@ -56,71 +64,37 @@ pub(super) enum Covering {
     Sheen,
 }
 
-/// Everything tabulated for a scene. What pairs of media there can be is known from the start, and which of them the
-/// nearest to an index is; so it makes no difference to what is looked up when, or by which thread, a pair is
-/// tabulated.
+/// Everything tabulated for a scene, each row when it is first asked for. What pairs of media there can be is known from
+/// the start, and which of them the nearest to an index is; so it makes no difference to what is looked up when, or by
+/// which thread, a row is tabulated.
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
-    sheen: Option<Grid>,
-    below_coat: Option<CoverTables>,
-    below_sheen: Option<CoverTables>,
+    sheen: Grid<1>,
+    below_coat: CoverTables,
+    below_sheen: CoverTables,
 }
 
-/// Which coverings a scene has: their tables cost time to make.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Coverings {
-    /// Some surface has a clear coat.
-    pub coat: bool,
-    /// Some surface has sheen.
-    pub sheen: bool,
-}
-
-/// Who makes a table.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum By {
-    /// All threads, before there are paths.
-    All,
-    /// The thread that follows a path and is the first to need it. It must not share the work: while it waited for the
-    /// others, it could be handed another path that needs the same table, and wait for itself.
-    One,
-}
-
-/// Tabulates functions of alpha and cosine: `f` is given a lobe, the direction towards the viewer, Lambda of it, a
-/// visible normal and its weight in the quadrature.
-fn tabulate<T: Send>(
-    by: By,
-    zero: impl Fn() -> T + Sync,
-    f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3, f32) + Sync,
-) -> Vec<Vec<T>> {
-    let row = |i: usize| -> Vec<T> {
-        let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
-        let cosines = (0..NODES).map(|j| {
-            let mu = node(j);
-            let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-            let lambda_o = ggx.lambda(wo);
-            let mut sum = zero();
-            for k in 0..LATTICE.0 {
-                // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
-                // reflections are the ones that are lost.
-                let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
-                let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
-                let weight = 2.0 * rest / LATTICE.0 as f32;
-                let h = ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest));
-                f(&mut sum, &ggx, wo, lambda_o, h, weight);
-            }
-            sum
-        });
-        cosines.collect()
-    };
-    match by {
-        By::All => (0..NODES).into_par_iter().map(row).collect(),
-        By::One => (0..NODES).map(row).collect(),
-    }
-}
-
-fn grid<T>(table: &[Vec<T>], f: impl Fn(&T) -> Vec4) -> Grid {
-    Grid::new(table.iter().map(|row| std::array::from_fn(|j| f(&row[j]))))
+/// Tabulates a function of the cosine at node `i` of alpha: `f` is given a lobe, the direction towards the viewer, Lambda
+/// of it, a visible normal and its weight in the quadrature.
+fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3, f32)) -> [T; NODES] {
+    let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
+    std::array::from_fn(|j| {
+        let mu = node(j);
+        let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
+        let lambda_o = ggx.lambda(wo);
+        let mut sum = zero;
+        for k in 0..LATTICE.0 {
+            // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
+            // reflections are the ones that are lost.
+            let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
+            let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
+            let weight = 2.0 * rest / LATTICE.0 as f32;
+            let h = ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest));
+            f(&mut sum, &ggx, wo, lambda_o, h, weight);
+        }
+        sum
+    })
 }
 
 /// The reflected direction, and G2 over G1 of it; zero below the horizon.
@@ -130,13 +104,33 @@ fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
 }
 
 impl SideTables {
-    fn new(eta: f32, by: By) -> SideTables {
+    fn new(eta: f32) -> SideTables {
         let smooth = Smooth::new(eta);
-        // Total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and weighted.
-        let table = tabulate(
-            by,
-            || [0.0f32; 5],
-            |sums, ggx, wo, lambda_o, h, weight| {
+        // Midpoints in mu^2: the cosine-weighted measure.
+        let n = 4096;
+        let (mut total, mut grazing) = (0.0f64, 0.0f64);
+        for i in 0..n {
+            let mu = ((i as f32 + 0.5) / n as f32).sqrt();
+            match smooth.grazing_weight(mu) {
+                None => total += 1.0,
+                Some((g, _)) => grazing += f64::from(g),
+            }
+        }
+        SideTables {
+            eta,
+            albedos: Grid::new(),
+            average_total: (total / f64::from(n)) as f32,
+            average_grazing: (grazing / f64::from(n)) as f32,
+        }
+    }
+
+    /// The albedos around an alpha.
+    #[inline]
+    fn albedos(&self, alpha: Position) -> Between<'_, 2> {
+        self.albedos.around(alpha, |i| {
+            let (eta, smooth) = (self.eta, Smooth::new(self.eta));
+            // Total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and weighted.
+            let sums = tabulate(i, [0.0f32; 5], |sums, ggx, wo, lambda_o, h, weight| {
                 let cos = wo.dot(h).clamp(0.0, 1.0);
                 let r = weight * reflected_share(ggx, wo, lambda_o, h).1;
                 let Some((grazing, cos_t)) = smooth.grazing_weight(cos) else {
@@ -149,50 +143,37 @@ impl SideTables {
                 for (sum, term) in sums[1..].iter_mut().zip([r, r * grazing, t, t * grazing]) {
                     *sum += term;
                 }
-            },
-        );
-        // Midpoints in mu^2: the cosine-weighted measure.
-        let n = 4096;
-        let (mut total, mut grazing) = (0.0f64, 0.0f64);
-        for i in 0..n {
-            let mu = ((i as f32 + 0.5) / n as f32).sqrt();
-            match smooth.grazing_weight(mu) {
-                None => total += 1.0,
-                Some((g, _)) => grazing += f64::from(g),
-            }
-        }
-        SideTables {
-            reflected: grid(&table, |&[total, r, rg, ..]| Vec4::new(total + r, total, r - rg, rg)),
+            });
+            let reflected = sums.map(|[total, r, rg, ..]| Vec4::new(total + r, total, r - rg, rg));
             // Transmitted is what F leaves: t (1 - F0) - tg (F90 - F0).
-            scattered: grid(&table, |&[total, r, rg, t, tg]| Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0)),
-            average_total: (total / f64::from(n)) as f32,
-            average_grazing: (grazing / f64::from(n)) as f32,
-        }
+            let scattered = sums.map(|[total, r, rg, t, tg]| Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0));
+            [row(&reflected), row(&scattered)]
+        })
     }
 
     /// Share of what arrives that the facets of a perfect reflector scatter less than all of: what compensation gives
     /// back.
     #[inline]
     pub fn white_loss(&self, alpha: Position) -> Profile {
-        Profile::new(&self.reflected, alpha, 1.0, -Vec4::X)
+        Profile::new(self.albedos(alpha), REFLECTED, 1.0, -Vec4::X)
     }
 
     /// Albedo of reflection.
     #[inline]
     pub fn reflection(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
-        Profile::new(&self.reflected, alpha, 0.0, Vec4::new(0.0, 1.0, f0, f90))
+        Profile::new(self.albedos(alpha), REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90))
     }
 
     /// What neither reflection nor compensation by `multiple` of the white loss reflects.
     #[inline]
     pub fn let_through(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile {
-        Profile::new(&self.reflected, alpha, 1.0 - multiple, Vec4::new(multiple, -1.0, -f0, -f90))
+        Profile::new(self.albedos(alpha), REFLECTED, 1.0 - multiple, Vec4::new(multiple, -1.0, -f0, -f90))
     }
 
     /// What reflection and transmission together lose.
     #[inline]
     pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
-        Profile::new(&self.scattered, alpha, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
+        Profile::new(self.albedos(alpha), SCATTERED, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
     }
 
     /// Average reflectance of the smooth interface.
@@ -209,81 +190,63 @@ impl InterfaceTables {
 
     /// From the thinner medium, from the denser one.
     #[inline]
-    fn sides(&self, by: By) -> &[SideTables; 2] {
-        self.sides.get_or_init(|| Box::new([self.eta, 1.0 / self.eta].map(|eta| SideTables::new(eta, by))))
+    fn sides(&self) -> &[SideTables; 2] {
+        self.sides.get_or_init(|| Box::new([self.eta, 1.0 / self.eta].map(SideTables::new)))
     }
 }
 
 impl CoverTables {
-    /// `cover(k)` is the albedo of the covering at node `k` of its roughness.
-    fn new(cover: impl Fn(usize) -> Profile) -> CoverTables {
-        let profiles: [Profile; COVER_NODES] = std::array::from_fn(&cover);
-        let table = tabulate(
-            By::All,
-            || [0.0f32; COVER_NODES],
-            |sums, ggx, wo, lambda_o, h, weight| {
+    const fn new() -> CoverTables {
+        CoverTables { covers: OnceLock::new(), losses: Grid::new() }
+    }
+
+    /// `cover(alpha)` is the albedo of the covering of a roughness.
+    fn profile(&self, alpha: Position, cover_alpha: f32, cover: impl Fn(Position) -> Profile) -> Profile {
+        let losses = self.losses.around(alpha, |i| {
+            let covers = self.covers.get_or_init(|| {
+                std::array::from_fn(|k| cover(Position::new(sqr(k as f32 / (COVER_NODES - 1) as f32))))
+            });
+            let sums = tabulate(i, [0.0f32; COVER_NODES], |sums, ggx, wo, lambda_o, h, weight| {
                 let (wi, share) = reflected_share(ggx, wo, lambda_o, h);
                 if share > 0.0 {
                     let (o, i) = (Position::new(wo.z), Position::new(wi.z));
-                    for (sum, profile) in sums.iter_mut().zip(&profiles) {
+                    for (sum, profile) in sums.iter_mut().zip(covers) {
                         *sum += weight * share * (profile.at(i) - profile.at(o)).max(0.0);
                     }
                 }
-            },
-        );
-        CoverTables([0, 3, 6].map(|k| grid(&table, |s| Vec4::new(s[k], s[k + 1], s[k + 2], s[k + 3]))))
-    }
-
-    fn profile(&self, alpha: Position, cover_alpha: f32) -> Profile {
+            });
+            [0, 3, 6].map(|k| row(&sums.map(|s| Vec4::new(s[k], s[k + 1], s[k + 2], s[k + 3]))))
+        });
         let x = cover_alpha.clamp(0.0, 1.0).sqrt() * (COVER_NODES - 1) as f32;
         let group = ((x / 3.0) as usize).min(2);
         let x = x - 3.0 * group as f32;
         let hat = |k: f32| (1.0 - (x - k).abs()).max(0.0);
-        Profile::new(&self.0[group], alpha, 0.0, Vec4::new(hat(0.0), hat(1.0), hat(2.0), hat(3.0)))
+        Profile::new(losses, group, 0.0, Vec4::new(hat(0.0), hat(1.0), hat(2.0), hat(3.0)))
     }
 }
 
 impl EnergyTables {
     /// Tables for interfaces of the relative indices `etas` (an index and its inverse share one), and for 1.5; others
     /// use the nearest.
-    pub fn new(etas: impl IntoIterator<Item = f32>, coverings: Coverings) -> EnergyTables {
-        EnergyTables::on_demand(etas, [], coverings)
-    }
-
-    /// The same for the indices `rare` too, of pairs of media that may never meet: they are as many as pairs of
-    /// materials, and are tabulated when a path comes to where they do.
-    pub fn on_demand(
-        etas: impl IntoIterator<Item = f32>,
-        rare: impl IntoIterator<Item = f32>,
-        coverings: Coverings,
-    ) -> EnergyTables {
-        let now: Vec<f32> = etas.into_iter().chain([COAT_ETA]).collect();
-        let mut etas: Vec<f32> =
-            now.iter().copied().chain(rare).filter(|e| *e > 0.0).map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
+    pub fn new(etas: impl IntoIterator<Item = f32>) -> EnergyTables {
+        let etas = etas.into_iter().chain([COAT_ETA]).filter(|e| *e > 0.0);
+        let mut etas: Vec<f32> = etas.map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
         etas.sort_by(f32::total_cmp);
         // Nearer ones than this differ by less than the tables' own error.
         etas.dedup_by(|a, b| *a - *b < 1e-3 * *b || (a.is_infinite() && b.is_infinite()));
         etas.retain(|e| !is_matched(*e));
-        let interfaces = etas.into_iter().map(InterfaceTables::new).collect();
-        let mut tables = EnergyTables { interfaces, sheen: None, below_coat: None, below_sheen: None };
-        for pair in now.into_iter().filter_map(|eta| tables.nearest(eta)) {
-            pair.sides(By::All);
+        EnergyTables {
+            interfaces: etas.into_iter().map(InterfaceTables::new).collect(),
+            sheen: Grid::new(),
+            below_coat: CoverTables::new(),
+            below_sheen: CoverTables::new(),
         }
-        let alpha = |k: usize| Position::new(sqr(k as f32 / (COVER_NODES - 1) as f32));
-        if coverings.coat {
-            tables.below_coat = Some(CoverTables::new(|k| tables.coat_albedo(alpha(k))));
-        }
-        if coverings.sheen {
-            let rows = |i: usize| std::array::from_fn(|j| Vec4::X * sheen::albedo(node(i), node(j)));
-            tables.sheen = Some(Grid::new((0..NODES).map(rows)));
-            tables.below_sheen = Some(CoverTables::new(|k| tables.sheen_albedo(alpha(k))));
-        }
-        tables
     }
 
-    /// How many pairs of media are tabulated by now.
+    /// How many rows are tabulated by now, of all pairs of media: what making them has cost.
     pub fn tabulated(&self) -> usize {
-        self.interfaces.iter().filter(|pair| pair.sides.get().is_some()).count()
+        let sides = self.interfaces.iter().filter_map(|pair| pair.sides.get()).flat_map(|sides| sides.iter());
+        sides.map(|side| side.albedos.made()).sum()
     }
 
     /// The pair of media nearest to an interface of relative index `eta`; `None` if the interface does nothing.
@@ -306,7 +269,7 @@ impl EnergyTables {
     /// `None` if the interface does nothing.
     #[inline]
     pub(super) fn sides(&self, eta: f32) -> Option<[&SideTables; 2]> {
-        let [thin, dense] = self.nearest(eta)?.sides(By::One);
+        let [thin, dense] = self.nearest(eta)?.sides();
         Some(if eta < 1.0 { [dense, thin] } else { [thin, dense] })
     }
 
@@ -327,7 +290,8 @@ impl EnergyTables {
     /// Albedo of white sheen.
     #[inline]
     pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile {
-        self.sheen.as_ref().map_or(Profile::constant(0.0), |grid| Profile::new(grid, alpha, 0.0, Vec4::X))
+        let made = |i: usize| [row(&std::array::from_fn(|j| Vec4::X * sheen::albedo(node(i), node(j))))];
+        Profile::new(self.sheen.around(alpha, made), 0, 0.0, Vec4::X)
     }
 
     /// Facets below a covering of albedo E are seen through `1 - max(E(o), E(i))`, which is exact for mirrors and keeps
@@ -335,10 +299,9 @@ impl EnergyTables {
     /// let them keep: this profile.
     #[inline]
     pub(super) fn covered_loss(&self, covering: Covering, alpha: Position, cover_alpha: f32) -> Profile {
-        let tables = match covering {
-            Covering::Coat => &self.below_coat,
-            Covering::Sheen => &self.below_sheen,
-        };
-        tables.as_ref().map_or(Profile::constant(0.0), |t| t.profile(alpha, cover_alpha))
+        match covering {
+            Covering::Coat => self.below_coat.profile(alpha, cover_alpha, |alpha| self.coat_albedo(alpha)),
+            Covering::Sheen => self.below_sheen.profile(alpha, cover_alpha, |alpha| self.sheen_albedo(alpha)),
+        }
     }
 }

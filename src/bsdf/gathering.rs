@@ -165,14 +165,14 @@ impl Positions {
 mod tests {
     use super::*;
     use crate::bsdf::Bsdf;
-    use crate::bsdf::{Coverings, EnergyTables, Interface, Parameters};
+    use crate::bsdf::{EnergyTables, Interface, Parameters};
     use crate::math::Frame;
     use crate::random::{Domain, Purpose, Stream};
 
     /// The short ways give what the long way gives, on both sides and with a bent shading normal.
     #[test]
     fn gathering_is_gather() {
-        let tables = EnergyTables::new([1.5], Coverings { coat: true, sheen: false });
+        let tables = EnergyTables::new([1.5]);
         let plastic =
             Parameters { base_color: Rgb::new(0.6, 0.3, 0.1), eta: 1.5, specular: 1.0, ..Parameters::default() };
         let matte = Parameters { specular: 0.0, ..plastic };
@@ -211,7 +211,7 @@ mod tests {
     /// should.
     #[test]
     fn photons_of_facets_nearby_bring_no_more_than_their_own_cosine_allows() {
-        let tables = EnergyTables::new([1.5], Coverings { coat: false, sheen: false });
+        let tables = EnergyTables::new([1.5]);
         let parameters = Parameters { base_color: Rgb::splat(0.8), specular: 0.0, ..Parameters::default() };
         let interface = Interface::new(&parameters, &tables);
         let bsdf = Bsdf::new(&parameters, &interface);

@@ -183,9 +183,13 @@ impl Covered {
             average if average > 1e-9 => average / profile.average_with(|mu| cover.passes(mu)).max(1e-9),
             _ => 1.0,
         };
-        let profiles = [(Covering::Coat, p.clearcoat_alpha), (Covering::Sheen, p.sheen_alpha)]
-            .map(|(covering, cover_alpha)| tables.covered_loss(covering, alpha, cover_alpha));
         let strengths = cover.strengths();
+        let profiles = [(Covering::Coat, p.clearcoat_alpha, 0), (Covering::Sheen, p.sheen_alpha, 1)].map(
+            |(covering, cover_alpha, k): (_, _, usize)| match strengths[k] {
+                0.0 => Profile::constant(0.0),
+                _ => tables.covered_loss(covering, alpha, cover_alpha),
+            },
+        );
         let scale = |k: usize| strengths[k] * FRAC_1_PI / profiles[k].average.max(1e-9);
         let rough = below.class != LobeSet::DELTA;
         Covered {

@@ -14,7 +14,7 @@ mod scatter;
 mod shading;
 mod sheen;
 
-pub use energy::{Coverings, EnergyTables};
+pub use energy::EnergyTables;
 pub use gathering::Gathering;
 pub use interface::Interface;
 pub use layered::Layered;

@@ -6,6 +6,7 @@
 
 use crate::math::{Vec2, Vec3, Vec4};
 use std::f32::consts::{FRAC_1_PI, TAU};
+use std::sync::OnceLock;
 
 /// Nodes along each axis.
 pub const NODES: usize = 32;
@@ -93,15 +94,43 @@ impl Position {
 /// Four functions of the cosine at one alpha.
 type Row = [[f32; NODES]; 4];
 
-/// Four functions of the cosine and of alpha.
-#[derive(Clone, Debug)]
-pub struct Grid(Vec<Row>);
+/// Values of four functions at the nodes of the cosine.
+pub fn row(values: &[Vec4; NODES]) -> Row {
+    std::array::from_fn(|k| values.map(|v| v[k]))
+}
 
-impl Grid {
-    /// From values at the nodes: of alpha, then of the cosine.
-    pub fn new(rows: impl Iterator<Item = [Vec4; NODES]>) -> Grid {
-        Grid(rows.map(|row| std::array::from_fn(|k| row.map(|v| v[k]))).collect())
+/// Rows of N times four functions of the cosine, at the nodes of alpha. A row is made when it is first asked for: most
+/// materials have one roughness, and look at two of them.
+#[derive(Clone, Debug)]
+pub struct Grid<const N: usize>([OnceLock<Box<[Row; N]>>; NODES]);
+
+impl<const N: usize> Grid<N> {
+    /// Without any row yet.
+    pub const fn new() -> Grid<N> {
+        Grid([const { OnceLock::new() }; NODES])
     }
+
+    /// How many rows there are by now.
+    pub fn made(&self) -> usize {
+        self.0.iter().filter(|row| row.get().is_some()).count()
+    }
+
+    /// The rows around `alpha`; `make` makes the one of a node. It runs on the thread that asks first, and must not
+    /// share its work with others: while it waited for them, it could be handed a path that needs the same row, and
+    /// wait for itself.
+    #[inline]
+    pub fn around(&self, alpha: Position, make: impl Fn(usize) -> [Row; N]) -> Between<'_, N> {
+        let at = |i: usize| &**self.0[i].get_or_init(|| Box::new(make(i)));
+        Between { low: at(alpha.i), high: at(alpha.i + 1), t: alpha.t }
+    }
+}
+
+/// Two neighbouring rows of a grid, and a place between them.
+#[derive(Clone, Copy)]
+pub struct Between<'g, const N: usize> {
+    low: &'g [Row; N],
+    high: &'g [Row; N],
+    t: f32,
 }
 
 /// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe. Its nodes are
@@ -132,11 +161,11 @@ impl Profile {
         Profile { nodes: [constant; NODES], average: constant, mass: 2.0 * constant }
     }
 
-    /// `constant + factors . grid`, at least zero.
+    /// `constant + factors . functions`, at least zero, with the functions of number `n` of a grid.
     #[inline]
-    pub fn new(grid: &Grid, alpha: Position, constant: f32, factors: Vec4) -> Profile {
-        let Position { i, t } = alpha;
-        let (low, high) = (&grid.0[i], &grid.0[i + 1]);
+    pub fn new<const N: usize>(grid: Between<'_, N>, n: usize, constant: f32, factors: Vec4) -> Profile {
+        let Between { low, high, t } = grid;
+        let (low, high) = (&low[n], &high[n]);
         let mut nodes = [constant; NODES];
         for (k, factor) in factors.to_array().into_iter().enumerate() {
             if factor != 0.0 {

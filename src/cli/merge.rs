@@ -50,6 +50,9 @@ pub struct MergeArgs {
     exr_naming: Option<Naming>,
     #[command(flatten)]
     picture: PictureArgs,
+    /// Leave clocks, threads and the names of shards out of the header: the same shards make the same file
+    #[arg(long, help_heading = "Running")]
+    reproducible: bool,
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads, help_heading = "Running")]
     threads: usize,
@@ -100,7 +103,7 @@ fn join(args: &MergeArgs) -> Result<()> {
         finish: args.finish(&arguments),
         layers: args.layers.clone().or_else(|| asked(&arguments, "layers")).unwrap_or_else(|| "all".into()),
         naming: naming.into(),
-        reproducible: asked(&arguments, "reproducible").unwrap_or(false),
+        reproducible: args.reproducible,
     };
     let made_for = shards.facts().map(|facts| facts.made_for).unwrap_or_default();
     shards.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));

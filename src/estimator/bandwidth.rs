@@ -62,14 +62,17 @@ pub fn initial_bandwidths<const MAPS: usize>(
     seed: u64,
     pilots: [&PhotonMap; MAPS],
 ) -> Vec<[f32; MAPS]> {
-    bandwidths(eye, (rule, widest), seed, pilots, |arena, start| eye.gather_point(arena, start))
+    let bounds = Bounds { widest, enough: 0.0 };
+    bandwidths(eye, (rule, bounds), seed, pilots, |arena, start| eye.gather_point(arena, start))
 }
 
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path,
 /// in three dimensions.
 ///
 /// Where on the way that point lies is chance, and what is true near the eye is not true of the whole way: each pixel
-/// takes the median of those around it, and what bounds it is the picture's width at the surface behind.
+/// takes the median of those around it, and what bounds it is the picture's width at the surface behind. From within a
+/// medium that bound may be so near that hardly a pixel ever finds a photon, and all are dark: it is not below the
+/// radius in which one is expected.
 pub fn initial_volume_bandwidths(
     eye: &Eye<'_>,
     rule: InitialBandwidth,
@@ -77,7 +80,13 @@ pub fn initial_volume_bandwidths(
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    let found = bandwidths(eye, (rule, widest), seed, [pilot], |arena, start| eye.volume_point(arena, start));
+    let one = match rule {
+        InitialBandwidth::Nearest(k) => usual_radius2(pilot, k).sqrt() / (k as f32).cbrt(),
+        _ => 0.0,
+    };
+    let enough = if one.is_finite() { one } else { 0.0 };
+    let bounds = Bounds { widest, enough };
+    let found = bandwidths(eye, (rule, bounds), seed, [pilot], |arena, start| eye.volume_point(arena, start));
     medians(found.as_flattened(), eye.camera.size().0 as usize)
 }
 
@@ -95,9 +104,39 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
     (0..values.len()).into_par_iter().map(median).collect()
 }
 
+/// What bandwidths are not to exceed.
+#[derive(Clone, Copy)]
+struct Bounds {
+    /// Over the picture's width.
+    widest: f32,
+    /// They may be as large as this at least.
+    enough: f32,
+}
+
+impl Bounds {
+    /// At the end of a path where the picture spans so much.
+    fn at(self, span: f32) -> f32 {
+        (self.widest * span).max(self.enough)
+    }
+}
+
+/// Median over photons of the squared distance to the k-th nearest; infinite where there are too few.
+pub fn usual_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
+    const SAMPLES: usize = 256;
+    let mut nearest = Nearest::default();
+    let every = map.photons().iter().step_by(map.photons().len().div_ceil(SAMPLES).max(1));
+    let of = |photon: &P| nearest.radius2(map, photon.position(), photon.normal(), k, f32::INFINITY);
+    let mut found: Vec<f32> = every.filter_map(of).collect();
+    if found.is_empty() {
+        return f32::INFINITY;
+    }
+    let middle = found.len() / 2;
+    *found.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
 fn bandwidths<P: Located, const MAPS: usize>(
     eye: &Eye<'_>,
-    (rule, widest): (InitialBandwidth, f32),
+    (rule, bounds): (InitialBandwidth, Bounds),
     seed: u64,
     pilots: [&PhotonMap<P>; MAPS],
     find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
@@ -111,7 +150,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
     let least = LEAST * scene.lights.sky().radius;
     let of_point = |pilot: &PhotonMap<P>, nearest: &mut Nearest<P>, point: &GatherPoint| {
         let span = span(camera, point.length);
-        let cap = widest * span;
+        let cap = bounds.at(span);
         let r = match rule {
             InitialBandwidth::Nearest(k) => {
                 nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
@@ -138,7 +177,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
     let fallback = std::array::from_fn(|map| {
         let mut known: Vec<f32> = found.iter().flatten().map(|r| r[map]).collect();
         if known.is_empty() {
-            return (widest * span(camera, scene.lights.sky().radius)).max(least);
+            return bounds.at(span(camera, scene.lights.sky().radius)).max(least);
         }
         let middle = known.len() / 2;
         *known.select_nth_unstable_by(middle, f32::total_cmp).1

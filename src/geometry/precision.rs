@@ -10,7 +10,7 @@ const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 /// How far from its triangle a position may be, where no coordinate of either is larger than `largest` (scene units).
 #[inline]
 pub(super) fn error_within(largest: f32) -> f32 {
-    POSITION_ERROR * largest.max(1e-3)
+    POSITION_ERROR * largest
 }
 
 /// The same for the points of a triangle with these corners in world space.

@@ -2,7 +2,7 @@
 
 use super::evaluate::unit_color;
 use super::{Material, Materials};
-use crate::bsdf::{Bsdf, Coverings, EnergyTables, Interface, Parameters, Shading};
+use crate::bsdf::{Bsdf, EnergyTables, Interface, Parameters, Shading};
 use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use bumpalo::Bump;
@@ -75,16 +75,11 @@ fn solids(materials: &[Material]) -> Vec<f32> {
 }
 
 impl EnergyTables {
-    /// Tables for all interfaces that surfaces of these materials make with the open space, and, when they are asked
-    /// for, with each other's solids.
+    /// Tables for all interfaces that surfaces of these materials make with the open space, and with each other's solids.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
-        let coverings = Coverings {
-            coat: materials.iter().any(|m| m.clearcoat > 0.0),
-            sheen: materials.iter().any(|m| m.sheen_color.max_element() > 0.0),
-        };
-        EnergyTables::on_demand(open.iter().copied(), nested, coverings)
+        EnergyTables::new(open.iter().copied().chain(nested))
     }
 }
 
@@ -94,8 +89,8 @@ impl Scattering {
         Scattering::with(Arc::new(EnergyTables::for_materials(materials)), materials)
     }
 
-    /// For the scene with other materials, which have no indices of refraction and no coverings that the first ones
-    /// lack: the tables, which take a thirtieth of a core-second for each pair of indices, are shared.
+    /// For the scene with other materials, which have no indices of refraction that the first ones lack: the tables are
+    /// shared.
     pub fn again(&self, materials: &[Material]) -> Scattering {
         Scattering::with(Arc::clone(&self.tables), materials)
     }

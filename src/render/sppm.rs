@@ -12,10 +12,10 @@ use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
 use super::volume::{Maps, VolumeMap};
 use crate::camera::{Camera, band, par_pixels};
-use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths};
+use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths, usual_radius2};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::{Guide, Region};
-use crate::photon::{ByKind, Kernel, Kind, Nearest, PhotonMap, kernel, kind};
+use crate::photon::{ByKind, Kernel, Kind, PhotonMap, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
@@ -105,20 +105,6 @@ fn eye_pass(
             }
         }
     });
-}
-
-/// Median over photons of the squared distance to the k-th nearest; infinite where there are too few.
-fn usual_radius2(map: &PhotonMap, k: usize) -> f32 {
-    const SAMPLES: usize = 256;
-    let mut nearest = Nearest::default();
-    let every = map.photons().iter().step_by(map.photons().len().div_ceil(SAMPLES).max(1));
-    let mut found: Vec<f32> =
-        every.filter_map(|photon| nearest.radius2(map, photon.p, photon.ng, k, f32::INFINITY)).collect();
-    if found.is_empty() {
-        return f32::INFINITY;
-    }
-    let middle = found.len() / 2;
-    *found.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// The passes of a render.

@@ -180,7 +180,7 @@ impl<K: Kernel> Merging<'_, K> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bsdf::{Bsdf, Coverings, EnergyTables, Interface, Parameters};
+    use crate::bsdf::{Bsdf, EnergyTables, Interface, Parameters};
     use crate::math::Frame;
     use crate::photon::kernel;
     use crate::random::{Domain, Purpose, Stream};
@@ -193,7 +193,7 @@ mod tests {
     /// varnish, with a bent shading normal.
     #[test]
     fn weights_sum_to_one() {
-        let tables = EnergyTables::new([1.5], Coverings { coat: false, sheen: false });
+        let tables = EnergyTables::new([1.5]);
         let metal = Parameters {
             base_color: Rgb::splat(0.8),
             metallic: 1.0,
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn unknown_photons_are_not_merged() {
         let mut glints = Glints::NONE;
-        let tables = EnergyTables::new([1.5], Coverings { coat: false, sheen: false });
+        let tables = EnergyTables::new([1.5]);
         let parameters = Parameters { metallic: 1.0, alpha_x: 0.1, alpha_y: 0.1, ..Parameters::default() };
         let interface = Interface::new(&parameters, &tables);
         let shading = Shading::new(Frame::from_normal(Vec3::Z), Vec3::Z, Bsdf::new(&parameters, &interface), Vec3::Z);

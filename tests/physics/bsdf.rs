@@ -5,9 +5,7 @@
 
 use crate::support;
 
-use caustique::bsdf::{
-    Bsdf, BsdfSample, Coverings, DELTA_ALPHA, EnergyTables, LobeSet, Parameters, SHARP_ALPHA, Transport,
-};
+use caustique::bsdf::{Bsdf, BsdfSample, DELTA_ALPHA, EnergyTables, LobeSet, Parameters, SHARP_ALPHA, Transport};
 use caustique::math::{Rgb, Vec2, Vec3};
 use caustique::random::mix;
 use rayon::prelude::*;
@@ -18,8 +16,7 @@ use support::stats::{chi_squared_p, sidak};
 
 const ERROR_RATE: f64 = 1e-3;
 
-static TABLES: LazyLock<EnergyTables> =
-    LazyLock::new(|| EnergyTables::new([1.33, 1.5, 2.4, 1.1, f32::INFINITY], Coverings { coat: true, sheen: true }));
+static TABLES: LazyLock<EnergyTables> = LazyLock::new(|| EnergyTables::new([1.33, 1.5, 2.4, 1.1, f32::INFINITY]));
 
 /// Uniform numbers by counting, all of them hashes.
 struct Uniform(u64);

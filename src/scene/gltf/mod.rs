@@ -5,7 +5,8 @@
 //! is an error that names its place, and whatever is ignored or approximated is a warning.
 //!
 //! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `animation` (which puts a
-//! moment of its curves into the document) -> `nodes` (the hierarchy), which calls for meshes, materials and textures as it meets them, so that what no node uses is not even decoded.
+//! moment of its curves into the document) -> `nodes` (the hierarchy), which calls for meshes, materials and textures as
+//! it meets them, so that what no node uses is not even decoded.
 
 mod accessor;
 mod animation;
@@ -14,6 +15,7 @@ mod curve;
 mod deform;
 mod document;
 mod extras;
+mod flat;
 mod lights;
 mod material;
 mod materials;

@@ -3,13 +3,14 @@
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
+use super::flat::flattened;
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
 use super::transform::{self, can_be_inverted, compose, finite, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology};
 use crate::error::Result;
 use crate::geometry::Mesh;
-use crate::math::{DAffine3, DVec3, Rgb};
+use crate::math::{DAffine3, DMat3, DVec3, Rgb};
 use crate::memory;
 use crate::scene::Description;
 use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Picture, Placed};
@@ -24,6 +25,10 @@ use std::path::Path;
 /// triangle.
 const PLACED_BYTES: u64 = 1000;
 
+/// Bytes of a vertex with all that it may have, and of a triangle, in our lists and in Embree's.
+const VERTEX_BYTES: u64 = 128;
+const TRIANGLE_BYTES: u64 = 128;
+
 /// Turns the bytes of a file into a description.
 pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
     let mut warnings = Vec::new();
@@ -36,6 +41,7 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         meshes: HashMap::new(),
         parents: transform::parents(&document),
         bounds: Vec::new(),
+        flattened: 0,
         divisor: None,
         options: *options,
         scene: SceneExtras::default(),
@@ -94,6 +100,8 @@ struct Reader<'r> {
     parents: Vec<Option<usize>>,
     /// Local bounds of the meshes read.
     bounds: Vec<(DVec3, DVec3)>,
+    /// Bytes of the meshes that nodes flatten.
+    flattened: u64,
     /// What divides intensities, once it is known.
     divisor: Option<f32>,
     options: ReadOptions,
@@ -289,12 +297,17 @@ impl Reader<'_> {
         let mut flat = 0;
         for copy in copies {
             let to_world = to_world * copy;
-            if !can_be_inverted(&to_world) {
-                flat += 1;
-                continue;
-            }
+            let turns = can_be_inverted(&to_world);
             for &Part { mesh, material } in parts {
                 self.check_reach(mesh, &to_world, place)?;
+                let (mesh, to_world) = if turns {
+                    (mesh, to_world)
+                } else if let Some(mesh) = self.flattened(mesh, &to_world.matrix3, place)? {
+                    (mesh, DAffine3::from_translation(to_world.translation))
+                } else {
+                    flat += 1;
+                    continue;
+                };
                 let (name, light_group) = (name.clone(), said.light_group.clone());
                 let hidden_from_camera = !said.visible.camera;
                 let placed = Placed { name, mesh, material, object, hidden_from_camera, light_group, to_world };
@@ -302,9 +315,22 @@ impl Reader<'_> {
             }
         }
         if flat > 0 {
-            self.out.warnings.push(format!("{place}: it is left out, because its scale is zero along an axis"));
+            self.out.warnings.push(format!("{place}: it is left out, because its scale leaves nothing of its area"));
         }
         Ok(())
+    }
+
+    /// Index of a mesh of its own for one on a node whose transform leaves it a plane; `None` where it leaves less.
+    fn flattened(&mut self, mesh: u32, transform: &DMat3, place: &str) -> Result<Option<u32>> {
+        let Some(flat) = flattened(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
+        self.flattened += flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
+        if self.flattened >= memory::SMALL {
+            let what = "meshes on nodes whose scale is zero along an axis";
+            memory::check(self.flattened, what).map_err(|e| e.within(place))?;
+        }
+        self.bounds.push(self.bounds[mesh as usize]);
+        self.out.meshes.push(flat);
+        Ok(Some(self.out.meshes.len() as u32 - 1))
     }
 
     fn check_reach(&self, mesh: u32, to_world: &DAffine3, place: &str) -> Result<()> {

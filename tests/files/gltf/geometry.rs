@@ -35,16 +35,33 @@ fn hierarchy_is_composed_and_meshes_are_shared() {
 }
 
 #[test]
-fn nodes_that_are_hidden_or_flat_are_left_out() {
+fn nodes_that_are_hidden_or_without_area_are_left_out() {
     let mut file = Glb::new();
     let mesh = file.cube("cube", None);
     let child = file.push("nodes", json!({"mesh": mesh}));
     file.node(json!({"children": [child], "extensions": {"KHR_node_visibility": {"visible": false}}}));
-    file.node(json!({"name": "flat", "mesh": mesh, "scale": [1, 0, 1]}));
+    file.node(json!({"name": "line", "mesh": mesh, "scale": [1, 0, 0]}));
     file.json["extensionsUsed"] = json!(["KHR_node_visibility"]);
     let scene = read(&file);
     assert!(scene.instances.is_empty());
-    assert_eq!(scene.warnings, ["node \"flat\": it is left out, because its scale is zero along an axis"]);
+    assert_eq!(scene.warnings, ["node \"line\": it is left out, because its scale leaves nothing of its area"]);
+}
+
+/// The upper and lower face of a cube remain, where the node stands; the sides have no area.
+#[test]
+fn a_scale_of_zero_along_an_axis_flattens() {
+    let mut file = Glb::new();
+    let mesh = file.cube("cube", None);
+    file.node(json!({"name": "flat", "mesh": mesh, "scale": [2, 0, 3], "translation": [0, 5, 0]}));
+    let scene = read(&file);
+    assert_eq!(scene.warnings, [""; 0]);
+    let [placed] = &scene.instances[..] else { panic!("{} instances", scene.instances.len()) };
+    let flat = &scene.meshes[placed.mesh as usize];
+    assert_eq!(flat.triangles.len(), 4);
+    let most = |f: fn(DVec3) -> f64| {
+        flat.positions.iter().map(|p| f(placed.to_world.transform_point3(p.as_dvec3()))).fold(0.0, f64::max)
+    };
+    assert_eq!([most(|p| p.x.abs()), most(|p| (p.y - 5.0).abs()), most(|p| p.z.abs())], [2.0, 0.0, 3.0]);
 }
 
 #[test]

@@ -1,0 +1,21 @@
+//! Meshes on nodes whose scale is zero along an axis: what a ball becomes is a disc, the limit of small scales.
+
+use super::mesh::drop_degenerate;
+use crate::geometry::Mesh;
+use crate::math::{DMat3, Vec3};
+
+/// The mesh through a transform that cannot be inverted; `None` where it leaves no triangle with an area. Faces have
+/// their own normals then: those of vertices lie across the plane, or nowhere.
+pub(super) fn flattened(mesh: &Mesh, transform: &DMat3) -> Option<Mesh> {
+    let mut flat = mesh.clone();
+    for p in &mut flat.positions {
+        *p = (*transform * p.as_dvec3()).as_vec3();
+    }
+    for t in &mut flat.tangents {
+        let along = (*transform * t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+        *t = along.extend(if along == Vec3::ZERO { 0.0 } else { t.w });
+    }
+    flat.normals.clear();
+    drop_degenerate(&mut flat);
+    (!flat.triangles.is_empty()).then_some(flat)
+}
