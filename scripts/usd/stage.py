@@ -86,6 +86,8 @@ class Stage:
         if not value.path:
             raise Fault(where, "it names no file", "give the texture's path in inputs:file")
         if not value.resolvedPath:
+            # Whether a file outside exists is not told.
+            self.check_place(os.path.join(os.path.dirname(self.path), value.path), where)
             raise Fault(where, f"the file {value.path} is not found", "put it where the stage looks for it")
         self.check_place(Ar.SplitPackageRelativePathOuter(name)[0], where)
         opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))

@@ -8,6 +8,7 @@ use crate::error::{Error, Kind, Result};
 use crate::estimator::Pixel;
 use crate::image::atomic;
 use crate::render::{State, Strategy};
+use crate::scene::gltf;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fs::File;
@@ -15,7 +16,7 @@ use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
-const MAGIC: &[u8; 23] = b"caustique checkpoint 2\n";
+pub const MAGIC: &[u8; 23] = b"caustique checkpoint 2\n";
 /// Pixels packed together.
 pub(super) const BLOCK: usize = 2048;
 /// Options that may be others when a render goes on: when it stops, and how its files are written.
@@ -127,53 +128,23 @@ pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(
     })
 }
 
-/// A hash of a scene's files: the file itself, and those in its folder that it or the command line names. `None` of a
+/// A hash of a scene's files: the file itself, and those that it (in its folder, unless they may lie outside) or the
+/// command line names. `None` of a
 /// scene that comes through a pipe, and is gone.
 ///
 /// # Errors
 /// The scene cannot be read.
-pub fn hash(scene: &Path, environment: Option<&Path>) -> Result<Option<String>> {
+pub fn hash(scene: &Path, environment: Option<&Path>, allow_outside: bool) -> Result<Option<String>> {
     if !scene.is_file() {
         return Ok(None);
     }
     let bytes = std::fs::read(scene).map_err(|cause| Error::io(scene, &cause))?;
     let mut hasher = blake3::Hasher::new();
     hasher.update(&bytes);
-    let folder = scene.parent().unwrap_or(Path::new(""));
-    let mut named: Vec<PathBuf> = environment.map(Path::to_owned).into_iter().collect();
-    if let Some(json) = document(&bytes) {
-        names(&json, &mut |name| named.push(folder.join(name)));
-    }
+    let beside = gltf::files(&bytes, scene, allow_outside);
+    let named: Vec<PathBuf> = environment.map(Path::to_owned).into_iter().chain(beside).collect();
     for bytes in named.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
         hasher.update(&bytes);
     }
     Ok(Some(hasher.finalize().to_hex().to_string()))
-}
-
-/// The JSON of a glTF file, or the one in a GLB.
-fn document(bytes: &[u8]) -> Option<Value> {
-    let json = match bytes.strip_prefix(b"glTF") {
-        Some(rest) => {
-            let length = rest.get(8..12).and_then(|four| four.try_into().ok()).map(u32::from_le_bytes)?;
-            rest.get(16..16 + length as usize)?
-        }
-        None => bytes,
-    };
-    serde_json::from_slice(json).ok()
-}
-
-/// Calls `found` with the value of every key `uri` and `file` that may name a file.
-fn names(json: &Value, found: &mut impl FnMut(&str)) {
-    match json {
-        Value::Array(values) => values.iter().for_each(|value| names(value, found)),
-        Value::Object(object) => {
-            for (key, value) in object {
-                match value.as_str().filter(|text| !text.starts_with("data:")) {
-                    Some(text) if key == "uri" || key == "file" => found(text),
-                    _ => names(value, found),
-                }
-            }
-        }
-        _ => {}
-    }
 }

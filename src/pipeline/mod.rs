@@ -276,7 +276,7 @@ impl Order<'_> {
             Some(load::Environment::File(path)) => Some(path.as_path()),
             _ => None,
         };
-        checkpoint::hash(&self.scene.path, environment)
+        checkpoint::hash(&self.scene.path, environment, self.scene.options.allow_outside)
     }
 }
 

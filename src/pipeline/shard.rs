@@ -16,7 +16,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// The last bytes of a file with such a tail.
-const MARK: &[u8; 8] = b"caustqS1";
+pub const MARK: &[u8; 8] = b"caustqS1";
 /// The length and the mark.
 const END: i64 = 16;
 
@@ -78,7 +78,11 @@ impl Open {
             let cause = format!("is of version {} of caustique; this is {}", head.version, env!("CARGO_PKG_VERSION"));
             return Err(Error::new(Kind::Usage, path.display(), cause).hint("merge it with the version that made it"));
         }
-        let (facts, part) = postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
+        let (facts, part): (Facts, Part) =
+            postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
+        if !part.is_sound() {
+            return Err(damaged());
+        }
         Ok(Some(Open { head, facts, part, file }))
     }
 

@@ -6,6 +6,8 @@ use super::method::Method;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Settings, Shard};
 use crate::estimator::{BandwidthState, Pixel};
+use crate::scene::MAX_SIZE;
+use crate::transport::MAX_LEVELS;
 use serde::{Deserialize, Serialize};
 
 /// What a render leaves besides its pixels, whose bandwidths follow from the iteration's number.
@@ -61,6 +63,18 @@ impl Rendered {
 }
 
 impl Part {
+    /// Whether it can be of a render: a file can say anything.
+    pub fn is_sound(&self) -> bool {
+        let Settings { shard, levels, .. } = &self.settings;
+        let (width, height) = self.size;
+        shard.is_sound()
+            && (1..=MAX_LEVELS).contains(&levels.count)
+            && (1..=MAX_SIZE).contains(&width)
+            && (1..=MAX_SIZE).contains(&height)
+            && self.iterations.checked_mul(shard.count).is_some()
+            && self.last == self.settings.last(self.iterations)
+    }
+
     /// The render with these pixels.
     pub fn rendered(self, pixels: Vec<Pixel>) -> Rendered {
         Rendered {

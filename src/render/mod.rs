@@ -42,7 +42,9 @@ pub use method::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOT
 pub use pm::PHOTON_BYTES;
 pub use result::{Phases, Rendered};
 pub use session::{Session, Stage};
-pub use settings::{DEFAULT_ITERATIONS, DEFAULT_MAP_MEMORY, KernelChoice, Levels, RadiusRule, Settings, Shard};
+pub use settings::{
+    DEFAULT_ITERATIONS, DEFAULT_MAP_MEMORY, KernelChoice, Levels, MAX_SHARDS, RadiusRule, Settings, Shard,
+};
 pub use state::State;
 pub use strategy::Strategy;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};

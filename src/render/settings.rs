@@ -20,6 +20,9 @@ pub const DEFAULT_ITERATIONS: u64 = 64;
 /// Bytes that their photons may take.
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 
+/// Most shards that a render may have.
+pub const MAX_SHARDS: u64 = 1_000_000;
+
 /// Which iterations to render: those with `i mod count = index`, i from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
@@ -27,6 +30,13 @@ pub struct Shard {
     pub index: u64,
     /// Number of shards.
     pub count: u64,
+}
+
+impl Shard {
+    /// Whether there can be such a shard.
+    pub fn is_sound(self) -> bool {
+        self.index < self.count && self.count <= MAX_SHARDS
+    }
 }
 
 /// Bandwidth levels, each 1/sqrt(2) of the next larger.

@@ -25,13 +25,24 @@ impl<'a> Folder<'a> {
     /// It lies outside the folder: by its name, or because a link on the way leads there.
     pub fn file(&self, name: &Path) -> Result<PathBuf> {
         let file = self.path.join(name);
-        if self.allow_outside || resolved(&file).starts_with(resolved(self.path)) {
+        let inside = || !is_of_windows(name) && resolved(&file).starts_with(resolved(self.path));
+        if self.allow_outside || inside() {
             return Ok(file);
         }
         let cause = format!("the file {} is outside the scene's folder", name.display());
         Err(Error::new(Kind::Scene, "", cause)
             .hint("put it beside the scene file and name it so, or allow such files with --allow-outside"))
     }
+}
+
+/// Whether a name is a path that Windows takes for one from a drive, of a share, or upwards: here its letters would
+/// name a file in the folder.
+fn is_of_windows(name: &Path) -> bool {
+    let bytes = name.as_os_str().as_encoded_bytes();
+    let drive = matches!(bytes, [letter, b':', b'\\' | b'/', ..] if letter.is_ascii_alphabetic());
+    drive
+        || bytes.starts_with(b"\\")
+        || bytes.split(|byte| matches!(byte, b'\\' | b'/')).any(|part| part == b".." && bytes.contains(&b'\\'))
 }
 
 /// Where a path leads, links followed. Of one that leads nowhere, what its letters say: whether a file outside exists

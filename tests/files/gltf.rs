@@ -1,9 +1,10 @@
 //! The glTF reader: what it reads, what it warns of, what it refuses, and that damaged files never bring it down.
 
-mod glb;
+pub mod glb;
 
 mod animation;
 mod bad_input;
+pub mod everything;
 mod fuzz;
 mod geometry;
 mod lights;

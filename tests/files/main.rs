@@ -6,5 +6,6 @@ mod support;
 mod cryptomatte;
 mod exr;
 mod gltf;
+mod messages;
 mod metrics;
 mod plan;

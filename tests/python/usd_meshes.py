@@ -4,7 +4,7 @@ import math
 import unittest
 
 import numpy
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdSkel, Vt
 
 import usd_support
 from faults import Fault
@@ -262,6 +262,24 @@ class Places(usd_support.Stages):
         with self.assertRaisesRegex(Fault, "part.usda is outside the scene's folder"):
             self.convert(inner / "stage.usda")
         self.convert(inner / "stage.usda", allow_outside=True)
+
+    def test_images_outside_the_folder_are_refused_whether_they_are_there_or_not(self):
+        inner = self.dir / "inner"
+        inner.mkdir()
+        (self.dir / "sky.hdr").write_bytes(b"")
+        (inner / "link.hdr").symlink_to(self.dir / "sky.hdr")
+        stage = Usd.Stage.CreateNew(str(inner / "stage.usda"))
+        light = UsdLux.DomeLight.Define(stage, "/Sky")
+        for name in ("../sky.hdr", "../no.hdr", "/etc/hostname", "/nowhere/no.hdr", "link.hdr"):
+            light.CreateTextureFileAttr(name)
+            stage.Save()
+            with self.subTest(name), self.assertRaisesRegex(Fault, "^/Sky: the file .* is outside the scene's folder"):
+                self.convert(inner / "stage.usda")
+        for name in ("http://example.org/sky.hdr", "file:///etc/hostname", "%2e%2e/sky.hdr", "C:/sky.hdr", "..\\sky.hdr"):
+            light.CreateTextureFileAttr(name)
+            stage.Save()
+            with self.subTest(name), self.assertRaisesRegex(Fault, "^/Sky: the file .* is (not found|outside)"):
+                self.convert(inner / "stage.usda")
 
     def test_time_samples(self):
         self.stage.SetStartTimeCode(1)

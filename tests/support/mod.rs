@@ -11,6 +11,9 @@ pub fn bsdf(p: &Parameters, tables: &EnergyTables) -> Bsdf<'static> {
 pub mod channels;
 pub mod field;
 pub mod glb;
+pub mod onnx;
+pub mod promises;
+pub mod readers;
 pub mod scenes;
 pub mod stats;
 pub mod tiles;

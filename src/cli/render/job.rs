@@ -14,7 +14,8 @@ use caustique::finish::{Denoiser, DenoiserChoice, Finish};
 use caustique::pipeline::sized;
 use caustique::render::Strategy;
 use caustique::render::{
-    self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, PHOTON_BYTES, Settings, Shard,
+    self, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, MAX_SHARDS, PHOTON_BYTES,
+    Settings, Shard,
 };
 use caustique::scene::{Crop, MAX_SIZE, View};
 use caustique::stat::sum::MOST_TERMS;
@@ -386,10 +387,10 @@ impl FromStr for ShardChoice {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match parts {
-            Some((index, count)) if index < count && count <= 1_000_000 => Ok(ShardChoice { index, count }),
+            Some((index, count)) if (Shard { index, count }).is_sound() => Ok(ShardChoice { index, count }),
             Some((_, 0)) => Err("there is no shard of 0".into()),
-            Some((_, count)) if count <= 1_000_000 => Err(format!("shards of {count} are 0 to {}", count - 1)),
-            Some(_) => Err("there are at most 1000000 shards".into()),
+            Some((_, count)) if count <= MAX_SHARDS => Err(format!("shards of {count} are 0 to {}", count - 1)),
+            Some(_) => Err(format!("there are at most {MAX_SHARDS} shards")),
             None => Err("it must be I/N, such as 0/4".into()),
         }
     }

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::Attributes;
 use crate::error::{Error, Kind, Result};
 use crate::film::{Layer, LayerSet, Plane, Sample};
+use crate::memory;
 
 /// Reads every channel of every part, and the string attributes of all parts.
 ///
@@ -79,11 +80,9 @@ fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)>
 
 /// Refuses headers that promise more than the file can hold, before anything is allocated for them.
 fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
-    /// No compression of EXR packs better: DWA runs deflate (1032 to 1) over run lengths of blocks of 64 samples.
-    const RATIO: u128 = 1032 * 64;
     let Some(first) = headers.first() else { return Err(invalid("no part")) };
     let window = |size: exr::math::Vec2<usize>| size.0 as u128 * size.1 as u128;
-    let mut promised = 0u128;
+    let mut taken = 0u128;
     for header in headers {
         if header.deep {
             return Err(exr::error::Error::NotSupported("the file is deep".into()));
@@ -94,10 +93,43 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
         if header.chunk_count as u128 * 8 > u128::from(length) {
             return Err(invalid("more chunks than bytes"));
         }
-        let display = window(first.shared_attributes.display_window.size) * 4 * header.channels.list.len() as u128;
-        promised += display.max(window(header.layer_size) * header.channels.bytes_per_pixel as u128);
+        if window(header.layer_size) * header.channels.bytes_per_pixel as u128 > u128::from(length) * ratio(header) {
+            return Err(invalid("more pixels than the file can hold"));
+        }
+        taken += window(first.shared_attributes.display_window.size) * 4 * header.channels.list.len() as u128;
     }
-    if promised > u128::from(length) * RATIO { Err(invalid("more pixels than the file can hold")) } else { Ok(()) }
+    // A window of a large picture may be small.
+    match u64::try_from(taken) {
+        Ok(taken) if taken <= WHOLE.max(length.saturating_mul(PACKED)) => {
+            memory::check(taken, "its pixels").map_err(|error| exr::error::Error::NotSupported(error.cause.into()))
+        }
+        _ => Err(invalid("the display window is too large for its file")),
+    }
+}
+
+/// Deflate: 258 bytes by two bits, one for the length and one for the distance.
+const DEFLATE: u128 = 1032;
+/// No compression packs better: deflate over run lengths of blocks of 64 samples.
+const PACKED: u64 = 1032 * 64;
+/// Most bytes of a picture of which a file holds a small window.
+const WHOLE: u64 = 1 << 30;
+
+/// How many bytes of samples a byte of a file stands for at most.
+fn ratio(header: &Header) -> u128 {
+    match header.compression {
+        Compression::Uncompressed => 1,
+        // Two bytes repeat one 128 times.
+        Compression::RLE => 64,
+        Compression::ZIP1 | Compression::ZIP16 => DEFLATE,
+        // Three of four bytes are kept.
+        Compression::PXR24 => DEFLATE * 4 / 3,
+        // Sixteen samples of two bytes by three bytes, if all are the same.
+        Compression::B44 | Compression::B44A => 32,
+        // Two codes of a bit at least and eight bits repeat a sample of two bytes 255 times; a bitmap says which values
+        // there are.
+        Compression::PIZ => DEFLATE,
+        _ => u128::from(PACKED),
+    }
 }
 
 /// A chunk of DWA begins with the sizes of its sections, eleven 64-bit numbers, and the decoder allocates what they

@@ -113,19 +113,6 @@ impl Document<'_> {
         self.elements(index, 1, 0, &unsigned, true)
     }
 
-    /// Counts bytes that elements are about to take, and asks whether there are so many once they are many: a file of
-    /// many parts can name the same data in all of them.
-    fn decoding(&self, bytes: u64) -> Result<()> {
-        let unasked = self.unasked.get().saturating_add(bytes);
-        self.unasked.set(unasked);
-        if unasked < memory::SMALL {
-            return Ok(());
-        }
-        self.unasked.set(0);
-        memory::check(unasked, "its elements")
-            .map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))
-    }
-
     fn elements<T: Copy>(
         &self,
         index: usize,
@@ -151,7 +138,9 @@ impl Document<'_> {
         let (count, size) = (accessor.count.0, width * component.size());
         // After the count is known to be that of data.
         let room = |count: usize| {
-            self.decoding(count as u64 * size_of::<T>() as u64)?;
+            let bytes = count as u64 * size_of::<T>() as u64;
+            let error = self.take(bytes, "its elements");
+            error.map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))?;
             memory::room(count, "elements")
         };
         let mut values = match accessor.buffer_view {

@@ -2,7 +2,7 @@
 //! blend skinning).
 
 use super::document::{Document, get, named};
-use super::transform::{affine, finite, to_world};
+use super::transform::{Worlds, affine, finite};
 use super::{counted, fault};
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -43,7 +43,7 @@ impl Deformation {
     ///
     /// # Errors
     /// Weights that are no numbers; a skin, or a joint of it, that does not exist or stands nowhere.
-    pub(super) fn of(document: &Document, mesh: usize, node: usize, parents: &[Option<usize>]) -> Result<Deformation> {
+    pub(super) fn of(document: &Document, mesh: usize, node: usize, worlds: &Worlds) -> Result<Deformation> {
         let raw = document.part("nodes", node);
         let weights = raw.get("weights").or(document.part("meshes", mesh).get("weights"));
         let weights = weights.map_or(Ok(Vec::new()), |list| {
@@ -53,7 +53,7 @@ impl Deformation {
         let skin = skin.as_u64().and_then(|i| usize::try_from(i).ok()).unwrap_or(usize::MAX);
         let list = document.raw["skins"].as_array().map_or(&[][..], Vec::as_slice);
         let place = named("skin", get(list, skin, "skin")?["name"].as_str(), skin);
-        let mut joints = joints(document, &list[skin], parents).map_err(|e| e.within(place))?;
+        let mut joints = joints(document, &list[skin], worlds).map_err(|e| e.within(place))?;
         let center = DAffine3::from_translation(joints.first().map_or(DVec3::ZERO, |joint| joint.translation));
         joints.iter_mut().for_each(|joint| joint.translation -= center.translation);
         Ok(Deformation { weights, joints: Some(joints), center: Some(center) })
@@ -140,7 +140,7 @@ fn add(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut Mesh) 
 }
 
 /// Joint matrices: the inverse bind matrix, then the joint's own place in the world.
-fn joints(document: &Document, raw: &Value, parents: &[Option<usize>]) -> Result<Vec<DAffine3>> {
+fn joints(document: &Document, raw: &Value, worlds: &Worlds) -> Result<Vec<DAffine3>> {
     let skin = Skin::deserialize(raw).map_err(|e| fault("", e).hint(EXPORT))?;
     let binds = skin.inverse_bind_matrices.map(|index| document.floats::<16>(index)).transpose()?;
     if binds.as_ref().is_some_and(|binds| binds.len() < skin.joints.len()) {
@@ -150,7 +150,7 @@ fn joints(document: &Document, raw: &Value, parents: &[Option<usize>]) -> Result
         let bind = binds.as_ref().map_or(Some(DAffine3::IDENTITY), |binds| affine(binds[i].map(f64::from)));
         let bind = bind
             .ok_or_else(|| fault(format!("inverse bind matrix {i}"), "its last row is not 0, 0, 0, 1").hint(EXPORT))?;
-        let joint = to_world(document, parents, node)? * bind;
+        let joint = worlds.of(node)? * bind;
         if !finite(&joint) {
             return Err(
                 fault(format!("joint {i}"), "its transform is not finite").hint("look at its scale and position")

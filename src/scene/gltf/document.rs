@@ -4,6 +4,7 @@ use super::accessor::MOST_ZEROS;
 use super::container::{self, malformed};
 use super::{fault, uri};
 use crate::error::Result;
+use crate::memory;
 use crate::scene::folder::Folder;
 use gltf::json;
 use serde::de::DeserializeOwned;
@@ -27,8 +28,8 @@ pub(super) struct Document<'a> {
     pub(super) samplers: Vec<json::texture::Sampler>,
     /// Elements that may still be made out of nothing.
     pub(super) zeros_left: Cell<u64>,
-    /// Bytes of elements that were taken since memory was last asked for.
-    pub(super) unasked: Cell<u64>,
+    /// Bytes that were taken since memory was last asked for.
+    unasked: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
 }
 
@@ -49,8 +50,8 @@ impl<'a> Document<'a> {
                 scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
             }
         }
-        let buffers = buffers(&parts::<json::Buffer>(&raw, "buffers")?, binary, folder)?;
-        Ok(Document {
+        let described = parts::<json::Buffer>(&raw, "buffers")?;
+        let mut document = Document {
             accessors: parts(&raw, "accessors")?,
             views: parts(&raw, "bufferViews")?,
             meshes: parts(&raw, "meshes")?,
@@ -64,7 +65,47 @@ impl<'a> Document<'a> {
             folder,
             zeros_left: Cell::new(MOST_ZEROS),
             unasked: Cell::new(0),
-            buffers,
+            buffers: Vec::new(),
+        };
+        document.buffers = document.load_buffers(&described, binary)?;
+        Ok(document)
+    }
+
+    /// Counts bytes that are about to be taken for `what`, and asks whether there are so many once they are many: a file
+    /// of many parts can name the same data in all of them.
+    pub(super) fn take(&self, bytes: u64, what: impl Display) -> Result<()> {
+        let unasked = self.unasked.get().saturating_add(bytes);
+        self.unasked.set(unasked);
+        if unasked < memory::SMALL {
+            return Ok(());
+        }
+        self.unasked.set(0);
+        memory::check(unasked, what)
+    }
+
+    fn load_buffers(&self, list: &[json::Buffer], binary: &'a [u8]) -> Result<Vec<Cow<'a, [u8]>>> {
+        let load = |(i, buffer): (usize, &json::Buffer)| {
+            let place = at("buffer", i);
+            let bytes = match &buffer.uri {
+                Some(uri) => Cow::Owned(self.bytes_of(uri).map_err(|e| e.within(&place))?),
+                None if i == 0 => Cow::Borrowed(binary),
+                None => Cow::Borrowed(&[][..]),
+            };
+            let (promised, there) = (buffer.byte_length.0, bytes.len());
+            if promised > there as u64 {
+                return Err(fault(place, format!("{promised} bytes are promised, {there} are there"))
+                    .hint("the file is damaged or incomplete: copy or export it again"));
+            }
+            Ok(bytes)
+        };
+        list.iter().enumerate().map(load).collect()
+    }
+
+    /// The bytes that a URI stands for.
+    pub(super) fn bytes_of(&self, uri: &str) -> Result<Vec<u8>> {
+        uri::load(uri, self.folder, |bytes| {
+            let error = self.take(bytes, "files that the scene names");
+            error.map_err(|e| e.hint("name each file once, or render with more memory"))
         })
     }
 
@@ -178,22 +219,4 @@ fn core(value: &Value, place: &str) -> Result<Value> {
         }
         other => other.clone(),
     })
-}
-
-fn buffers<'a>(list: &[json::Buffer], binary: &'a [u8], folder: Folder) -> Result<Vec<Cow<'a, [u8]>>> {
-    let load = |(i, buffer): (usize, &json::Buffer)| {
-        let place = at("buffer", i);
-        let bytes = match &buffer.uri {
-            Some(uri) => Cow::Owned(uri::load(uri, folder).map_err(|e| e.within(&place))?),
-            None if i == 0 => Cow::Borrowed(binary),
-            None => Cow::Borrowed(&[][..]),
-        };
-        let (promised, there) = (buffer.byte_length.0, bytes.len());
-        if promised > there as u64 {
-            return Err(fault(place, format!("{promised} bytes are promised, {there} are there"))
-                .hint("the file is damaged or incomplete: copy or export it again"));
-        }
-        Ok(bytes)
-    };
-    list.iter().enumerate().map(load).collect()
 }

@@ -15,6 +15,7 @@ mod curve;
 mod deform;
 mod document;
 mod extras;
+mod files;
 mod flat;
 mod lights;
 mod material;
@@ -27,6 +28,8 @@ mod texture;
 mod topology;
 mod transform;
 mod uri;
+
+pub use files::files;
 
 use super::Description;
 use crate::error::{Error, Kind, Result};

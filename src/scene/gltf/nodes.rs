@@ -6,8 +6,8 @@ use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::flat::flattened;
 use super::materials::{Library, tangent_set};
 use super::mesh::FARTHEST;
-use super::transform::{self, can_be_inverted, compose, finite, local};
-use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology};
+use super::transform::{Worlds, can_be_inverted, compose, finite, local};
+use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{DAffine3, DMat3, DVec3, Rgb};
@@ -39,7 +39,7 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         document: &document,
         library: Library::new(options.glass),
         meshes: HashMap::new(),
-        parents: transform::parents(&document),
+        worlds: Worlds::new(&document),
         bounds: Vec::new(),
         flattened: 0,
         divisor: None,
@@ -96,8 +96,7 @@ struct Reader<'r> {
     library: Library,
     /// By mesh of the file, and the node that gives it a shape of its own.
     meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
-    /// Of each node.
-    parents: Vec<Option<usize>>,
+    worlds: Worlds<'r, 'r>,
     /// Local bounds of the meshes read.
     bounds: Vec<(DVec3, DVec3)>,
     /// Bytes of the meshes that nodes flatten.
@@ -192,7 +191,8 @@ impl Reader<'_> {
                 EnvironmentSource::Color(color)
             }
             (None, Some(file)) => {
-                let file = self.document.folder.file(file.as_ref()).map_err(|e| e.within("environment"))?;
+                let file = uri::local(file).and_then(|file| self.document.folder.file(file.as_ref()));
+                let file = file.map_err(|e| e.within("environment"))?;
                 environment_file::read(&file, &mut self.out.warnings)?
             }
             _ => {
@@ -269,7 +269,7 @@ impl Reader<'_> {
             let known = |name: &String| !name.is_empty();
             let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
             let said = extras::read::<ObjectExtras>(raw, place)?;
-            let shape = Deformation::of(document, mesh, index, &self.parents).map_err(|e| e.within(place))?;
+            let shape = Deformation::of(document, mesh, index, &self.worlds).map_err(|e| e.within(place))?;
             // Where the node of a skinned mesh stands says nothing: its joints do.
             let to_world = shape.center.unwrap_or(to_world);
             let parts = self.parts(mesh, deform::is_own(raw).then_some(index), &shape)?;

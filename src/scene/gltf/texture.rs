@@ -1,9 +1,8 @@
 //! Images and textures: decoded once, kept once per use (colour or data) and sampler.
 
 use super::document::{Document, get, named};
-use super::{fault, uri};
+use super::fault;
 use crate::error::{Error, Kind, Result};
-use crate::memory;
 use crate::texture::{Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
@@ -11,6 +10,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::io::Cursor;
 use std::rc::Rc;
 
@@ -129,6 +129,9 @@ impl Textures {
             return Ok(known);
         }
         let image = self.image(document, source)?;
+        // Four bytes or four floats a texel, for each sampler and use of it.
+        let count = u64::from(image.width()) * u64::from(image.height());
+        room(document, count * if is_deep(&image) { 16 } else { 4 }, "the textures of an image")?;
         let sampler = match texture.sampler {
             Some(sampler) => get(&document.samplers, sampler.value(), "sampler")?.clone(),
             None => Sampler::default(),
@@ -156,8 +159,8 @@ impl Textures {
         let image = get(&document.images, index, "image")?;
         let place = named("image", image.name.as_deref(), index);
         let decoded = match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => uri::load(uri, document.folder).and_then(|bytes| decode(&bytes)),
-            (None, Some(view)) => document.view(view.value()).and_then(decode),
+            (Some(uri), _) => document.bytes_of(uri).and_then(|bytes| decode(document, &bytes)),
+            (None, Some(view)) => document.view(view.value()).and_then(|bytes| decode(document, bytes)),
             (None, None) => Err(fault("", "it has neither a URI nor a buffer view").hint("export the scene again")),
         };
         let decoded = Rc::new(decoded.map_err(|e| e.within(place))?);
@@ -166,7 +169,7 @@ impl Textures {
     }
 }
 
-fn decode(bytes: &[u8]) -> Result<DynamicImage> {
+fn decode(document: &Document, bytes: &[u8]) -> Result<DynamicImage> {
     const HINT: &str = "save the image again as PNG or JPEG";
     let broken = |cause: String| Error::new(Kind::Image, "", cause).hint(HINT);
     let format = image::guess_format(bytes);
@@ -179,7 +182,7 @@ fn decode(bytes: &[u8]) -> Result<DynamicImage> {
     limits.max_alloc = Some(MOST_BYTES);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
-    check_room(bytes, format)?;
+    check_room(document, bytes, format)?;
     // A decoder's own fault must not end the program.
     let decoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.decode()));
     let decoded = decoded.map_err(|_| broken("it cannot be decoded: the decoder failed".into()))?;
@@ -191,7 +194,7 @@ fn decode(bytes: &[u8]) -> Result<DynamicImage> {
 }
 
 /// Checks that the image fits as it is decoded and as it is kept: a few bytes can stand for a gigabyte of one colour.
-fn check_room(bytes: &[u8], format: ImageFormat) -> Result<()> {
+fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<()> {
     // What is wrong with it, or larger than any image is taken, the decoder tells.
     let Ok(decoder) = ImageReader::with_format(Cursor::new(bytes), format).into_decoder() else { return Ok(()) };
     let (width, height) = decoder.dimensions();
@@ -199,23 +202,32 @@ fn check_room(bytes: &[u8], format: ImageFormat) -> Result<()> {
     // Four bytes, or four floats twice on the way, beside what is decoded.
     let texels = u64::from(width) * u64::from(height);
     let needed = decoder.total_bytes().saturating_add(texels * if deep { 32 } else { 4 });
-    if needed < memory::SMALL || width > MOST_TEXELS || height > MOST_TEXELS {
-        return Ok(());
+    if width > MOST_TEXELS || height > MOST_TEXELS {
+        Ok(())
+    } else {
+        room(document, needed, format_args!("{width} x {height} texels"))
     }
-    memory::check(needed, format_args!("{width} x {height} texels"))
-        .map_err(|e| e.hint("save the image smaller, or render with more memory"))
 }
 
-/// Texels as the renderer keeps them: 8 bits stay 8 bits, more become floats.
-fn texels(image: &DynamicImage, usage: Use) -> Texels {
-    let deep = !matches!(
+/// Asks for memory of texels.
+fn room(document: &Document, bytes: u64, what: impl Display) -> Result<()> {
+    document.take(bytes, what).map_err(|e| e.hint("save the image smaller, or render with more memory"))
+}
+
+/// Whether an image has more than eight bits a channel.
+fn is_deep(image: &DynamicImage) -> bool {
+    !matches!(
         image,
         DynamicImage::ImageLuma8(_)
             | DynamicImage::ImageLumaA8(_)
             | DynamicImage::ImageRgb8(_)
             | DynamicImage::ImageRgba8(_)
-    );
-    if deep && usage != Use::Glossiness {
+    )
+}
+
+/// Texels as the renderer keeps them: 8 bits stay 8 bits, more become floats.
+fn texels(image: &DynamicImage, usage: Use) -> Texels {
+    if is_deep(image) && usage != Use::Glossiness {
         let mut data: Vec<[f32; 4]> = image.to_rgba32f().pixels().map(|p| p.0).collect();
         if usage == Use::Color {
             data.iter_mut().for_each(|t| t[..3].iter_mut().for_each(|x| *x = srgb_to_linear(*x)));

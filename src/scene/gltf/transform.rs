@@ -5,6 +5,8 @@ use super::fault;
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
 use serde_json::Value;
+use std::cell::RefCell;
+use std::collections::HashMap;
 
 /// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3),
 /// with all the digits of the file.
@@ -50,31 +52,51 @@ pub(super) fn can_be_inverted(transform: &DAffine3) -> bool {
         && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
 }
 
-/// The parent of each node of a document.
-pub(super) fn parents(document: &Document) -> Vec<Option<usize>> {
-    let mut parents = vec![None; document.nodes.len()];
-    for (parent, node) in document.nodes.iter().enumerate() {
-        for child in node.children.iter().flatten() {
-            if let Some(slot) = parents.get_mut(child.value()) {
-                *slot = Some(parent);
-            }
-        }
-    }
-    parents
+/// Transforms of nodes against the world, whatever scene they stand in.
+pub(super) struct Worlds<'d, 'a> {
+    document: &'d Document<'a>,
+    /// Of each node.
+    parents: Vec<Option<usize>>,
+    /// Those that have been asked for, and those above them: joints share their ancestors.
+    known: RefCell<HashMap<usize, DAffine3>>,
 }
 
-/// Transform of a node against the world.
-///
-/// # Errors
-/// There is no such node, it is its own ancestor, or a transform on the way is malformed.
-pub(super) fn to_world(document: &Document, parents: &[Option<usize>], node: usize) -> Result<DAffine3> {
-    let (mut whole, mut at) = (DAffine3::IDENTITY, Some(node));
-    // A node has fewer ancestors than there are nodes.
-    for _ in 0..=parents.len() {
-        let Some(index) = at else { return Ok(whole) };
-        let name = get(&document.nodes, index, "node")?.name.as_deref();
-        whole = local(document.part("nodes", index), &named("node", name, index))? * whole;
-        at = parents[index];
+impl<'d, 'a> Worlds<'d, 'a> {
+    pub(super) fn new(document: &'d Document<'a>) -> Worlds<'d, 'a> {
+        let mut parents = vec![None; document.nodes.len()];
+        for (parent, node) in document.nodes.iter().enumerate() {
+            for child in node.children.iter().flatten() {
+                if let Some(slot) = parents.get_mut(child.value()) {
+                    *slot = Some(parent);
+                }
+            }
+        }
+        Worlds { document, parents, known: RefCell::default() }
     }
-    Err(fault(format!("node {node}"), "it is its own ancestor").hint("the file is damaged: export it again"))
+
+    /// Transform of a node against the world.
+    ///
+    /// # Errors
+    /// There is no such node, it is its own ancestor, or a transform on the way is malformed.
+    pub(super) fn of(&self, node: usize) -> Result<DAffine3> {
+        let mut known = self.known.borrow_mut();
+        let (mut way, mut at) = (Vec::new(), Some(node));
+        while let Some(index) = at.filter(|index| !known.contains_key(index)) {
+            get(&self.document.nodes, index, "node")?;
+            // A node has fewer ancestors than there are nodes.
+            if way.len() == self.parents.len() {
+                let error = fault(format!("node {node}"), "it is its own ancestor");
+                return Err(error.hint("the file is damaged: export it again"));
+            }
+            way.push(index);
+            at = self.parents[index];
+        }
+        let mut whole = at.and_then(|index| known.get(&index).copied()).unwrap_or(DAffine3::IDENTITY);
+        for index in way.into_iter().rev() {
+            let name = self.document.nodes[index].name.as_deref();
+            whole *= local(self.document.part("nodes", index), &named("node", name, index))?;
+            known.insert(index, whole);
+        }
+        Ok(whole)
+    }
 }

@@ -5,8 +5,9 @@ use crate::error::{Error, Kind, Result};
 use crate::scene::folder::Folder;
 use std::path::PathBuf;
 
-/// The bytes that `uri` stands for; relative paths start at `folder`.
-pub(super) fn load(uri: &str, folder: Folder) -> Result<Vec<u8>> {
+/// The bytes that `uri` stands for; relative paths start at `folder`. `room` is asked for those of a file before they
+/// are read.
+pub(super) fn load(uri: &str, folder: Folder, room: impl FnOnce(u64) -> Result<()>) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((head, body)) = data.split_once(',') else {
             return Err(fault("", "its data URI has no comma").hint("export the scene again"));
@@ -24,28 +25,45 @@ pub(super) fn load(uri: &str, folder: Folder) -> Result<Vec<u8>> {
             .hint("put the file there, or export as .glb, which holds buffers and textures itself")
     };
     // A device or a pipe might never end.
-    if !std::fs::metadata(&path).map_err(cause)?.is_file() {
+    let meta = std::fs::metadata(&path).map_err(cause)?;
+    if !meta.is_file() {
         return Err(cause(std::io::Error::other("it is not a regular file")));
     }
+    room(meta.len())?;
     std::fs::read(&path).map_err(cause)
 }
 
 /// The file that a relative or absolute path in a URI names.
 pub(super) fn path_of(uri: &str, folder: Folder) -> Result<PathBuf> {
-    let scheme = uri.split_once(':').map(|(scheme, _)| scheme);
-    let path = match scheme {
-        // One letter is a drive.
-        Some(s) if s.len() > 1 && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)) => {
-            let Some(path) = uri.strip_prefix("file://") else {
-                return Err(fault("", format!("a URI of scheme \"{s}\" cannot be read"))
-                    .hint("save what it names beside the scene file"));
-            };
-            path
-        }
-        _ => uri,
+    let path = match uri.strip_prefix("file://") {
+        Some(path) => path,
+        None => without_scheme(uri)?,
     };
     let path = String::from_utf8(percent_decode(path)).map_err(|_| fault("", "its URI is not valid UTF-8"))?;
     folder.file(path.as_ref())
+}
+
+/// A name without a scheme, which is that of a file.
+///
+/// # Errors
+/// It has one.
+fn without_scheme(name: &str) -> Result<&str> {
+    match name.split_once(':') {
+        // One letter is a drive.
+        Some((s, _)) if s.len() > 1 && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)) => {
+            let error = fault("", format!("a URI of scheme \"{s}\" cannot be read"));
+            Err(error.hint("save what it names beside the scene file"))
+        }
+        _ => Ok(name),
+    }
+}
+
+/// A path, which is no URI: colons may stand in it.
+///
+/// # Errors
+/// It is a URI all the same.
+pub(super) fn local(path: &str) -> Result<&str> {
+    if path.contains("://") { without_scheme(path) } else { Ok(path) }
 }
 
 /// `%41` is `A`; a percent sign without two digits stands for itself.

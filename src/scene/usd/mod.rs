@@ -2,6 +2,7 @@
 //! which is part of the program) lets Pixar's own library compose the stage, and [`gltf`] reads what it writes, so that a
 //! scene means the same through either door.
 
+pub mod answer;
 mod python;
 
 pub use python::Interpreter;
@@ -9,7 +10,6 @@ pub use python::Interpreter;
 use super::description::Description;
 use super::gltf::{self, Frame, ReadOptions};
 use crate::error::{Error, Kind, Result};
-use serde::Deserialize;
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::Output;
@@ -72,17 +72,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
 /// Those of the converter, as for [`read`].
 pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
     let output = Converter::new(path)?.run(&["--arguments".into()], allow_outside)?;
-    serde_json::from_slice(&output.stdout).map_err(|cause| {
-        Error::new(Kind::Scene, path.display(), format!("the converter does not say options: {cause}"))
-    })
-}
-
-/// What the converter says of an error.
-#[derive(Deserialize)]
-struct Fault {
-    prim: String,
-    fault: String,
-    hint: Option<String>,
+    answer::options(&output.stdout, path)
 }
 
 /// The converter, laid out in a folder that ends with it.
@@ -119,17 +109,6 @@ impl<'p> Converter<'p> {
         if output.status.success() {
             return Ok(output);
         }
-        let told = String::from_utf8_lossy(&output.stderr);
-        let fault = told.lines().rev().find_map(|line| serde_json::from_str::<Fault>(line).ok());
-        Err(self.error(fault, &told))
-    }
-
-    fn error(&self, fault: Option<Fault>, told: &str) -> Error {
-        let Some(Fault { prim, fault, hint }) = fault else {
-            let last = told.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
-            let cause = format!("the converter (scripts/usd) failed: {}", last.trim());
-            return Error::new(Kind::Scene, self.stage.display(), cause).hint("'caustique doctor' says what is found");
-        };
-        Error { hint, ..Error::new(Kind::Scene, prim, fault).within(self.stage.display()) }
+        Err(answer::fault(&output.stderr, self.stage))
     }
 }

@@ -54,21 +54,56 @@ fn files_outside_the_folder_are_not_opened() {
         let absent = format!("../no-{file}");
         let mut names = vec![format!("../{file}"), format!("{root}/{file}"), format!("up/{file}"), absent.clone()];
         names.extend([format!("up/no-{file}"), format!("../scene-2/{file}"), format!("nowhere/../../{file}")]);
+        names.extend([format!("C:\\{file}"), format!("c:/{file}"), format!("\\\\host\\{file}"), format!("..\\{file}")]);
         if part != "environment" {
-            names.extend([format!("file://{root}/{file}"), format!("%2e%2e/{file}")]);
+            names.extend([format!("file://{root}/{file}"), format!("%2e%2e/{file}"), format!("%2E%2E%2F{file}")]);
+            names.extend([format!("..%2f{file}"), format!("C:%5C{file}"), format!("up/%2e/{file}")]);
         }
         for name in names {
-            let shown = name.trim_start_matches("file://").replace("%2e", ".").replace(&root, "DIR");
+            let shown = [("%2e", "."), ("%2E", "."), ("%2f", "/"), ("%2F", "/"), ("%5C", "\\"), (&root, "DIR")]
+                .iter()
+                .fold(name.trim_start_matches("file://").to_owned(), |name, (code, letter)| name.replace(code, letter));
             let expected = format!(
                 "DIR/scene/a.glb: {place}: the file {shown} is outside the scene's folder\n\
                  hint: put it beside the scene file and name it so, or allow such files with --allow-outside"
             );
             let told = reading(folder, part, &name, false).expect_err(&name);
             assert_eq!(told, expected, "{part} {name}");
-            if name != absent && !name.contains("no-") && !name.starts_with("nowhere") {
+            let of_windows = ["\\", "%5C", "c:"].iter().any(|part| name.contains(part));
+            if name != absent && !name.contains("no-") && !name.starts_with("nowhere") && !of_windows {
                 assert_eq!(reading(folder, part, &name, true), Ok(()), "{part} {name}");
             }
         }
+    }
+}
+
+/// Names that are addresses, or that would be paths upwards if they were decoded once more, lead nowhere.
+#[test]
+fn addresses_are_not_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::create_dir(folder.join("scene")).expect("a folder");
+    let root = folder.display();
+    for (part, place) in [
+        ("buffer", "buffer 0"),
+        ("image", "material 0, emissiveTexture: image 0"),
+        ("environment", "scene \"Scene\": environment"),
+    ] {
+        for (scheme, name) in [
+            ("http", "http://example.org/a".to_owned()),
+            ("https", "https://example.org/../a".to_owned()),
+            ("ftp", "ftp://example.org/a".to_owned()),
+            ("FILE", format!("FILE://{root}/a")),
+        ] {
+            let expected = format!(
+                "DIR/scene/a.glb: {place}: a URI of scheme \"{scheme}\" cannot be read\n\
+                 hint: save what it names beside the scene file"
+            );
+            assert_eq!(reading(folder, part, &name, true), Err(expected.clone()), "{part} {name}");
+            assert_eq!(reading(folder, part, &name, false), Err(expected), "{part} {name}");
+        }
+        let told = reading(folder, part, "%252e%252e/a", false).expect_err("it is not there");
+        assert!(told.contains("2e/a") && told.contains("No such file") && told.contains("hint: "), "{told}");
     }
 }
 

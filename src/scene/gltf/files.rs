@@ -1,0 +1,34 @@
+//! The files that a scene file names, whether it uses them or not.
+
+use super::container;
+use super::uri;
+use crate::scene::folder::Folder;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// The files that the bytes of a scene file at `scene` name, in its folder unless they may lie outside; whether they
+/// are there is not looked at. None of what is no glTF.
+pub fn files(bytes: &[u8], scene: &Path, allow_outside: bool) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    if let Ok((json, _)) = container::split(bytes) {
+        collect(&json, Folder::of(scene, allow_outside), &mut found);
+    }
+    found
+}
+
+/// The values of keys that name files: `uri` of buffers and images, `file` of an environment.
+fn collect(json: &Value, folder: Folder, found: &mut Vec<PathBuf>) {
+    match json {
+        Value::Array(values) => values.iter().for_each(|value| collect(value, folder, found)),
+        Value::Object(object) => {
+            for (key, value) in object {
+                match (key.as_str(), value.as_str().filter(|text| !text.starts_with("data:"))) {
+                    ("uri", Some(name)) => found.extend(uri::path_of(name, folder).ok()),
+                    ("file", Some(name)) => found.extend(folder.file(name.as_ref()).ok()),
+                    _ => collect(value, folder, found),
+                }
+            }
+        }
+        _ => {}
+    }
+}

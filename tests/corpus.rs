@@ -1,0 +1,96 @@
+//! What was kept of fuzzing (`scripts/fuzz.sh`) is read again, each file by its own reader: none may panic, take long or
+//! take much memory. A folder of `tests/corpus` is called as its reader in `tests/support/readers.rs`.
+
+#[path = "support/mod.rs"]
+mod support;
+
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::thread;
+use std::time::Duration;
+use support::readers::{READERS, Reader};
+
+/// What reading a file may take.
+#[derive(Clone, Copy)]
+struct Bounds {
+    time: Duration,
+    /// Resident memory on top of what was there (bytes).
+    memory: u64,
+}
+
+/// Files are small: an image of them is none of a gigabyte. A slow machine has time enough.
+const BOUNDS: Bounds = Bounds { time: Duration::from_secs(20), memory: 256 << 20 };
+
+/// The memory of a process is measured: one file at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// A line of `/proc/self/status` (bytes).
+fn memory(key: &str) -> u64 {
+    let text = fs::read_to_string("/proc/self/status").expect("Linux tells");
+    let line = text.lines().find_map(|line| line.strip_prefix(key)).expect("the line is there");
+    line.split_whitespace().nth(1).and_then(|kib| kib.parse::<u64>().ok()).expect("a number") << 10
+}
+
+/// Reads a file; what is wrong with how that went.
+fn fault(reader: Reader, path: &Path, bounds: Bounds) -> Option<String> {
+    let bytes = fs::read(path).expect("it can be read");
+    let folder = tempfile::tempdir().expect("a folder");
+    // Sets the peak to what is in use now.
+    fs::write("/proc/self/clear_refs", "5").expect("Linux lets a process");
+    let before = memory("VmRSS");
+    let (done, ended) = mpsc::channel();
+    thread::spawn(move || {
+        let outcome = catch_unwind(AssertUnwindSafe(|| (reader.1)(&bytes, folder.path())));
+        done.send(outcome.is_ok())
+    });
+    let what = match ended.recv_timeout(bounds.time) {
+        Err(_) => "it takes long".into(),
+        Ok(false) => "a panic".into(),
+        Ok(true) => match memory("VmHWM").saturating_sub(before) {
+            taken if taken > bounds.memory => format!("it takes {} MiB", taken >> 20),
+            _ => return None,
+        },
+    };
+    Some(format!("{}: {what}", path.display()))
+}
+
+/// The files that were kept of a reader.
+fn kept(name: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name);
+    let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn what_was_kept_of_fuzzing_is_read_or_refused() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut faults = Vec::new();
+    for reader in READERS {
+        let files = kept(reader.0);
+        assert!(files.len() > 2, "{}: nothing was kept", reader.0);
+        faults.extend(files.iter().filter_map(|path| fault(reader, path, BOUNDS)));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// The bounds find readers that panic, that do not end, and that take more memory than they should.
+#[test]
+fn planted_faults_are_found() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let path = &kept("glb")[0];
+    let bounds = Bounds { time: Duration::from_secs(2), memory: 32 << 20 };
+    let readers: [(Reader, &str); 4] = [
+        (("panics", |_, _| panic!("planted")), ": a panic"),
+        (("sleeps", |_, _| thread::sleep(Duration::from_secs(5))), ": it takes long"),
+        (("takes", |_, _| drop(std::hint::black_box(vec![1u8; 64 << 20]))), ": it takes "),
+        (("is fine", |_, _| {}), ""),
+    ];
+    for (reader, expected) in readers {
+        let said = fault(reader, path, bounds).unwrap_or_default();
+        assert!(said.contains(expected) && said.is_empty() == expected.is_empty(), "{}: {said}", reader.0);
+    }
+}

@@ -1,0 +1,154 @@
+//! A look through the sources of the loaders: each message in them is said in some case.
+
+use super::everything_said;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Where loaders are.
+const LOADERS: [&str; 10] = [
+    "src/scene/gltf",
+    "src/scene/folder.rs",
+    "src/scene/environment_file.rs",
+    "src/scene/usd/mod.rs",
+    "src/scene/usd/answer.rs",
+    "src/image/exr/read.rs",
+    "src/combine/model.rs",
+    "src/combine/network.rs",
+    "src/pipeline/checkpoint.rs",
+    "src/pipeline/shard.rs",
+];
+
+/// Texts that no case can bring up, and why.
+const UNSAID: [(&str, &[&str]); 5] = [
+    (
+        "there is memory enough where tests run",
+        &[
+            "render fewer or simpler meshes, or with more memory",
+            "{placed} placed meshes",
+            "place fewer copies, join them into one mesh, or render with more memory",
+            "save the image smaller, or render with more memory",
+            "the textures of an image",
+            "files that the scene names",
+            "name each file once, or render with more memory",
+            "its texels",
+            "its pixels",
+        ],
+    ),
+    (
+        "another check, of the crate that is used, comes before it",
+        &[
+            "its weights",
+            "its {key} is not {N} numbers",
+            "it has no texels",
+            "the display window has no pixels",
+            "part index",
+            "the file is deep",
+            "the output is missing",
+            "the output has shape {shape:?} instead of {expected:?}",
+        ],
+    ),
+    (
+        "decoders have no fault that is known",
+        &["it cannot be decoded: the decoder failed", "the decoder failed", "the file contradicts itself"],
+    ),
+    ("no mesh has a rim of one edge", &["edge has one face only"]),
+    ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 2n", "not said"]),
+];
+
+/// The files of the loaders.
+fn files() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let of = |name: &str| -> Vec<PathBuf> {
+        let path = root.join(name);
+        match fs::read_dir(&path) {
+            Ok(entries) => entries.map(|entry| entry.expect("an entry").path()).collect(),
+            Err(_) => vec![path],
+        }
+    };
+    LOADERS.into_iter().flat_map(of).collect()
+}
+
+/// The texts in a source but for its tests and comments, as they are once escapes are taken out.
+fn texts(source: &str) -> Vec<String> {
+    let shipped = source.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
+    let mut found = Vec::new();
+    let mut at = shipped.char_indices().peekable();
+    while let Some((i, c)) = at.next() {
+        if c == '/' && shipped[i..].starts_with("//") {
+            while at.next_if(|(_, c)| *c != '\n').is_some() {}
+        } else if c == '\'' && (shipped[i..].starts_with("'\"'") || shipped[i..].starts_with("'\\")) {
+            // A character, which may be a quotation mark.
+            at.by_ref().skip(1).find(|(_, c)| *c == '\'');
+        } else if c == '"' {
+            let mut text = String::new();
+            while let Some((_, c)) = at.next().filter(|(_, c)| *c != '"') {
+                match (c, at.peek().map(|(_, next)| *next)) {
+                    ('\\', Some('\n')) => while at.next_if(|(_, c)| c.is_whitespace()).is_some() {},
+                    ('\\', Some(next)) => {
+                        text.push(next);
+                        at.next();
+                    }
+                    (c, _) => text.push(c),
+                }
+            }
+            found.push(text);
+        }
+    }
+    found
+}
+
+/// What stands between the braces of a format.
+fn fixed(text: &str) -> Vec<&str> {
+    let parts = text.split('{').enumerate();
+    parts.map(|(i, part)| if i == 0 { part } else { part.split_once('}').map_or(part, |(_, rest)| rest) }).collect()
+}
+
+/// Whether a text is a message: words that are more than one, and not the place that an error is at.
+fn is_message(text: &str) -> bool {
+    let words = fixed(text).join(" ");
+    let words = words.split_whitespace().filter(|word| word.chars().filter(|c| c.is_alphabetic()).count() > 1);
+    words.count() > 1
+}
+
+/// Whether a line holds the fixed parts of a text in their order.
+fn is_said(text: &str, line: &str) -> bool {
+    let mut rest = Some(line);
+    for part in fixed(text) {
+        rest = rest.and_then(|rest| rest.find(part).map(|at| &rest[at + part.len()..]));
+    }
+    rest.is_some()
+}
+
+/// Messages of a source that are nowhere said.
+fn unsaid(source: &str, said: &str) -> Vec<String> {
+    let missing = |text: &String| is_message(text) && !said.lines().any(|line| is_said(text, line));
+    texts(source).into_iter().filter(missing).collect()
+}
+
+#[test]
+fn every_message_is_said_in_some_case() {
+    let said = everything_said();
+    let excepted: Vec<&str> = UNSAID.iter().flat_map(|(_, texts)| *texts).copied().collect();
+    let mut faults = Vec::new();
+    let mut used = Vec::new();
+    for file in files() {
+        for text in unsaid(&fs::read_to_string(&file).expect("it can be read"), &said) {
+            match excepted.contains(&&*text) {
+                true => used.push(text),
+                false => faults.push(format!("{}: {text}", file.display())),
+            }
+        }
+    }
+    assert!(faults.is_empty(), "messages without a case:\n{}", faults.join("\n"));
+    let idle: Vec<_> = excepted.iter().filter(|text| !used.iter().any(|used| used == *text)).collect();
+    assert!(idle.is_empty(), "exceptions that are none: {idle:?}");
+}
+
+#[test]
+fn a_message_without_a_case_is_found() {
+    let source = r#"fn f() { fault(place, format!("its {kind} is odd")) } // "not this one"
+        #[cfg(test)]
+mod tests { fn f() { g("nor that one"); } }"#;
+    assert_eq!(unsaid(source, "a.glb: it is fine"), ["its {kind} is odd"]);
+    assert_eq!(unsaid(source, "a.glb: its head is odd"), [] as [&str; 0]);
+}

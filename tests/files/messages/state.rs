@@ -1,0 +1,120 @@
+//! Messages about networks, checkpoints, shards, and what the converter of stages answers.
+
+use super::{Said, message};
+use crate::support::onnx;
+use caustique::combine::network::Network;
+use caustique::combine::{Model, Runtime};
+use caustique::error::Result;
+use caustique::pipeline::checkpoint::{self, Head};
+use caustique::pipeline::records::{self, Record};
+use caustique::pipeline::shard::{self, Open};
+use caustique::scene::usd::answer;
+use serde_json::json;
+use std::fs;
+use std::path::Path;
+
+fn refused<T>(outcome: Result<T>) -> Vec<String> {
+    vec![message(&outcome.err().expect("it is refused"))]
+}
+
+fn networks(said: &mut Said, folder: &Path) {
+    said.case("no network", &refused(Model::open("/nowhere/a.onnx")));
+    said.case("the paper's network", &refused(Model::open("paper")));
+    let runtime = Runtime::find().expect("ONNX Runtime is installed");
+    let mut load = |what: &str, bytes: &[u8]| {
+        let path = folder.join("a.onnx");
+        fs::write(&path, bytes).expect("it can be written");
+        let loaded = Network::load(&Model::from_file(&path).expect("it is there"), &runtime, 1);
+        said.case(what, &refused(loaded));
+    };
+    for (what, key, value) in [
+        ("a network without levels", "levels", ""),
+        ("a network of too many levels", "levels", "99"),
+        ("a network of another input", "normalisation", "2"),
+        ("a network of another kind", "kind", "odd"),
+        ("a network without a centre", "window", "4"),
+        ("a network of more levels than its tensors", "levels", "3"),
+    ] {
+        load(what, &onnx::network("features", &[(key, value)]));
+    }
+    let right = onnx::network("features", &[]);
+    load("a network without an input", &replaced(right, b"input", b"other"));
+    load("a network of a flat tensor", &onnx::flat());
+}
+
+/// The same bytes with a word in place of another as long.
+fn replaced(mut bytes: Vec<u8>, word: &[u8], other: &[u8]) -> Vec<u8> {
+    for at in 0..bytes.len() - word.len() {
+        if bytes[at..].starts_with(word) {
+            bytes[at..at + word.len()].copy_from_slice(other);
+        }
+    }
+    bytes
+}
+
+/// The head of a render's file, of a version of the program.
+fn head(version: &str) -> Vec<u8> {
+    let head = json!({"version": version, "scene": "", "arguments": {"width": 2}, "way": null, "plan": {}});
+    serde_json::to_vec(&head).expect("it is JSON")
+}
+
+/// Records, and their end.
+fn sealed(contents: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    contents.iter().for_each(|content| Record::new(content).write(&mut bytes).expect("memory"));
+    records::end(&mut bytes).expect("memory");
+    bytes
+}
+
+fn checkpoints(said: &mut Said, folder: &Path) {
+    let path = folder.join("state");
+    said.case("no checkpoint", &refused(checkpoint::read(&path)));
+    let mut read = |what: &str, bytes: &[u8]| {
+        fs::write(&path, bytes).expect("it can be written");
+        said.case(what, &refused(checkpoint::read(&path)));
+    };
+    read("another file as a checkpoint", b"glTF");
+    read("a damaged checkpoint", &[&checkpoint::MAGIC[..], b"odd"].concat());
+    read("a checkpoint of another version", &[&checkpoint::MAGIC[..], &sealed(&[head("0.0.1")])].concat());
+    let own: Head = serde_json::from_slice(&head("0.1.0")).expect("a head");
+    said.case("a checkpoint of another scene", &refused(checkpoint::check(&path, &own, Some("x"), &json!({}))));
+    let other = json!({"width": 3});
+    said.case("a checkpoint of other options", &refused(checkpoint::check(&path, &own, Some(""), &other)));
+}
+
+fn shards(said: &mut Said, folder: &Path) {
+    let path = folder.join("shard.exr");
+    for (what, version) in [("a shard of another version", "0.0.1"), ("a damaged shard", env!("CARGO_PKG_VERSION"))] {
+        let tail = sealed(&[head(version), vec![1, 2, 3]]);
+        let length = (tail.len() as u64 + 16).to_le_bytes();
+        fs::write(&path, [&tail[..], &length, shard::MARK].concat()).expect("it can be written");
+        said.case(what, &refused(Open::of(&path)));
+    }
+}
+
+fn stages(said: &mut Said) {
+    let stage = Path::new("a.usda");
+    said.case("a converter that says no options", &refused(answer::options(b"odd", stage)));
+    said.case("a converter that fails silently", &[message(&answer::fault(b"", stage))]);
+    said.case("a converter that fails", &[message(&answer::fault(b"Traceback\nKeyError: 'x'\n", stage))]);
+    let fault = br#"{"prim": "/World/Pool", "fault": "it is odd", "hint": "make it even"}"#;
+    said.case("a fault of a stage", &[message(&answer::fault(fault, stage))]);
+}
+
+pub fn said() -> String {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let mut said = Said::default();
+    networks(&mut said, folder);
+    checkpoints(&mut said, folder);
+    shards(&mut said, folder);
+    stages(&mut said);
+    said.0.replace(&folder.display().to_string(), "DIR")
+}
+
+#[test]
+fn about_what_a_render_leaves() {
+    let said = said();
+    assert_eq!(super::silent(&said), [] as [&str; 0], "cases of which nothing is said");
+    insta::assert_snapshot!("state", said);
+}

@@ -1,0 +1,190 @@
+//! Every reader of files that come from anywhere, called with the bytes of one file as the program calls it. What is
+//! fuzzed (`fuzz/`) and what replays the corpus that was kept of it call the same functions.
+
+use super::promises;
+use caustique::combine::network::Network;
+use caustique::combine::{Model, Runtime};
+use caustique::error::Result;
+use caustique::film::Naming;
+use caustique::image::exr;
+use caustique::pipeline::merge::{Order, Shards};
+use caustique::pipeline::{checkpoint, records, shard};
+use caustique::scene::description::EnvironmentSource;
+use caustique::scene::gltf::{self, ReadOptions};
+use caustique::scene::{Scene, environment_file, usd};
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+/// A reader: what it is called, and what reads the bytes of a file; other files lie in the folder, which is its own.
+pub type Reader = (&'static str, fn(&[u8], &Path));
+
+/// All of them.
+pub const READERS: [Reader; 13] = [
+    ("glb", glb),
+    ("scene", scene),
+    ("gltf", gltf),
+    ("png", texture),
+    ("jpeg", texture),
+    ("exr", picture),
+    ("exr_environment", environment),
+    ("hdr", environment),
+    ("checkpoint", checkpoint),
+    ("shard", shard),
+    ("model", model),
+    ("usd_options", usd_options),
+    ("usd_fault", usd_fault),
+];
+
+/// An error says what it is of.
+fn told<T>(outcome: Result<T>) -> Option<T> {
+    outcome.inspect_err(|error| assert!(!error.cause.is_empty() && !error.place.is_empty(), "{error:?}")).ok()
+}
+
+/// Puts bytes into a file.
+fn file(folder: &Path, name: &str, bytes: &[u8]) -> std::path::PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, bytes).expect("the folder takes files");
+    path
+}
+
+/// Scene files, binary or not.
+fn glb(bytes: &[u8], _: &Path) {
+    if let Some(scene) = told(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default())) {
+        promises::check(&scene, "what was read");
+    }
+}
+
+/// Scene files, and the scenes that are built of them.
+fn scene(bytes: &[u8], _: &Path) {
+    if let Some(scene) = told(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default())) {
+        told(Scene::build(scene, 1));
+    }
+}
+
+/// A scene in JSON and, behind a zero, what lies beside it as `a.bin`, `a.png`, `a.jpg`, `a.hdr` and `a.exr`.
+fn gltf(bytes: &[u8], folder: &Path) {
+    let (json, beside) = match bytes.iter().position(|byte| *byte == 0) {
+        Some(at) => (&bytes[..at], &bytes[at + 1..]),
+        None => (bytes, &[][..]),
+    };
+    for name in ["a.bin", "a.png", "a.jpg", "a.hdr", "a.exr"] {
+        file(folder, name, beside);
+    }
+    let path = file(folder, "fuzz.gltf", json);
+    if let Some(scene) = told(gltf::read(&path, &ReadOptions::default())) {
+        promises::check(&scene, "what was read");
+    }
+}
+
+/// A texture, as colours, as numbers and as glossiness.
+fn texture(bytes: &[u8], _: &Path) {
+    let texture = serde_json::json!({"index": 0});
+    let document = serde_json::json!({
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"normalTexture": texture, "emissiveTexture": texture, "extensions":
+            {"KHR_materials_pbrSpecularGlossiness": {"specularGlossinessTexture": texture}}}],
+        "textures": [{"source": 0}], "images": [{"bufferView": 0}],
+        "accessors": [{"componentType": 5126, "type": "VEC3", "count": 3, "bufferView": 1}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 36, "byteLength": bytes.len()}, {"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36 + bytes.len()}],
+    });
+    let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let scene = gltf::read_bytes(
+        &packed(&document, &[corners.as_flattened(), bytes].concat()),
+        Path::new("fuzz.glb"),
+        &ReadOptions::default(),
+    );
+    if let Some(scene) = told(scene) {
+        promises::check(&scene, "what was read");
+        assert!(scene.textures.iter().all(|texture| texture.mean().is_finite()), "texels");
+    }
+}
+
+/// A `.glb` of a document and its bytes.
+fn packed(document: &serde_json::Value, binary: &[u8]) -> Vec<u8> {
+    let mut json = document.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let total = 28 + json.len() + binary.len();
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let head = [word(0x4654_6c67), word(2), word(total), word(json.len()), word(0x4e4f_534a)];
+    let mut bytes = head.as_flattened().to_vec();
+    bytes.extend(&json);
+    bytes.extend([word(binary.len()), word(0x004e_4942)].as_flattened());
+    bytes.extend(binary);
+    bytes
+}
+
+/// A picture, as `info`, `compare` and `combine` read it.
+fn picture(bytes: &[u8], folder: &Path) {
+    if let Some((layers, attributes)) = told(exr::read(&file(folder, "fuzz.exr", bytes))) {
+        let pixels = layers.width * layers.height;
+        assert!(layers.layers.iter().flat_map(|layer| &layer.planes).all(|plane| plane.values.len() == pixels));
+        attributes.object();
+    }
+}
+
+/// An image of an environment.
+fn environment(bytes: &[u8], folder: &Path) {
+    let read = environment_file::read(&file(folder, "fuzz.sky", bytes), &mut Vec::new());
+    if let Some(EnvironmentSource::Image { width, height, texels }) = told(read) {
+        assert_eq!(texels.len(), width as usize * height as usize);
+        assert!(texels.iter().flatten().all(|x| x.is_finite() && *x >= 0.0));
+    }
+}
+
+/// Contents of records: the first two up to a zero and by a length of two bytes, the third is the rest. Their hashes are
+/// put right, which else would let nothing through.
+fn sealed(bytes: &[u8]) -> Vec<u8> {
+    let head = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    let rest = bytes.get(head + 1..).unwrap_or_default();
+    let length = rest.get(..2).map_or(0, |two| usize::from(two[0]) | usize::from(two[1]) << 8);
+    let rest = rest.get(2..).unwrap_or_default();
+    let (state, pixels) = rest.split_at(length.min(rest.len()));
+    let mut out = Vec::new();
+    for content in [&bytes[..head], state, pixels] {
+        records::Record::new(content).write(&mut out).expect("memory");
+    }
+    records::end(&mut out).expect("memory");
+    out
+}
+
+/// A checkpoint as it is, or the contents of its records.
+fn checkpoint(bytes: &[u8], folder: &Path) {
+    let whole = bytes.starts_with(checkpoint::MAGIC);
+    let bytes = if whole { bytes.to_vec() } else { [&checkpoint::MAGIC[..], &sealed(bytes)].concat() };
+    told(checkpoint::read(&file(folder, "fuzz.checkpoint", &bytes)));
+}
+
+/// A shard as it is, or the contents of the records behind its picture; merged alone.
+fn shard(bytes: &[u8], folder: &Path) {
+    let mut bytes = if bytes.ends_with(shard::MARK) { bytes.to_vec() } else { sealed(bytes) };
+    if !bytes.ends_with(shard::MARK) {
+        let length = bytes.len() as u64 + 16;
+        bytes.write_all(&length.to_le_bytes()).and_then(|()| bytes.write_all(shard::MARK)).expect("memory");
+    }
+    let order = Order { finish: None, layers: "all".into(), naming: Naming::Plain, reproducible: true };
+    if let Some(shards) = told(Shards::open(&[file(folder, "fuzz.exr", &bytes)], true)) {
+        shards.warnings();
+        told(shards.merge(&order, |_| {}));
+    }
+}
+
+/// A network.
+fn model(bytes: &[u8], folder: &Path) {
+    let runtime = Runtime::find().expect("ONNX Runtime is installed");
+    let model = Model::from_file(&file(folder, "fuzz.onnx", bytes)).expect("it can be read");
+    told(Network::load(&model, &runtime, 1));
+}
+
+/// What the converter of stages says of options.
+fn usd_options(bytes: &[u8], _: &Path) {
+    told(usd::answer::options(bytes, Path::new("fuzz.usda")));
+}
+
+/// What the converter of stages says when it fails.
+fn usd_fault(bytes: &[u8], _: &Path) {
+    told::<()>(Err(usd::answer::fault(bytes, Path::new("fuzz.usda"))));
+}
