@@ -2,6 +2,7 @@
 
 use crate::{Folder, Outcome, values};
 use caustique::image::exr;
+use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
@@ -28,6 +29,37 @@ fn no_limit_of_memory_aborts() {
         codes.push(outcome.code);
     }
     assert!(codes[0] == Some(1) && codes[codes.len() - 1] == Some(0), "{codes:?}");
+}
+
+/// A file that is named by many buffers, and an image that is shown by many textures, are counted as often as they are
+/// read.
+#[test]
+fn what_a_scene_names_many_times_is_counted() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("big.bin"), vec![0; 1 << 20]).expect("it can be written");
+    image::RgbImage::new(1024, 1024).save(folder.path("big.png")).expect("it can be written");
+    let asset = json!({"version": "2.0"});
+    let buffers = json!({"asset": asset, "buffers": vec![json!({"uri": "big.bin", "byteLength": 1}); 4000]});
+    let each = |part: &dyn Fn(usize) -> Value| (0..400).map(part).collect::<Vec<Value>>();
+    let textures = json!({
+        "asset": asset, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "images": each(&|_| json!({"uri": "big.png"})), "textures": each(&|i| json!({"source": i})),
+        "materials": each(&|i| json!({"emissiveTexture": {"index": i}})),
+        "meshes": [{"primitives": each(&|i| json!({"attributes": {"POSITION": 0}, "material": i}))}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+    });
+    for (scene, said, hint) in [
+        (buffers, "files that the scene names need about ", "name each file once, or render with more memory"),
+        (textures, " need about ", "save the image smaller, or render with more memory"),
+    ] {
+        std::fs::write(folder.path("many.gltf"), scene.to_string()).expect("it can be written");
+        let outcome = limited(&folder, "ulimit -v 1500000", "plan many.gltf");
+        assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+        assert!(outcome.stderr.ends_with(&format!("\nhint: {hint}\n")), "{}", outcome.stderr);
+    }
 }
 
 /// A cap on memory has its price told: fewer light paths, less of a map; and what cannot be is refused.

@@ -363,6 +363,26 @@ fn nodes_that_are_no_tree() {
     );
 }
 
+/// Joints at the end of a long chain take as long as the chain, not as the chain times their number.
+#[test]
+fn deep_skeletons() {
+    let mut file = pool();
+    let (which, weights) = (file.floats(&[[0.0; 4]; 4]), file.floats(&[[1.0, 0.0, 0.0, 0.0]; 4]));
+    file.json["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = json!(which);
+    file.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+    file.json["nodes"][0]["skin"] = json!(0);
+    let depth = 30_000;
+    for i in 1..=depth {
+        let below = if i < depth { json!([i + 1]) } else { json!(null) };
+        file.push("nodes", json!({"translation": [0, 1, 0], "children": below}));
+    }
+    file.push("skins", json!({"joints": vec![depth; 30_000]}));
+    let start = std::time::Instant::now();
+    let scene = try_read(&file).unwrap();
+    assert_eq!(scene.instances[0].to_world.translation.y, f64::from(depth));
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
 #[test]
 fn extensions_that_are_not_known() {
     assert_eq!(

@@ -2,6 +2,7 @@
 
 use super::glb::Glb;
 use super::message;
+use caustique::pipeline::checkpoint;
 use caustique::scene::gltf::{ReadOptions, read_bytes};
 use serde_json::json;
 use std::path::Path;
@@ -105,6 +106,27 @@ fn addresses_are_not_opened() {
         let told = reading(folder, part, "%252e%252e/a", false).expect_err("it is not there");
         assert!(told.contains("2e/a") && told.contains("No such file") && told.contains("hint: "), "{told}");
     }
+}
+
+/// The hash by which a checkpoint knows its scene follows names as the reader does: decoded, and not outside.
+#[test]
+fn hashes_are_of_the_files_in_the_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::create_dir(folder.join("scene")).expect("a folder");
+    let scene = folder.join("scene/a.gltf");
+    let document = json!({"buffers": [{"uri": "a%20b.bin"}, {"uri": "../c.bin"}]});
+    std::fs::write(&scene, document.to_string()).expect("it can be written");
+    let hash = |place: &str, bytes: &str, allow_outside: bool| {
+        std::fs::write(folder.join(place), bytes).expect("it can be written");
+        checkpoint::hash(&scene, None, allow_outside).expect("it can be read")
+    };
+    let first = hash("scene/a b.bin", "1", false);
+    assert!(first.is_some());
+    assert_ne!(hash("scene/a b.bin", "2", false), first);
+    assert_eq!(hash("scene/a b.bin", "1", false), first);
+    assert_eq!(hash("c.bin", "1", false), first);
+    assert_ne!(hash("c.bin", "2", true), hash("c.bin", "1", true));
 }
 
 fn png() -> Vec<u8> {

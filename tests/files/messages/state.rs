@@ -8,6 +8,7 @@ use caustique::error::Result;
 use caustique::pipeline::checkpoint::{self, Head};
 use caustique::pipeline::records::{self, Record};
 use caustique::pipeline::shard::{self, Open};
+use caustique::render::{MAX_SHARDS, Shard};
 use caustique::scene::usd::answer;
 use serde_json::json;
 use std::fs;
@@ -117,4 +118,12 @@ fn about_what_a_render_leaves() {
     let said = said();
     assert_eq!(super::silent(&said), [] as [&str; 0], "cases of which nothing is said");
     insta::assert_snapshot!("state", said);
+}
+
+/// A file can tell of shards that cannot be, whose numbers would be counted up to or divided by.
+#[test]
+fn shards_that_cannot_be() {
+    let is_sound = |index, count| Shard { index, count }.is_sound();
+    assert!(is_sound(0, 1) && is_sound(MAX_SHARDS - 1, MAX_SHARDS));
+    assert!(!is_sound(0, 0) && !is_sound(1, 1) && !is_sound(0, MAX_SHARDS + 1) && !is_sound(0, u64::MAX));
 }
