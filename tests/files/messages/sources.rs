@@ -32,6 +32,7 @@ const UNSAID: [(&str, &[&str]); 5] = [
             "name each file once, or render with more memory",
             "its texels",
             "its pixels",
+            "meshes on nodes whose scale is zero along an axis",
         ],
     ),
     (
@@ -43,6 +44,10 @@ const UNSAID: [(&str, &[&str]); 5] = [
             "the display window has no pixels",
             "part index",
             "the file is deep",
+            "the file has subsampled channels",
+            "the file ends too early",
+            "copy or render it again; it is not whole",
+            "no part",
             "the output is missing",
             "the output has shape {shape:?} instead of {expected:?}",
         ],
@@ -52,7 +57,7 @@ const UNSAID: [(&str, &[&str]); 5] = [
         &["it cannot be decoded: the decoder failed", "the decoder failed", "the file contradicts itself"],
     ),
     ("no mesh has a rim of one edge", &["edge has one face only"]),
-    ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 2n", "not said"]),
+    ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 2n", "not said", "default material"]),
 ];
 
 /// The files of the loaders.
