@@ -126,7 +126,9 @@ fn is_said(text: &str, line: &str) -> bool {
 
 /// Messages of a source that are nowhere said.
 fn unsaid(source: &str, said: &str) -> Vec<String> {
-    let missing = |text: &String| is_message(text) && !said.lines().any(|line| is_said(text, line));
+    // Titles of cases are no messages.
+    let lines: Vec<&str> = said.lines().filter(|line| !line.starts_with("# ")).collect();
+    let missing = |text: &String| is_message(text) && !lines.iter().any(|line| is_said(text, line));
     texts(source).into_iter().filter(missing).collect()
 }
 
