@@ -186,5 +186,5 @@ fn usd_options(bytes: &[u8], _: &Path) {
 
 /// What the converter of stages says when it fails.
 fn usd_fault(bytes: &[u8], _: &Path) {
-    told::<()>(Err(usd::answer::fault(bytes, Path::new("fuzz.usda"))));
+    told::<()>(Err(usd::answer::failure(bytes, Path::new("fuzz.usda"))));
 }

@@ -23,7 +23,7 @@ pub fn options(printed: &[u8], stage: &Path) -> Result<Vec<String>> {
 }
 
 /// The error that a converter that failed has told about a stage.
-pub fn fault(told: &[u8], stage: &Path) -> Error {
+pub fn failure(told: &[u8], stage: &Path) -> Error {
     let told = String::from_utf8_lossy(told);
     let fault = told.lines().rev().find_map(|line| serde_json::from_str::<Fault>(line).ok());
     let Some(Fault { prim, fault, hint }) = fault else {

@@ -109,6 +109,6 @@ impl<'p> Converter<'p> {
         if output.status.success() {
             return Ok(output);
         }
-        Err(answer::fault(&output.stderr, self.stage))
+        Err(answer::failure(&output.stderr, self.stage))
     }
 }

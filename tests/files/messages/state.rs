@@ -96,10 +96,10 @@ fn shards(said: &mut Said, folder: &Path) {
 fn stages(said: &mut Said) {
     let stage = Path::new("a.usda");
     said.case("a converter that says no options", &refused(answer::options(b"odd", stage)));
-    said.case("a converter that fails silently", &[message(&answer::fault(b"", stage))]);
-    said.case("a converter that fails", &[message(&answer::fault(b"Traceback\nKeyError: 'x'\n", stage))]);
+    said.case("a converter that fails silently", &[message(&answer::failure(b"", stage))]);
+    said.case("a converter that fails", &[message(&answer::failure(b"Traceback\nKeyError: 'x'\n", stage))]);
     let fault = br#"{"prim": "/World/Pool", "fault": "it is odd", "hint": "make it even"}"#;
-    said.case("a fault of a stage", &[message(&answer::fault(fault, stage))]);
+    said.case("a fault of a stage", &[message(&answer::failure(fault, stage))]);
 }
 
 pub fn said() -> String {
