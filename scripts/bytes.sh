@@ -20,7 +20,7 @@ one() { # SCENE METHOD OPTIONS...
 }
 
 for scene in scenes/*.glb; do
-    for method in path light bdpt pm ppm sppm appm cppm bpm vcm; do
+    for method in path light bdpt pm ppm sppm appm cppm bpm vcm mlt; do
         one "$scene" "$method" --no-combine
     done
     printf '%s  %s plan\n' "$("$program" plan "$scene" --json 2>/dev/null | sha256sum | cut -c1-16)" "$scene"

@@ -19,7 +19,7 @@ from record import ROOT, record
 
 OUT = ROOT / "out" / "kills"
 SCENE = ROOT / "scenes" / "cornell.glb"
-ALL = "path,light,bdpt,pm,ppm,sppm,appm,cppm,bpm,vcm,auto"
+ALL = "path,light,bdpt,pm,ppm,sppm,appm,cppm,bpm,vcm,mlt,auto"
 # Methods whose light paths are not as many as the pixels unless told so.
 PHOTONS = ("pm", "ppm", "sppm", "appm", "cppm")
 METHODS = os.environ.get("METHODS", ALL).split(",")

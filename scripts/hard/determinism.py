@@ -5,8 +5,8 @@ from answers import Resumed, Shards, Threads
 from case import Case
 
 TITLE = "Determinism"
-ALL = ("path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm")
-DIVIDED = ("path", "bdpt", "sppm", "vcm")
+ALL = ("path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "mlt")
+DIVIDED = ("path", "bdpt", "sppm", "vcm", "mlt")
 SCENE = {"scene": magnitude.room}
 
 CASES = [

@@ -5,7 +5,7 @@ mod rgb;
 pub mod warp;
 
 pub use frame::{Frame, orthonormal_basis};
-pub use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Mat3A, Vec2, Vec3, Vec3A, Vec4};
+pub use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Mat3A, UVec2, Vec2, Vec3, Vec3A, Vec4};
 pub use rgb::{Rgb, is_lit, luminance};
 
 /// `x * x`.

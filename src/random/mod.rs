@@ -9,8 +9,10 @@
 //! and passes take its points one after the other. Passes are then not independent any more. What tells variances
 //! takes [`QUARTERS`] of them, whose sequences are.
 
+mod chain;
 mod sobol;
 
+pub use chain::Chain;
 pub use sobol::{SobolPair, owen_sobol};
 
 use glam::Vec2;
@@ -95,6 +97,10 @@ pub enum Purpose {
     BorderTurn = 25,
     /// Which of the pixels that see a point of the film a light path goes to (2D).
     Splat = 26,
+    /// Where on the film a Markov chain's path starts (2D).
+    Film = 27,
+    /// How such a path is divided among the two walks.
+    Division = 28,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.
@@ -150,7 +156,7 @@ impl Streams {
     pub fn new(seed: u64, pass: u64, domain: Domain) -> Streams {
         let key = mix(seed.wrapping_add(GOLDEN));
         let key = mix(key ^ pass.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
-        Streams(Stream { key, reversed: 0, vertices: 0 })
+        Streams(Stream { key, reversed: 0, vertices: 0, chained: false })
     }
 
     /// The same with the first vertices of every path drawn from sequences, of which pass `pass` takes one point.
@@ -160,7 +166,7 @@ impl Streams {
         let group = (index >> 32) * QUARTERS + quarter(pass);
         let key = mix(mix(seed.wrapping_add(GOLDEN)) ^ 0x2545_f491_4f6c_dd1d);
         let key = mix(key ^ group.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
-        Streams(Stream { key, reversed: (index as u32).reverse_bits(), vertices: VERTICES })
+        Streams(Stream { key, reversed: (index as u32).reverse_bits(), vertices: VERTICES, chained: false })
     }
 
     /// Those of path `index`.
@@ -179,6 +185,8 @@ pub struct Stream {
     reversed: u32,
     /// Vertices whose draws are points of sequences.
     vertices: u32,
+    /// Its draws are the coordinates of a Markov chain.
+    chained: bool,
 }
 
 impl Stream {
@@ -188,15 +196,33 @@ impl Stream {
         Streams::new(seed, pass, domain).path(index)
     }
 
+    /// The same with draws that are the coordinates of the Markov chain at work on this thread, and start as they are.
+    #[must_use]
+    pub fn chained(self) -> Stream {
+        Stream { chained: true, ..self }
+    }
+
     /// The draws at vertex `vertex` of the path (0 is the endpoint the path starts from).
     #[inline]
     pub fn vertex(self, vertex: u32) -> Draws {
         Draws {
             key: mix(self.key ^ (u64::from(vertex) + 1).wrapping_mul(0xd1b5_4a32_d192_ed03)),
             reversed: self.reversed,
-            in_sequence: vertex < self.vertices,
+            source: match vertex < self.vertices {
+                _ if self.chained => Source::Chain,
+                true => Source::Sequence,
+                false => Source::Hash,
+            },
         }
     }
+}
+
+/// Where draws come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Source {
+    Hash,
+    Sequence,
+    Chain,
 }
 
 /// The draws at one vertex of a path.
@@ -205,7 +231,7 @@ pub struct Draws {
     /// Of a stream in sequences, the key of all passes of a group.
     key: u64,
     reversed: u32,
-    in_sequence: bool,
+    source: Source,
 }
 
 impl Draws {
@@ -221,9 +247,31 @@ impl Draws {
         self.key.wrapping_add((purpose as u64).wrapping_mul(GOLDEN))
     }
 
-    /// 64 random bits for `purpose`: a hash.
+    /// The coordinates of a chain.
+    #[cold]
+    #[inline(never)]
+    fn chained(self, purpose: Purpose) -> Vec2 {
+        let bits = self.hash(purpose);
+        Chain::draw_here(self.id(purpose), Vec2::new(unit((bits >> 32) as u32), unit(bits as u32)))
+    }
+
+    /// What tells the coordinates of a chain apart.
+    pub fn id(self, purpose: Purpose) -> u64 {
+        mix(self.key_of(purpose))
+    }
+
+    /// 64 random bits for `purpose`.
     #[inline]
     pub fn bits(self, purpose: Purpose) -> u64 {
+        if self.source == Source::Chain {
+            let u = self.chained(purpose);
+            return mix(u64::from(u.x.to_bits()) << 32 | u64::from(u.y.to_bits()));
+        }
+        self.hash(purpose)
+    }
+
+    #[inline]
+    fn hash(self, purpose: Purpose) -> u64 {
         mix(self.key_of(purpose).wrapping_add(u64::from(self.reversed).wrapping_mul(0x9fb2_1c65_1e98_df25)))
     }
 
@@ -235,28 +283,34 @@ impl Draws {
     /// Uniform on `[0, 1)`.
     #[inline]
     pub fn one(self, purpose: Purpose) -> f32 {
-        if self.in_sequence {
-            self.pair(purpose).first_reversed(self.reversed)
-        } else {
-            unit((self.bits(purpose) >> 32) as u32)
+        match self.source {
+            Source::Sequence => self.pair(purpose).first_reversed(self.reversed),
+            Source::Hash => unit((self.hash(purpose) >> 32) as u32),
+            Source::Chain => self.chained(purpose).x,
         }
     }
 
     /// The number of [`Draws::one`] with all of its 32 bits: to choose among more than 2^24.
     #[inline]
     pub fn one_fine(self, purpose: Purpose) -> f64 {
-        let hash = || (self.bits(purpose) >> 32) as u32;
-        fine(if self.in_sequence { self.pair(purpose).first_bits(self.reversed) } else { hash() })
+        match self.source {
+            Source::Sequence => fine(self.pair(purpose).first_bits(self.reversed)),
+            Source::Hash => fine((self.hash(purpose) >> 32) as u32),
+            Source::Chain => f64::from(self.chained(purpose).x),
+        }
     }
 
     /// Uniform on `[0, 1)^2`.
     #[inline]
     pub fn two(self, purpose: Purpose) -> Vec2 {
-        if self.in_sequence {
-            return self.pair(purpose).point_reversed(self.reversed);
+        match self.source {
+            Source::Sequence => self.pair(purpose).point_reversed(self.reversed),
+            Source::Hash => {
+                let bits = self.hash(purpose);
+                Vec2::new(unit((bits >> 32) as u32), unit(bits as u32))
+            }
+            Source::Chain => self.chained(purpose),
         }
-        let bits = self.bits(purpose);
-        Vec2::new(unit((bits >> 32) as u32), unit(bits as u32))
     }
 
     /// 32 random bits, the token of a ray's alpha decisions: a hash.

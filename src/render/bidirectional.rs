@@ -93,6 +93,7 @@ impl<'a> Passes<'a> {
             strategies,
             light_paths: pixels,
             merged_paths: pixels * pairs.len() as f32,
+            only: None,
         });
         let guided = settings.guided && shared.is_some();
         let guide = guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);

@@ -4,6 +4,7 @@ use super::bidirectional::Passes;
 use super::counting::Counting;
 use super::iterate::Iterate;
 use super::method::Method;
+use super::metropolis::Metropolis;
 use super::pm::Pm;
 use super::settings::{KernelChoice, RadiusRule, Settings};
 use super::sppm::Sppm;
@@ -32,6 +33,7 @@ pub(super) fn passes<'a>(
         Method::Path | Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm => {
             Box::new(Passes::new(scene, camera, settings, surroundings))
         }
+        Method::Mlt => Box::new(Metropolis::new(scene, camera, settings, surroundings)),
     }
 }
 

@@ -41,6 +41,8 @@ pub enum Method {
     Bpm,
     /// Vertex connection and merging.
     Vcm,
+    /// Multiplexed Metropolis light transport.
+    Mlt,
 }
 
 impl Method {
@@ -57,6 +59,7 @@ impl Method {
             Method::Cppm => "cppm",
             Method::Bpm => "bpm",
             Method::Vcm => "vcm",
+            Method::Mlt => "mlt",
         }
     }
 
@@ -65,7 +68,7 @@ impl Method {
         match self {
             Method::Path => Search::EyePaths,
             Method::Light => Search::LightPaths,
-            Method::Bdpt => Search::Connections,
+            Method::Bdpt | Method::Mlt => Search::Connections,
             Method::Pm => Search::Map,
             Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => Search::Photons,
             Method::Bpm => Search::Merging,
@@ -79,7 +82,7 @@ impl Method {
             Method::Path | Method::Pm => None,
             Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => None,
             Method::Light => Some(Strategies::LIGHT),
-            Method::Bdpt => Some(Strategies::BDPT),
+            Method::Bdpt | Method::Mlt => Some(Strategies::BDPT),
             Method::Bpm => Some(Strategies::BPM),
             Method::Vcm => Some(Strategies::vcm(camera.connects())),
         }
@@ -87,7 +90,7 @@ impl Method {
 
     /// Whether it weighs sampling techniques against each other path by path, or has but one.
     pub fn has_techniques(self) -> bool {
-        !self.counts_photons()
+        !self.counts_photons() && self != Method::Mlt
     }
 
     /// Whether its bandwidths are several levels.

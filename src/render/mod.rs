@@ -17,6 +17,7 @@ mod guiding;
 mod iterate;
 mod joined;
 mod method;
+mod metropolis;
 pub mod output;
 mod pm;
 mod region;

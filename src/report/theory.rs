@@ -19,7 +19,7 @@ pub struct Theory {
 pub fn theory(settings: &Settings) -> Option<Theory> {
     let kernel = -settings.alpha.min(2.0 - 2.0 * settings.alpha);
     let (exponent, because) = match settings.method {
-        Method::Path | Method::Light | Method::Bdpt => (-1.0, "unbiased: variance alone, N^−1"),
+        Method::Path | Method::Light | Method::Bdpt | Method::Mlt => (-1.0, "unbiased: variance alone, N^−1"),
         Method::Sppm | Method::Bpm => (kernel, "the slower of variance N^−α and squared bias N^(2α − 2)"),
         Method::Vcm => (kernel, "of what is merged; where connections do, N^−1"),
         Method::Pm => (0.0, "one map: its error stays"),

@@ -78,9 +78,83 @@ pub struct Bidirectional<'a> {
     pub light_paths: f32,
     /// Light paths of a pass whose photons are merged.
     pub merged_paths: f32,
+    /// What alone is looked for, if not all that the two walks find.
+    pub only: Option<Division>,
+}
+
+/// How a path of `segments` is divided among the two walks: the eye's goes as far as its vertex at depth `eye`, the
+/// light's to the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Division {
+    /// Segments of the path.
+    pub segments: u32,
+    /// 0 is the camera, to which a light vertex is connected; `segments` the light, which an eye path runs into.
+    pub eye: u32,
+}
+
+impl Division {
+    /// That of a path found by connecting.
+    pub fn of(technique: Technique) -> Option<Division> {
+        let (segments, eye) = match technique {
+            Technique::Hit { eye } => (eye, eye),
+            Technique::NextEvent { eye } => (eye + 1, eye),
+            Technique::Connect { light, eye } => (light + eye + 1, eye),
+            Technique::Camera { light } => (light + 1, 0),
+            Technique::Merge { .. } => return None,
+        };
+        Some(Division { segments, eye })
+    }
+
+    /// Depth of the light walk's last vertex, 0 being the light; `None` where the eye path runs into that.
+    #[inline]
+    pub fn light(self) -> Option<u32> {
+        self.segments.checked_sub(self.eye + 1)
+    }
 }
 
 impl Bidirectional<'_> {
+    /// Whether an eye path that runs into a light with segment number `depth` tells of it.
+    #[inline]
+    pub(super) fn hits_at(&self, depth: u32) -> bool {
+        self.only.is_none_or(|only| only.eye == depth && only.segments == depth)
+    }
+
+    /// Whether an eye path's vertex at `depth` is connected.
+    #[inline]
+    pub(super) fn connects_eye(&self, depth: u32) -> bool {
+        self.only.is_none_or(|only| only.eye == depth && only.segments > depth)
+    }
+
+    /// Whether it is connected to a light itself.
+    #[inline]
+    pub(super) fn next_event(&self) -> bool {
+        self.only.is_none_or(|only| only.light() == Some(0))
+    }
+
+    /// Whether a light path's vertex at `depth` is connected.
+    #[inline]
+    pub(super) fn connects_light(&self, depth: u32) -> bool {
+        self.only.is_none_or(|only| only.light() == Some(depth))
+    }
+
+    /// Whether a light path's vertex is connected to the camera.
+    #[inline]
+    pub(super) fn connects_camera(&self) -> bool {
+        self.only.is_none_or(|only| only.eye == 0)
+    }
+
+    /// Whether an eye path has an end at `depth`.
+    #[inline]
+    pub(super) fn ends_eye(&self, depth: u32) -> bool {
+        self.only.is_some_and(|only| only.eye <= depth)
+    }
+
+    /// Whether a light path has an end at `depth`.
+    #[inline]
+    pub(super) fn ends_light(&self, depth: u32) -> bool {
+        self.only.is_some_and(|only| only.light().is_none_or(|light| light <= depth))
+    }
+
     /// Number of pixels.
     #[inline]
     pub fn pixels(&self) -> f32 {

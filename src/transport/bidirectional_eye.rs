@@ -96,7 +96,7 @@ impl<R: Record> EyeWalk<'_, R> {
     #[inline]
     fn run_into(&mut self, (value, group): (Rgb, Group), depth: u32, at: Vec3, density: &EmissionDensity) {
         let class = self.trail.sight.lit(false);
-        if !self.shared.eye.classes.has(class) {
+        if !self.shared.hits_at(self.depth) || !self.shared.eye.classes.has(class) {
             return;
         }
         let ratios = if self.trail.delta {
@@ -201,7 +201,12 @@ impl<R: Record> EyeWalk<'_, R> {
     /// Next-event estimation and connections.
     #[inline]
     fn connect_all(&mut self, vertex: &impl ScatterPoint) {
-        self.next_event(vertex);
+        if !self.shared.connects_eye(vertex.depth()) {
+            return;
+        }
+        if self.shared.next_event() {
+            self.next_event(vertex);
+        }
         let longest = self.shared.eye.max_depth - vertex.depth();
         for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {
             self.connect(vertex, light);
@@ -246,7 +251,8 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
             }
         }
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
-        if !self.trail.leads(eye.classes) {
+        // One that is to run into a light has its end there.
+        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) {
             return Next::Stop;
         }
         self.last = vertex.receiver();
@@ -289,7 +295,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
             self.connect_all(vertex);
         }
         self.trail.leave(None);
-        if !self.trail.leads(eye.classes) {
+        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) {
             return Next::Stop;
         }
         self.last = vertex.receiver();

@@ -2,7 +2,7 @@
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::eye::EyeMeasure;
-use super::light::LightPass;
+use super::light::{Emitted, LightPass};
 use super::light_vertex::{LightVertex, Scatterer};
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
@@ -160,7 +160,8 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
             let flux = vertex.throughput / *merged_paths;
             self.left.photons.push(MergePhoton::new(vertex, flux, (self.beam, self.group), &self.mis));
         }
-        if lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
+        let connected = self.shared.connects_light(vertex.depth);
+        if connected && lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Surface(*vertex.surface, *vertex.shading),
@@ -173,11 +174,14 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     group: self.group,
                 });
             }
-            if strategies.camera && !eye.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera {
+            if strategies.camera
+                && self.shared.connects_camera()
+                && !eye.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera
+            {
                 self.connect_camera(vertex);
             }
         }
-        Next::Continue(LobeSet::ALL)
+        if self.shared.ends_light(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
     }
 
     #[inline]
@@ -185,7 +189,8 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         let Bidirectional { eye, strategies, .. } = self.shared;
         self.arrive(&vertex.receiver(), vertex.met.distance, 1.0, vertex.flight, scattered);
         self.lobes = None;
-        if !self.photons_only && vertex.depth < eye.max_depth {
+        let connected = self.shared.connects_light(vertex.depth);
+        if connected && !self.photons_only && vertex.depth < eye.max_depth {
             if strategies.connect {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Medium(vertex.met.p, vertex.phase()),
@@ -198,11 +203,11 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     group: self.group,
                 });
             }
-            if strategies.camera {
+            if strategies.camera && self.shared.connects_camera() {
                 self.connect_camera(vertex);
             }
         }
-        Next::Continue(LobeSet::ALL)
+        if self.shared.ends_light(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
     }
 
     #[inline]
@@ -245,8 +250,22 @@ impl<'s> Bidirectional<'s> {
         left: &mut Deposits,
         record: &mut R,
     ) {
+        let Some(emitted) = pass.emit(self.eye.scene, self.surroundings, index) else { return };
+        self.light_path_of(pass, &emitted, photons_only, vertices, left, record);
+    }
+
+    /// The same of a light path that begins so.
+    #[inline]
+    pub fn light_path_of<R: Record>(
+        &self,
+        pass: &LightPass,
+        emitted: &Emitted,
+        photons_only: bool,
+        vertices: &mut LightVertices<'s>,
+        left: &mut Deposits,
+        record: &mut R,
+    ) {
         let eye = &self.eye;
-        let Some(emitted) = pass.emit(eye.scene, self.surroundings, index) else { return };
         let arena = vertices.bump();
         let mut start = emitted.start;
         start.throughput *= pass.paths() as f32;

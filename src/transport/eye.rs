@@ -33,7 +33,7 @@ use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::camera::{Camera, GROUP, Place};
 use crate::light::{EmissionDensity, Receiver};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::Flight;
 use crate::photon::{ByKind, Kernel, Kind, Near, Photon, PhotonMap, PhotonMaps, VolumePhoton};
 use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
@@ -506,8 +506,14 @@ impl Eye<'_> {
     /// The first ray of an eye path through a uniform point of pixel `(x, y)`.
     #[inline]
     pub fn start(&self, pixel: (u32, u32), stream: Stream) -> PathStart {
+        self.start_at(pixel, stream.vertex(0).two(Purpose::Pixel), stream)
+    }
+
+    /// The same through the point of the pixel that `within`, uniform on the unit square, draws.
+    #[inline]
+    pub fn start_at(&self, pixel: (u32, u32), within: Vec2, stream: Stream) -> PathStart {
         let draws = stream.vertex(0);
-        let film = self.camera.film(pixel, draws.two(Purpose::Pixel));
+        let film = self.camera.film(pixel, within);
         let ray = self.camera.ray(film, draws.two(Purpose::Lens));
         PathStart {
             origin: ray.origin,

@@ -7,7 +7,7 @@ use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
-use crate::math::{DVec3, Rgb, Vec2};
+use crate::math::{DVec2, DVec3, Rgb, Vec2};
 use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
@@ -109,8 +109,9 @@ impl<'a> LightPass<'a> {
         self.hue_of(self.stream(u64::from(index)))
     }
 
+    /// The hue of a path with these draws.
     #[inline]
-    fn hue_of(&self, stream: Stream) -> WavelengthSample {
+    pub fn hue_of(&self, stream: Stream) -> WavelengthSample {
         let hue = WavelengthSample::new(stream.vertex(0).one(Purpose::Wavelength));
         self.comb.map_or(hue, |comb| comb.nearest(hue))
     }
@@ -128,8 +129,27 @@ impl<'a> LightPass<'a> {
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
     pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
-        let choice = self.choice.fine(index);
-        let (point, direction): (Vec2, Vec2) = (self.point.point(index), self.direction.point(index));
+        let draws = (self.choice.fine(index), self.point.point(index), self.direction.point(index));
+        self.emit_by(scene, surroundings, self.stream(u64::from(index)), draws)
+    }
+
+    /// The beginning of a path all of whose draws are those of `stream`.
+    pub fn emit_from(&self, scene: &Scene, surroundings: &Surroundings, stream: Stream) -> Option<Emitted> {
+        let draws = stream.vertex(0);
+        let choice =
+            DVec2::new(draws.one_fine(Purpose::EmitterChoice), f64::from(draws.nth(1).one(Purpose::EmitterChoice)));
+        let (point, direction) = (draws.two(Purpose::EmitterPoint), draws.two(Purpose::EmitterDirection));
+        self.emit_by(scene, surroundings, stream, (choice, point, direction))
+    }
+
+    #[inline(always)]
+    fn emit_by(
+        &self,
+        scene: &Scene,
+        surroundings: &Surroundings,
+        stream: Stream,
+        (choice, point, direction): (DVec2, Vec2, Vec2),
+    ) -> Option<Emitted> {
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
         let (emission, cell, ratio, weight, unaimed) = match self.guide {
             Some(guide) => {
@@ -151,7 +171,6 @@ impl<'a> LightPass<'a> {
             // It has come through the medium that fills all space, from infinity.
             flux *= medium.transmittance(f32::INFINITY);
         }
-        let stream = self.stream(u64::from(index));
         Some(Emitted {
             start: PathStart {
                 origin: emission.origin,

@@ -30,7 +30,7 @@ mod volume;
 mod walk;
 
 pub use bandwidths::{Bandwidths, Counter, Found, LevelRadii, MAX_LEVELS};
-pub use bidirectional::{Bidirectional, MergeLevels, Record, Strategies, Technique};
+pub use bidirectional::{Bidirectional, Division, MergeLevels, Record, Strategies, Technique};
 pub use bidirectional_eye::Meets;
 pub use bidirectional_light::{Deposits, LightVertices, Splat};
 pub use direct::{balance, direct_light};

@@ -96,6 +96,7 @@ fn furnace_box() {
     let scene = build(description);
     let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
     hold(check, "furnace", &scene, &ALL, 400, 0.1);
+    hold(check, "furnace", &scene, &[Method::Mlt], 100, 0.1);
 }
 
 /// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2.
@@ -254,7 +255,7 @@ fn glossy_room() {
     let scene = build(glossy_balls());
     let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm, Method::Cppm];
     let mut methods = methods.map(|m| (m, 48)).to_vec();
-    methods.push((Method::Pm, 16));
+    methods.extend([(Method::Pm, 16), (Method::Mlt, 24)]);
     agree("glossy room", &scene, &methods, 0.04, 0.02, 0.15);
 }
 
@@ -270,7 +271,7 @@ fn glass_room() {
     description.cameras[0].focus_distance = 2.5;
     let scene = build(description);
     let mut methods = [Method::Path, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm].map(|m| (m, 64)).to_vec();
-    methods.push((Method::Pm, 16));
+    methods.extend([(Method::Pm, 16), (Method::Mlt, 32)]);
     agree("glass room", &scene, &methods, 0.04, 0.02, 0.2);
 }
 

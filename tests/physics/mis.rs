@@ -462,8 +462,14 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     };
     let pixels = (SIZE * SIZE) as f32;
     let strategies = Strategies::vcm(true);
-    let shared =
-        Bidirectional { eye, surroundings: &surroundings, strategies, light_paths: pixels, merged_paths: 2.0 * pixels };
+    let shared = Bidirectional {
+        eye,
+        surroundings: &surroundings,
+        strategies,
+        light_paths: pixels,
+        merged_paths: 2.0 * pixels,
+        only: None,
+    };
     let eta = Eta::new(radius * radius, 2.0 * pixels).sharing(SHARING);
     let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
     // Wider than eta says, so that enough is merged: weights know nothing of distances.

@@ -24,7 +24,7 @@ __all__ = [
 
 __version__: str
 
-_Method = Literal["auto", "path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm"]
+_Method = Literal["auto", "path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "mlt"]
 _Denoise = Literal["auto", "oidn", "own", "none"]
 _Filter = Literal["box", "gaussian", "blackman-harris"]
 _Picture = Image | str | os.PathLike[str] | NDArray[Any]

@@ -29,6 +29,7 @@ const METHODS: [(&str, Option<Method>); 11] = [
     ("cppm", Some(Method::Cppm)),
     ("bpm", Some(Method::Bpm)),
     ("vcm", Some(Method::Vcm)),
+    ("mlt", Some(Method::Mlt)),
 ];
 const DENOISERS: [(&str, DenoiserChoice); 4] = [
     ("auto", DenoiserChoice::Auto),

@@ -115,7 +115,7 @@ impl Scene {
     /// The options are those of `caustique render`; the same ones with the same seed give the same bytes in every
     /// layer, here and there, whatever the number of threads.
     ///
-    /// method                    'auto', 'path', 'light', 'bdpt', 'pm', 'ppm', 'sppm', 'appm', 'cppm', 'bpm' or 'vcm'
+    /// method                    'auto', 'path', 'light', 'bdpt', 'pm', 'ppm', 'sppm', 'appm', 'cppm', 'bpm', 'vcm' or 'mlt'
     /// iterations, time,         when to stop: after so many iterations, seconds, or at an estimated relative error,
     /// target_error              whichever comes first; after 64 iterations if none is given
     /// width, height             pixels; one given keeps the camera's aspect

@@ -182,6 +182,8 @@ pub enum Method {
     Bpm,
     /// Vertex connection and merging
     Vcm,
+    /// Metropolis light transport: chains that stay where light is; what they miss they miss for long
+    Mlt,
 }
 
 impl Method {
@@ -198,6 +200,7 @@ impl Method {
             Method::Cppm => render::Method::Cppm,
             Method::Bpm => render::Method::Bpm,
             Method::Vcm => render::Method::Vcm,
+            Method::Mlt => render::Method::Mlt,
         }
     }
 }
