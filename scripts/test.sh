@@ -86,6 +86,7 @@ fi
 RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --release --workspace --no-deps
 tests 'cargo test' cargo test --release --workspace --no-fail-fast
 tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
+tests 'Hard cases' scripts/hard-cases.sh
 part 'Python wheel' scripts/python.sh
 tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning -m unittest discover -s tests/python/package
 tests 'Python with USD' .venv-usd/bin/python -m unittest discover -s tests/python -p 'usd_*.py'

@@ -8,7 +8,7 @@ import numpy as np
 import scene as s
 import shapes
 from answers import Equal, Exact, Refused, Value
-from case import Case
+from case import FEW, Case
 
 TITLE = "Geometry"
 EYE = ("path", "bdpt", "vcm", "sppm")
@@ -105,6 +105,7 @@ CASES = [
         Equal("without", ("own", "among"), NOTHING, resolves=0.06),
         EYE,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "slivers",
@@ -113,6 +114,7 @@ CASES = [
         Equal("two", ("slivers",), SAME, bound=0.005, resolves=0.06),
         EYE,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "duplicated",
@@ -120,6 +122,7 @@ CASES = [
         {"shared": lambda: stage(ball(smooth=False)), "own": lambda: stage(ball(smooth=False).flat())},
         Equal("shared", ("own",), SAME, bound=1e-5),
         EYE,
+        seeds=FEW,
     ),
     Case(
         "huge-and-tiny",
@@ -142,6 +145,7 @@ CASES = [
         Equal("one", ("two",), SAME + " Which of the two is met does not matter.", resolves=0.06),
         EYE,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "cracks",
@@ -165,6 +169,7 @@ CASES = [
         ),
         EYE,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "normals-long",
@@ -172,6 +177,7 @@ CASES = [
         {"unit": partial(normals, 1.0), "long": partial(normals, 1000.0), "short": partial(normals, 0.001)},
         Equal("unit", ("long", "short"), "A normal is a direction; its length means nothing.", bound=1e-4),
         EYE,
+        seeds=FEW,
     ),
     Case(
         "nan-position",
@@ -197,6 +203,7 @@ CASES = [
         ),
         EYE,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "scale-negative",
@@ -211,6 +218,7 @@ CASES = [
         ),
         EYE,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "scale-singular",

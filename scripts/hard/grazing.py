@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, pi, radians, sin
 import scene as s
 import shapes
 from answers import Equal, Value
-from case import Case
+from case import FEW, Case
 from furnace import WHITE
 
 TITLE = "Grazing"
@@ -82,6 +82,7 @@ CASES = [
             bound=0.004,
         ),
         size=8,
+        seeds=FEW,
     ),
     Case(
         "grazing-photons",
@@ -124,6 +125,7 @@ CASES = [
         Value(1.0, WHITE),
         ("path", "bdpt", "vcm"),
         size=8,
+        seeds=FEW,
     ),
     Case(
         "coarse-white",
@@ -145,6 +147,7 @@ CASES = [
             resolves=0.05,
         ),
         iterations={None: 32, "sppm": 8},
+        photons=2000,
     ),
     Case(
         "slit",

@@ -3,7 +3,7 @@
 import scene as s
 import shapes
 from answers import Equal, Exact
-from case import Case
+from case import FEW, Case
 
 TITLE = "Scale"
 METHODS = ("path", "bdpt", "vcm", "sppm")
@@ -62,6 +62,7 @@ CASES = [
         Equal("one", ("milli", "kilo", "mega"), SAME, resolves=0.05),
         METHODS,
         iterations=4,
+        seeds=FEW,
     ),
     _binary(
         "scale-binary-large",
@@ -81,6 +82,7 @@ CASES = [
         Equal("here", ("there",), PLACE.format("13 km", "0.5 mm"), bound=0.005, resolves=0.05),
         METHODS,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "far-1000km",
@@ -97,5 +99,6 @@ CASES = [
         ),
         METHODS,
         iterations=4,
+        seeds=FEW,
     ),
 ]

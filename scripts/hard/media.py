@@ -8,7 +8,7 @@ import numpy as np
 import scene as s
 import shapes
 from answers import Equal, Value, Values, Warned
-from case import Case
+from case import FEW, Case
 
 TITLE = "Media"
 WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
@@ -75,6 +75,7 @@ CASES = [
         Equal("without", ("with",), "Coefficients of zero neither absorb nor scatter.", resolves=0.06),
         METHODS,
         iterations=4,
+        seeds=FEW,
     ),
     Case(
         "media-absorbing",
@@ -87,6 +88,8 @@ CASES = [
         ),
         ("path", "bdpt", "vcm", "sppm"),
         iterations=8,
+        photons=2000,
+        seeds=FEW,
     ),
     Case(
         "media-colour",
@@ -95,6 +98,8 @@ CASES = [
         Value([exp(-0.1), exp(-1), exp(-3)], "Beer and Lambert by channel.", bound=0.01),
         METHODS,
         iterations=8,
+        photons=2000,
+        seeds=FEW,
     ),
     Case(
         "media-eye-inside",
@@ -107,10 +112,10 @@ CASES = [
             {"scatters": 1.0, "absorbs": exp(-0.7)},
             WHITE + " An absorbing way of 0.7 leaves exp(-0.7). Photons' kernels reach out of the box, within the bound.",
             bound=0.03,
-            resolves=0.1,
+            resolves=0.25,
         ),
         METHODS,
-        iterations={None: 16, "sppm": 8},
+        iterations={None: 16, "sppm": 4},
         photons=100000,
     ),
     Case(
@@ -122,6 +127,7 @@ CASES = [
         ),
         METHODS,
         size=8,
+        seeds=FEW,
     ),
     Case(
         "media-albedo-1",

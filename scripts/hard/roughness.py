@@ -8,7 +8,7 @@ import numpy as np
 import scene as s
 import shapes
 from answers import Equal, Sweep, Values
-from case import Case
+from case import FEW, Case
 
 TITLE = "Roughness"
 EYE = ("path", "bdpt", "vcm", "sppm")
@@ -96,6 +96,7 @@ CASES = [
         EYE,
         iterations=4,
         photons=5000,
+        seeds=FEW,
     ),
     Case(
         "rough-delta-glass",
@@ -105,6 +106,7 @@ CASES = [
         EYE,
         iterations=4,
         photons=5000,
+        seeds=FEW,
     ),
     Case(
         "rough-lobe",
