@@ -169,7 +169,6 @@ CASES = [
         ),
         EYE,
         iterations=4,
-        seeds=FEW,
     ),
     Case(
         "normals-long",
