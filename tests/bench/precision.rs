@@ -6,9 +6,9 @@
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{Affine3A, DAffine3, DVec3, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
+use caustique::render::Clock;
 use caustique::stat::sum::{Grid, Sum};
 use std::hint::black_box;
-use std::time::Instant;
 
 const MILLION: u32 = 1_000_000;
 /// Runs of which the fastest counts.
@@ -35,9 +35,9 @@ fn timed<T>(count: u32, run: impl Fn() -> T) -> (f64, T) {
     let mut result = black_box(run());
     let mut best = f64::INFINITY;
     for _ in 0..RUNS {
-        let start = Instant::now();
+        let start = Clock::start();
         result = black_box(run());
-        best = best.min(start.elapsed().as_secs_f64());
+        best = best.min(start.seconds());
     }
     (1e9 * best / f64::from(count), result)
 }
