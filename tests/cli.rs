@@ -20,6 +20,8 @@ mod merge;
 mod peers;
 #[path = "cli/plan.rs"]
 mod plan;
+#[path = "cli/rejected.rs"]
+mod rejected;
 #[path = "cli/running.rs"]
 mod running;
 #[path = "cli/usage.rs"]

@@ -121,7 +121,7 @@ fn join(args: &MergeArgs) -> Result<()> {
         if let Some((name, _)) = &delivery.finished {
             tell_finish(name, &delivery, summary.told_of_finished());
         }
-        summary.tell_rejected(&args.output);
+        summary.tell_rejected(&args.output, true);
     }
     args.write(&delivery.set, &delivery.attributes, naming, &made_for)?;
     let output = args.output.display();

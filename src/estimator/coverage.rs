@@ -39,6 +39,11 @@ impl Coverage {
         other.counts.iter().for_each(|&(instance, count)| self.count(instance, count));
     }
 
+    /// All paths.
+    pub fn paths(&self) -> u32 {
+        self.paths
+    }
+
     /// Fraction of paths that hit anything, 0 to 1; 0 before the first path.
     pub fn hit_fraction(&self) -> f32 {
         self.fraction(self.counts.iter().map(|(_, count)| count).sum())

@@ -5,6 +5,7 @@ mod coverage;
 mod error;
 mod pixel;
 mod quarters;
+mod rejected;
 pub mod rule;
 mod state;
 
@@ -13,4 +14,5 @@ pub use coverage::Coverage;
 pub use error::SquaredError;
 pub use pixel::{FAR, Parts, Pixel, QUARTERS};
 pub use quarters::variance_ratio;
+pub use rejected::Rejected;
 pub use state::{BandwidthState, Schedule, level_factor2};

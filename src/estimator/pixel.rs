@@ -1,12 +1,12 @@
 //! The state of a pixel: plain numbers that can be saved and joined.
 
-use super::Coverage;
+use super::{Coverage, Rejected};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::photon::ByKind;
 use crate::random;
 use crate::stat::sum::Term;
 use crate::stat::{Grids, Moments, Sum, Total, variance_of_mean};
-use crate::transport::{EyeMeasure, MAX_LEVELS};
+use crate::transport::{Cause, EyeMeasure, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -79,7 +79,7 @@ pub struct Pixel {
     /// Iterations counted.
     pub iterations: u32,
     /// Iterations rejected as not finite.
-    pub rejected: u32,
+    pub rejected: Rejected,
     /// Largest initial bandwidth by kind of photons (scene units).
     pub bandwidths: ByKind<f32>,
     /// The same for photons in media; 0 where there are none.
@@ -196,6 +196,11 @@ impl Pixel {
         if self.features == 0 { DVec3::ZERO } else { self.albedo / f64::from(self.features) }
     }
 
+    /// Eye paths whose albedo, normal or depth was not finite.
+    pub fn features_rejected(&self) -> u32 {
+        self.coverage.paths() - self.features
+    }
+
     /// Direction of the mean normal; zero where there is none.
     pub fn normal(&self) -> DVec3 {
         self.normal.normalize_or_zero()
@@ -284,9 +289,9 @@ impl Pixel {
         let difference = if count > 1 { self.difference_of(&values, independent, correlated) } else { Rgb::ZERO };
         let all =
             || values[..count].iter().chain(&parts).chain(std::iter::once(&difference)).chain(groups.as_flattened());
-        if !all().all(|value| value.is_finite()) {
-            self.rejected += 1;
-            return;
+        let broken = independent.broken.or_else(|| correlated.and_then(|measure| measure.broken));
+        if let Some(cause) = broken.or_else(|| (!all().all(|value| value.is_finite())).then_some(Cause::Sum)) {
+            return self.rejected.count(cause);
         }
         self.iterations += 1;
         let most = all().fold(Rgb::ZERO, |most, value| most.max(value.abs()));
@@ -384,7 +389,7 @@ impl Pixel {
             self.first = other.first;
         }
         self.iterations += other.iterations;
-        self.rejected += other.rejected;
+        self.rejected.join(&other.rejected);
     }
 }
 
@@ -451,6 +456,7 @@ mod tests {
                     depth: draw(7).x,
                 },
                 first: (!pass.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (pass % 10) as u32 }),
+                broken: (pass % 13 == 1).then_some(Cause::Splat),
             }
         })
     }
@@ -479,7 +485,8 @@ mod tests {
         let (z, p) = pixel.first();
         all.extend([p.as_dvec3(), DVec3::splat(z.into())]);
         let mut bits: Vec<u64> = all.iter().flat_map(|value| value.to_array()).map(f64::to_bits).collect();
-        bits.extend([pixel.iterations, pixel.rejected, pixel.coverage.hit_fraction().to_bits()].map(u64::from));
+        bits.extend(pixel.rejected.by_cause().map(u64::from));
+        bits.extend([pixel.iterations, pixel.coverage.hit_fraction().to_bits()].map(u64::from));
         bits.extend(pixel.coverage.fractions().flat_map(|(id, share)| [id, share.to_bits()].map(u64::from)));
         bits
     }

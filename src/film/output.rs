@@ -173,7 +173,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
         Column::one("depth", "Z", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
         Column::one("Z", "Z", |at| at.pixel.first().0),
         Column::xyz("P", |p| p.first().1),
-        Column::one("Rejected", "X", |at| at.pixel.rejected as f32),
+        Column::one("Rejected", "X", |at| at.pixel.rejected.total() as f32),
     ]);
     columns
 }
@@ -277,6 +277,7 @@ mod tests {
             } else {
                 Features::default()
             },
+            broken: None,
             first: hit.then_some(FirstHit { p: Vec3::X, instance: 3 }),
         }
     }

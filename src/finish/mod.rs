@@ -238,7 +238,9 @@ impl Finish {
         })?;
         if let Some(errors) = &errors {
             set.layers.retain(|layer| layer.name != ERROR);
-            set.push(Layer::interleaved(ERROR, "RGB", errors.squared().map(|rgb| rgb.map(f32::sqrt))))?;
+            // As in layers of variances: what is known to be large is not to look as if nothing were known.
+            let root = |square: f32| square.sqrt().min(f32::MAX);
+            set.push(Layer::interleaved(ERROR, "RGB", errors.squared().map(|rgb| rgb.map(root))))?;
         }
         for (name, values) in parts {
             set.push(Layer::interleaved(name, "RGB", values))?;

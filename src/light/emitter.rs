@@ -170,18 +170,22 @@ impl Emitter {
     /// Emitted flux (W) as a luminance: what the choice of lights is proportional to. For light from infinity, the flux
     /// through the scene's bounding sphere.
     pub fn power(&self, sky: &Sky) -> f64 {
-        let disc = PI * sky.radius * sky.radius;
-        f64::from(match self {
+        // In f64, which no light overflows: what is infinitely strong would never be chosen.
+        const PI: f64 = std::f64::consts::PI;
+        let radius = f64::from(sky.radius);
+        let (sphere, disc) = (4.0 * PI, PI * radius * radius);
+        let light = |rgb: Rgb| f64::from(luminance(rgb));
+        match self {
             Emitter::Triangle { area, two_sided, radiance, .. } => {
-                luminance(*radiance) * area * PI * if *two_sided { 2.0 } else { 1.0 }
+                light(*radiance) * f64::from(*area) * PI * if *two_sided { 2.0 } else { 1.0 }
             }
-            Emitter::Point { intensity, .. } => luminance(*intensity) * 2.0 * TAU,
+            Emitter::Point { intensity, .. } => light(*intensity) * sphere,
             Emitter::Spot { intensity, inner, outer, edge, .. } => {
-                luminance(*intensity) * spot_solid_angle(*inner, *outer, *edge)
+                light(*intensity) * f64::from(spot_solid_angle(*inner, *outer, *edge))
             }
-            Emitter::Sun { irradiance, .. } => luminance(*irradiance) * disc,
-            Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean())) * 2.0 * TAU * disc,
-        })
+            Emitter::Sun { irradiance, .. } => light(*irradiance) * disc,
+            Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| light(e.mean())) * sphere * disc,
+        }
     }
 
     /// A point of the light, just before its front; `None` for light from infinity.

@@ -535,7 +535,8 @@ impl Lights {
         let delta = emitter.is_delta();
         let start = direct * probability;
         let density = EmissionDensity { direct: start, start, onward, cos, infinite, delta };
-        (flux.is_finite() && flux.max_element() > 0.0).then_some(EmissionSample {
+        // What is not finite sets out, for somebody to see that it was there.
+        (flux.max_element() > 0.0 || !flux.is_finite()).then_some(EmissionSample {
             origin,
             direction: d,
             flux,

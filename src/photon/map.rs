@@ -122,6 +122,8 @@ impl Located for Photon {
 /// Photons of one pass, ready for range queries.
 pub struct PhotonMap<P = Photon> {
     photons: Vec<P>,
+    /// Photons that were not finite.
+    rejected: u64,
     paths: u32,
     leaves: Vec<Leaf>,
     quantiser: Quantiser,
@@ -180,14 +182,16 @@ impl<P: Located> PhotonMap<P> {
     /// so the map and every query's order of visits depend on the photons alone. Photons that are not finite are left
     /// out.
     pub fn build(mut photons: Vec<P>) -> PhotonMap<P> {
+        let all = photons.len();
         photons.retain(P::is_finite);
+        let rejected = (all - photons.len()) as u64;
         let bounds = photons.iter().fold(Aabb::EMPTY, |b, p| b.union(Aabb::of(p)));
         let extent = (bounds.max - bounds.min).max_element().max(f32::MIN_POSITIVE);
         let quantiser = Quantiser { min: bounds.min, scale: ((1u32 << MORTON_BITS) - 1) as f32 / extent };
-        let mut order: Vec<(u64, u32)> =
-            photons.par_iter().enumerate().map(|(i, photon)| (quantiser.code(photon.position()), i as u32)).collect();
+        let mut order: Vec<(u64, usize)> =
+            photons.par_iter().enumerate().map(|(i, photon)| (quantiser.code(photon.position()), i)).collect();
         order.par_sort_unstable();
-        let photons: Vec<P> = order.par_iter().map(|&(_, i)| photons[i as usize]).collect();
+        let photons: Vec<P> = order.par_iter().map(|&(_, i)| photons[i]).collect();
 
         let far = f32::INFINITY;
         let (leaves, mut boxes): (Vec<Leaf>, Vec<Aabb>) = photons
@@ -223,7 +227,7 @@ impl<P: Located> PhotonMap<P> {
         }
         levels.reverse();
         debug_assert!(levels.len() <= MAX_LEVELS);
-        PhotonMap { photons, paths: 0, leaves, quantiser, levels }
+        PhotonMap { photons, rejected, paths: 0, leaves, quantiser, levels }
     }
 
     /// The same, of so many light paths that estimates can tell how many photons to expect.
@@ -236,6 +240,11 @@ impl<P: Located> PhotonMap<P> {
     #[inline]
     pub fn paths(&self) -> u32 {
         self.paths
+    }
+
+    /// Photons that were left out because they were not finite.
+    pub fn rejected(&self) -> u64 {
+        self.rejected
     }
 
     /// The photons, in Morton order.

@@ -16,7 +16,7 @@ use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
-pub const MAGIC: &[u8; 23] = b"caustique checkpoint 2\n";
+pub const MAGIC: &[u8; 23] = b"caustique checkpoint 3\n";
 /// Pixels packed together.
 pub(super) const BLOCK: usize = 2048;
 /// Options that may be others when a render goes on: when it stops, and how its files are written.

@@ -59,6 +59,7 @@ pub(super) fn deliver(
 ) -> Result<(Delivery, Vec<Pixel>)> {
     let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
     let mut header = rendered.account((!reproducible).then_some(rayon::current_num_threads()));
+    let rejections = rendered.rejections();
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let finishes = ready.is_some();
     let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
@@ -94,7 +95,9 @@ pub(super) fn deliver(
     }
     header.insert("plan".into(), plan.clone());
     header.insert("arguments".into(), arguments.clone());
-    header.insert("warnings".into(), json!(facts.warnings));
+    let rejected = rejections.sentence().filter(|_| rejections.are_many());
+    let warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
+    header.insert("warnings".into(), json!(warnings));
     if let Some(number) = facts.made_for.frame {
         header.insert("frame".into(), number.into());
     }

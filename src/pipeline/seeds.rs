@@ -245,6 +245,16 @@ fn normalise(layer: &mut Layer) {
     }
 }
 
+/// What the renders have left out, by name.
+fn rejected_by(sources: &[Source]) -> Value {
+    let mut all: Map<String, Value> = Map::new();
+    for (name, count) in sources.iter().filter_map(|source| source.header["rejected_by"].as_object()).flatten() {
+        let sum = all.get(name).and_then(Value::as_u64).unwrap_or(0) + count.as_u64().unwrap_or(0);
+        all.insert(name.clone(), sum.into());
+    }
+    all.into()
+}
+
 /// The first render's header, with what all have in common done.
 fn header(sources: &[Source], total: f64) -> Value {
     let mut header: Map<String, Value> =
@@ -260,6 +270,7 @@ fn header(sources: &[Source], total: f64) -> Value {
         ("iterations", json!(total as u64)),
         ("light_paths", json!(sum("light_paths") as u64)),
         ("rejected", json!(sum("rejected") as u64)),
+        ("rejected_by", rejected_by(sources)),
         ("seconds", json!(sum("seconds"))),
         ("seed", Value::Null),
         ("error", json!(error)),

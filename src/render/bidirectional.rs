@@ -26,8 +26,8 @@ use crate::scene::Scene;
 use crate::spectrum::Comb;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
-    Surroundings, path_measure,
+    Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Surroundings,
+    path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -158,7 +158,7 @@ impl<'a> Passes<'a> {
         let Some(shared) = self.shared else {
             self.paths(i, watches);
             self.add(i, pixels, watches);
-            return Work { light_paths: 0, photons: 0 };
+            return Work { light_paths: 0, photons: 0, rejected: 0 };
         };
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
@@ -182,6 +182,7 @@ impl<'a> Passes<'a> {
         let (seed, tiles) = (self.settings.seed, self.tiles);
         let map = self.photons.as_ref().map(|(_, map)| map);
         let merges = map.map_or(0, |map| map.photons().len());
+        let mut rejected = map.map_or(0, PhotonMap::rejected);
         let bandwidths: &[Pixel] = pixels;
         let mut photons: Vec<Vec<MergePhoton>> = Vec::new();
         let guide = self.guide.clone();
@@ -189,7 +190,7 @@ impl<'a> Passes<'a> {
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
             let streams = Streams::in_sequence(seed, i, pair.eye);
-            let left: Vec<(Vec<Splat>, Vec<MergePhoton>)> = measures
+            let left: Vec<Deposits> = measures
                 .par_chunks_mut(TILE_PIXELS)
                 .zip(watches.par_iter_mut())
                 .enumerate()
@@ -210,17 +211,18 @@ impl<'a> Passes<'a> {
                             shared.eye_path(&arena, start, &meets, watch, &mut measures[place.at]);
                         }
                     }
-                    (left.splats, left.photons)
+                    left
                 })
                 .collect();
-            for (splats, left) in left {
-                for splat in splats {
+            for left in left {
+                rejected += left.lost;
+                for splat in left.splats {
                     let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
                     let (tile, slot) = tiles.place(splat.pixel);
                     watches[tile].splat(slot, own, &splat, &levels);
                     splat.apply(&levels, &mut measures[tile * TILE_PIXELS + slot]);
                 }
-                photons.push(left);
+                photons.push(left.photons);
             }
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
@@ -228,7 +230,7 @@ impl<'a> Passes<'a> {
         if shared.strategies.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons.concat())));
         }
-        Work { light_paths: walked, photons: merges }
+        Work { light_paths: walked, photons: merges, rejected }
     }
 
     /// Path tracing.

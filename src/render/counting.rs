@@ -265,6 +265,7 @@ fn add_photons(all: &mut EyeMeasure, measure: &EyeMeasure) {
     for (sum, light) in sums.zip(photons) {
         *sum += *light;
     }
+    all.broken = all.broken.or(measure.broken);
 }
 
 impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {

@@ -12,6 +12,8 @@ pub(super) struct Work {
     pub light_paths: u64,
     /// Photons of the map used.
     pub photons: usize,
+    /// Those that were left out of it and light paths that ended because they were not finite.
+    pub rejected: u64,
 }
 
 /// The passes of a method.

@@ -25,6 +25,8 @@ pub struct Part {
     pub light_paths: u64,
     /// Photons of the last map.
     pub photons: u64,
+    /// Photons and light paths that were not finite.
+    pub light_rejected: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Core-seconds per phase.
@@ -45,6 +47,7 @@ impl Rendered {
             last: self.settings.last(self.iterations),
             light_paths: self.light_paths,
             photons: self.photons,
+            light_rejected: self.light_rejected,
             seconds: self.seconds,
             phases: self.phases,
             history: self.history.clone(),
@@ -87,6 +90,7 @@ impl Part {
             iterations: self.iterations,
             light_paths: self.light_paths,
             photons: self.photons,
+            light_rejected: self.light_rejected,
             seconds: self.seconds,
             phases: self.phases,
             history: self.history,
@@ -99,13 +103,15 @@ impl Part {
     pub fn join(parts: &[Part]) -> Option<Part> {
         let last = parts.iter().max_by_key(|part| part.last)?;
         let sum = |of: fn(&Phases) -> f64| parts.iter().map(|part| of(&part.phases)).sum();
-        let light_paths = parts.iter().map(|part| part.light_paths);
         // All shards trace the same map.
         let once = last.settings.method == Method::Pm;
+        let of_light =
+            |counts: &mut dyn Iterator<Item = u64>| if once { counts.max().unwrap_or(0) } else { counts.sum() };
         Some(Part {
             settings: Settings { shard: Shard { index: 0, count: 1 }, ..last.settings.clone() },
             iterations: parts.iter().map(|part| part.iterations).sum(),
-            light_paths: if once { light_paths.max().unwrap_or(0) } else { light_paths.sum() },
+            light_paths: of_light(&mut parts.iter().map(|part| part.light_paths)),
+            light_rejected: of_light(&mut parts.iter().map(|part| part.light_rejected)),
             seconds: parts.iter().map(|part| part.seconds).fold(0.0, f64::max),
             phases: Phases {
                 pilot: sum(|phases| phases.pilot),

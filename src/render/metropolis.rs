@@ -287,10 +287,11 @@ impl<'a> Metropolis<'a> {
         Metropolis { eye, settings, shared, tiles, measures, levels }
     }
 
-    /// One pair of walks for every pixel: all that is seen directly, direct light, and what chains can start from.
-    fn walk_all(&mut self, walks: &Walks<'_, '_>) -> Vec<Candidate> {
+    /// One pair of walks for every pixel: all that is seen directly, direct light, and what chains can start from. Last,
+    /// light paths that ended because they were not finite.
+    fn walk_all(&mut self, walks: &Walks<'_, '_>) -> (Vec<Candidate>, u64) {
         let (tiles, width) = (self.tiles, walks.size.x);
-        let left: Vec<(Vec<Splat>, Vec<Candidate>)> = self
+        let left: Vec<(Deposits, Vec<Candidate>)> = self
             .measures
             .par_chunks_mut(TILE_PIXELS)
             .enumerate()
@@ -300,21 +301,23 @@ impl<'a> Metropolis<'a> {
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
                     let measure = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
-                    let EyeMeasure { emission, direct, features, first, .. } = measure;
-                    measures[place.at] = EyeMeasure { emission, direct, features, first, ..EyeMeasure::default() };
+                    let EyeMeasure { emission, direct, features, first, broken, .. } = measure;
+                    measures[place.at] =
+                        EyeMeasure { emission, direct, features, first, broken, ..EyeMeasure::default() };
                     found.deposits.clear();
                 }
-                (left.splats, found.candidates)
+                (left, found.candidates)
             })
             .collect();
-        let mut candidates = Vec::new();
-        for (splats, found) in left {
-            for splat in splats.iter().filter(|splat| !chained(splat.class)) {
+        let (mut candidates, mut lost) = (Vec::new(), 0);
+        for (left, found) in left {
+            lost += left.lost;
+            for splat in left.splats.iter().filter(|splat| !chained(splat.class)) {
                 splat.apply(&self.levels, &mut self.measures[tiles.slot(splat.pixel)]);
             }
             candidates.extend(found);
         }
-        candidates
+        (candidates, lost)
     }
 }
 
@@ -337,7 +340,7 @@ impl Iterate for Metropolis<'_> {
             lights: Streams::new(seed, i, Domain::Light),
             size: UVec2::new(width, height),
         };
-        let candidates = self.walk_all(&walks);
+        let (candidates, rejected) = self.walk_all(&walks);
         let count = (pixels.len() / STEPS).max(CHAINS);
         let steps = pixels.len().div_ceil(count);
         let u = walks.eyes.path(u64::MAX).vertex(OWN).one_fine(Purpose::Film);
@@ -366,6 +369,6 @@ impl Iterate for Metropolis<'_> {
             pixel.add(i, measure, None);
         });
         phases.eye += cpu_seconds() - started;
-        Work { light_paths: u64::from(width) * u64::from(height), photons: 0 }
+        Work { light_paths: u64::from(width) * u64::from(height), photons: 0, rejected }
     }
 }

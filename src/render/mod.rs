@@ -21,6 +21,7 @@ mod metropolis;
 pub mod output;
 mod pm;
 mod region;
+mod rejections;
 mod result;
 mod session;
 mod settings;
@@ -41,6 +42,7 @@ pub use forecast::photons_per_path;
 pub use joined::Part;
 pub use method::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
 pub use pm::PHOTON_BYTES;
+pub use rejections::Rejections;
 pub use result::{Phases, Rendered};
 pub use session::{Session, Stage};
 pub use settings::{

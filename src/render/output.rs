@@ -59,7 +59,9 @@ impl Rendered {
         put("error", self.relative_error().into());
         put("error_of", json!(self.settings.told()));
         put("variance_known", (self.iterations >= 2).into());
-        put("rejected", self.rejected().into());
+        let rejections = self.rejections();
+        put("rejected", rejections.rejected().into());
+        put("rejected_by", rejections.header().into());
         let history = self.history.iter().map(|moment| {
             let mut entry = json!({
                 "iterations": moment.iterations, "light_paths": moment.light_paths,

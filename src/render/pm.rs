@@ -35,17 +35,18 @@ const BATCH: u32 = 1 << 16;
 pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
 /// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by
-/// it.
-fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (ByKind<Vec<Photon>>, u32) {
-    let (mut photons, mut traced): (ByKind<Vec<Photon>>, _) = (ByKind::default(), 0);
+/// it. Last, light paths that ended because they were not finite.
+fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (ByKind<Vec<Photon>>, u32, u64) {
+    let (mut photons, mut traced, mut lost): (ByKind<Vec<Photon>>, _, _) = (ByKind::default(), 0, 0);
     while traced < pass.paths() {
         let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
         let end = paths.end;
-        let batch = trace_some(scene, surroundings, pass, paths).surface;
-        if kind::count(&photons) + kind::count(&batch) > most {
+        let batch = trace_some(scene, surroundings, pass, paths);
+        if kind::count(&photons) + kind::count(&batch.surface) > most {
             break;
         }
-        kind::append(&mut photons, batch);
+        kind::append(&mut photons, batch.surface);
+        lost += batch.lost;
         traced = end;
     }
     // The memory ends within a batch: path by path.
@@ -59,11 +60,12 @@ fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usi
         }
         kind::append(&mut photons, std::mem::take(&mut path.surface));
         path.volume.clear();
+        lost += std::mem::take(&mut path.lost);
         traced += 1;
     }
     let more = pass.paths() as f32 / traced.max(1) as f32;
     photons.iter_mut().flatten().for_each(|photon| photon.flux *= more);
-    (photons, traced)
+    (photons, traced, lost)
 }
 
 /// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this
@@ -113,18 +115,20 @@ impl<'a> Pm<'a> {
         Pm { eye, settings, surroundings, maps: None, counted: false }
     }
 
-    fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32) {
+    /// The maps, how many light paths they are of, and what was left out.
+    fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
         let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
             .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
-        let (photons, traced) = trace(self.eye.scene, self.surroundings, &pass, most);
+        let (photons, traced, lost) = trace(self.eye.scene, self.surroundings, &pass, most);
         phases.light += cpu_seconds() - start;
         let start = cpu_seconds();
         let maps = photons.map(PhotonMap::build);
         phases.map += cpu_seconds() - start;
-        (maps, traced)
+        let rejected = lost + maps.iter().map(PhotonMap::rejected).sum::<u64>();
+        (maps, traced, rejected)
     }
 }
 
@@ -135,8 +139,8 @@ impl Iterate for Pm<'_> {
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
-        let (maps, traced) = match self.maps.take() {
-            Some(maps) => (maps, 0),
+        let (maps, traced, rejected) = match self.maps.take() {
+            Some(maps) => (maps, 0, 0),
             None => self.build(phases),
         };
         let start = cpu_seconds();
@@ -167,8 +171,9 @@ impl Iterate for Pm<'_> {
         let photons = maps.iter().map(|map| map.photons().len()).sum();
         self.maps = Some(maps);
         // After a pause the maps are made again, of the same paths.
-        let light_paths = if std::mem::replace(&mut self.counted, true) { 0 } else { u64::from(traced) };
-        Work { light_paths, photons }
+        let (light_paths, rejected) =
+            if std::mem::replace(&mut self.counted, true) { (0, 0) } else { (u64::from(traced), rejected) };
+        Work { light_paths, photons, rejected }
     }
 
     fn state(&self) -> postcard::Result<Vec<u8>> {

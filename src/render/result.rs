@@ -3,6 +3,7 @@
 use super::control::{History, StopReason};
 use super::error_estimate::ErrorEstimate;
 use super::method::Method;
+use super::rejections::Rejections;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
 use crate::estimator::{BandwidthState, Pixel, SquaredError};
@@ -44,6 +45,8 @@ pub struct Rendered {
     pub light_paths: u64,
     /// Photons of the last map.
     pub photons: u64,
+    /// Photons and light paths that were not finite.
+    pub light_rejected: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Core-seconds per phase.
@@ -84,7 +87,12 @@ impl Rendered {
 
     /// Samples rejected as not finite.
     pub fn rejected(&self) -> u64 {
-        self.pixels.iter().map(|p| u64::from(p.rejected)).sum()
+        self.rejections().rejected()
+    }
+
+    /// All that was left out as not finite.
+    pub fn rejections(&self) -> Rejections {
+        Rejections::of(&self.pixels, self.light_rejected)
     }
 }
 

@@ -70,6 +70,7 @@ pub struct Session<'a> {
     done: u64,
     light_paths: u64,
     photons: usize,
+    rejected: u64,
     history: Vec<History>,
     next_record: u64,
 }
@@ -100,6 +101,7 @@ impl<'a> Session<'a> {
             done: 0,
             light_paths: 0,
             photons: 0,
+            rejected: 0,
             history: Vec::new(),
             next_record: 1,
         }
@@ -108,7 +110,8 @@ impl<'a> Session<'a> {
     /// Goes on from a saved state; `None` where it is of another picture or method.
     pub fn resume(stage: &'a Stage<'a>, state: State) -> Option<Session<'a>> {
         let mut session = Session::new(stage);
-        let State { next, done, light_paths, photons, next_record, history, phases, spent, pilot_seconds, .. } = state;
+        let State { next, done, light_paths, photons, rejected, next_record, history, .. } = state;
+        let State { phases, spent, pilot_seconds, .. } = state;
         let levels = stage.settings.levels.count;
         let fits = state.pixels.len() == session.pixels.len()
             && state.pixels.iter().all(|pixel| pixel.levels() == levels)
@@ -122,6 +125,7 @@ impl<'a> Session<'a> {
             done,
             light_paths,
             photons: photons as usize,
+            rejected,
             history,
             next_record,
             ..session
@@ -138,6 +142,7 @@ impl<'a> Session<'a> {
             done: self.done,
             light_paths: self.light_paths,
             photons: self.photons as u64,
+            rejected: self.rejected,
             next_record: self.next_record,
             history: self.history.clone(),
             phases: self.phases,
@@ -213,6 +218,7 @@ impl<'a> Session<'a> {
         self.done += 1;
         self.light_paths += work.light_paths;
         self.photons = work.photons;
+        self.rejected += work.rejected;
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = self.done >= self.next_record || Some(self.done) == self.total();
         let wanted = record || settings.target_error.is_some();
@@ -323,6 +329,7 @@ impl<'a> Session<'a> {
             iterations: self.done,
             light_paths: self.light_paths,
             photons: self.photons as u64,
+            light_rejected: self.rejected,
             seconds: self.spent.seconds,
             phases: self.phases,
             history: self.history,
@@ -340,6 +347,40 @@ impl Settings {
         match (by_count, by_time) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::scene::description::{CameraDescription, Projection};
+    use crate::scene::{Description, View};
+
+    /// Pixels count iterations in 32 bits, and their sums are exact for 2^23: no render goes on beyond, however many
+    /// are asked for, nor does the last of many shards.
+    #[test]
+    fn no_more_iterations_than_can_be_summed() {
+        let mut description = Description::default();
+        let projection = Projection::Perspective { yfov: 1.0, aspect: Some(1.0) };
+        description.cameras.push(CameraDescription {
+            name: String::new(),
+            to_world: DAffine3::IDENTITY,
+            projection,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+            shift: [0.0; 2],
+        });
+        let scene = Scene::build(description, 1).unwrap();
+        let camera = scene.camera(&View { width: Some(2), height: Some(1), ..View::default() }).unwrap();
+        for (iterations, last) in [(None, MOST_TERMS), (Some(1 << 40), MOST_TERMS), (Some(100), 100)] {
+            let stage = Stage::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
+            let mut session = Session::new(&stage);
+            session.next = last - 1;
+            assert!(!session.finished());
+            session.step();
+            assert!(session.finished() && session.done == 1);
         }
     }
 }

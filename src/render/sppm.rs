@@ -50,6 +50,7 @@ fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons)
         .collect();
     let mut photons = Photons::default();
     for part in parts {
+        photons.lost += part.lost;
         kind::append(&mut photons.surface, part.surface);
         photons.volume.extend(part.volume);
     }
@@ -146,7 +147,7 @@ impl<'a> Sppm<'a> {
 
     /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
     pub fn channel_maps(&self, i: u64, flux: &[Option<EqualFlux>; 3], phases: &mut Phases) -> ([Maps; 3], Work) {
-        let mut work = Work { light_paths: 0, photons: 0 };
+        let mut work = Work { light_paths: 0, photons: 0, rejected: 0 };
         let each = (self.settings.photons / 3).max(1);
         let Settings { seed, max_depth, .. } = *self.settings;
         let maps = std::array::from_fn(|channel| {
@@ -168,6 +169,7 @@ impl<'a> Sppm<'a> {
             phases.map += cpu_seconds() - traced;
             work.light_paths += u64::from(each);
             work.photons += maps.len();
+            work.rejected += maps.rejected();
             maps
         });
         (maps, work)
@@ -187,19 +189,19 @@ impl<'a> Sppm<'a> {
         let maps = self.build(photons, pass.paths(), i);
         phases.light += t1 - t0;
         phases.map += cpu_seconds() - t1;
-        let photons = maps.len();
-        (maps, Work { light_paths: u64::from(pass.paths()), photons })
+        let work = Work { light_paths: u64::from(pass.paths()), photons: maps.len(), rejected: maps.rejected() };
+        (maps, work)
     }
 
     /// Maps of the photons of iteration `i`, and of how many light paths, if sharp lobes may merge them: those of
     /// caustics, if they are sent.
     fn build(&self, photons: Photons, paths: u32, i: u64) -> Maps {
-        let scatters = self.eye.scene.survey.scattering;
+        let (scatters, lost) = (self.eye.scene.survey.scattering, photons.lost);
         let volume = scatters.then(|| VolumeMap::new(photons.volume, i, self.settings));
         let [others, caustics] = photons.surface.map(PhotonMap::build);
         let [_, caustics_sent] = self.kinds();
         let surface = [others, caustics.of_paths(if caustics_sent { paths } else { 0 })];
-        Maps { surface, volume, comb: Comb::new(self.settings.seed, i) }
+        Maps { surface, volume, comb: Comb::new(self.settings.seed, i), lost }
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass<'_> {

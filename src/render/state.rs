@@ -18,6 +18,8 @@ pub struct State<P = Vec<Pixel>> {
     pub(super) light_paths: u64,
     /// Photons of the last map.
     pub(super) photons: u64,
+    /// Photons and light paths that were not finite.
+    pub(super) rejected: u64,
     /// Iterations done when the error is recorded next.
     pub(super) next_record: u64,
     /// Error against time.
@@ -38,13 +40,25 @@ impl<P> State<P> {
     /// The same with other pixels, and its own.
     pub fn exchange<Q>(self, pixels: Q) -> (State<Q>, P) {
         let State {
-            next, done, light_paths, photons, next_record, history, phases, spent, pilot_seconds, passes, ..
+            next,
+            done,
+            light_paths,
+            photons,
+            rejected,
+            next_record,
+            history,
+            phases,
+            spent,
+            pilot_seconds,
+            passes,
+            ..
         } = self;
         let state = State {
             next,
             done,
             light_paths,
             photons,
+            rejected,
             next_record,
             history,
             phases,

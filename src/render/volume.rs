@@ -16,6 +16,8 @@ pub(super) struct Maps {
     pub volume: Option<VolumeMap>,
     /// The wavelengths they have taken.
     pub comb: Comb,
+    /// Light paths that ended because they were not finite.
+    pub lost: u64,
 }
 
 impl Maps {
@@ -23,6 +25,12 @@ impl Maps {
     pub fn len(&self) -> usize {
         let surface: usize = self.surface.iter().map(|map| map.photons().len()).sum();
         surface + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
+    }
+
+    /// Photons and light paths that were not finite.
+    pub fn rejected(&self) -> u64 {
+        let surface: u64 = self.surface.iter().map(PhotonMap::rejected).sum();
+        self.lost + surface + self.volume.as_ref().map_or(0, |volume| volume.map.rejected())
     }
 
     /// The starts of eye paths that take no other wavelengths.

@@ -5,6 +5,7 @@
 //! splats (its vertices connected to the camera), vertices for the one eye path it belongs to, and photons for all eye
 //! paths of the next pass. No light vertex outlives its pixel.
 
+use super::cause::Cause;
 use super::eye::Eye;
 use super::mis::{Eta, Merges, Ratios, one_merge};
 use super::surroundings::Surroundings;
@@ -196,6 +197,19 @@ pub enum Technique {
         /// See above.
         eye: u32,
     },
+}
+
+impl Technique {
+    /// Why a sample is rejected to which it brings what is not finite.
+    pub(super) fn cause(self) -> Cause {
+        match self {
+            Technique::Hit { .. } => Cause::Emission,
+            Technique::NextEvent { .. } => Cause::DirectLight,
+            Technique::Connect { .. } => Cause::Connection,
+            Technique::Camera { .. } => Cause::Splat,
+            Technique::Merge { .. } => Cause::Photons,
+        }
+    }
 }
 
 /// Looks over the shoulder of the walks: for pictures per technique, and for tests. `()` costs nothing.

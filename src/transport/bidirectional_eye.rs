@@ -3,6 +3,7 @@
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
+use super::cause::Cause;
 use super::eye::{Eye, EyeMeasure, Features};
 use super::glow::Glow;
 use super::light_vertex::LightVertex;
@@ -84,8 +85,21 @@ pub(super) fn look_in_medium(
 }
 
 impl<R: Record> EyeWalk<'_, R> {
+    /// Whether a technique has found light that is worth a ray. What is no number rejects the sample.
+    #[inline]
+    fn finds(&mut self, technique: Technique, light: Rgb) -> bool {
+        if light.is_nan() {
+            self.measure.reject(technique.cause());
+            return false;
+        }
+        is_lit(light)
+    }
+
     #[inline]
     fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, ratios: Ratios) {
+        if !value.is_finite() {
+            return self.measure.reject(technique.cause());
+        }
         for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
             self.record.arrival(technique, of, level, value, ratios.weight(eta));
         }
@@ -125,7 +139,8 @@ impl<R: Record> EyeWalk<'_, R> {
         };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         let value = vertex.throughput() * f * light.radiance / light.pdf_w;
-        if !is_lit(value) {
+        let technique = Technique::NextEvent { eye: vertex.depth() };
+        if !self.finds(technique, value) {
             return;
         }
         let way = vertex.shadow_ray(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
@@ -136,7 +151,7 @@ impl<R: Record> EyeWalk<'_, R> {
         let arrival_pdf_a = light.arrival_pdf_a * vertex.cos(light.wi) * way.flight.reverse;
         let onward = pdf * way.flight.forward;
         let ratios = mis::next_event(&self.mis, (onward, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
-        let (technique, at) = (Technique::NextEvent { eye: vertex.depth() }, light.target.unwrap_or(light.wi));
+        let at = light.target.unwrap_or(light.wi);
         self.record.contribution(technique, value, at, ratios);
         for (class, share) in shares(vertex, seen, (light.wi, Transport::Radiance, f), classes).iter() {
             self.add(technique, (class, scene.lights.group(light.light)), value * way.left * share, ratios);
@@ -150,11 +165,13 @@ impl<R: Record> EyeWalk<'_, R> {
         let distance2 = to.length_squared();
         let d = to / distance2.sqrt();
         let (f_eye, pdf_eye) = vertex.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
-        if !is_lit(f_eye) {
+        let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
+        if !self.finds(technique, f_eye) {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
-        let shares = || connected(vertex, light, self.trail.sight, (d, f_eye, f_light), eye.classes);
+        let sight = self.trail.sight;
+        let shares = || connected(vertex, light, sight, (d, f_eye, f_light), eye.classes);
         if !eye.classes.is_all() && shares().is_empty() {
             return;
         }
@@ -162,7 +179,7 @@ impl<R: Record> EyeWalk<'_, R> {
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
             value *= wavelength.once();
         }
-        if !is_lit(value) {
+        if !self.finds(technique, value) {
             return;
         }
         // Every pair of vertices has its own decisions at cut-outs.
@@ -191,7 +208,6 @@ impl<R: Record> EyeWalk<'_, R> {
                 },
             },
         );
-        let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
         self.record.contribution(technique, value, light.p(), ratios);
         for (class, share) in shares().iter() {
             self.add(technique, (class, light.group), value * way.left * share, ratios);
@@ -247,7 +263,10 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
                 };
                 let own = one_merge(self.trail.delta);
                 let seen = (self.trail.sight, eye.classes);
-                merge_photons(photons, self.meets.levels, vertex, (&self.mis, own), seen, longest, self.record, add);
+                let merging = (photons, self.meets.levels);
+                if !merge_photons(merging, vertex, (&self.mis, own), seen, longest, self.record, add) {
+                    self.measure.reject(Cause::Photons);
+                }
             }
         }
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
@@ -277,6 +296,10 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
             &density,
         );
         (self.mis, self.trail, self.depth) = before;
+    }
+
+    fn lost(&mut self) {
+        self.measure.reject(Cause::Path);
     }
 
     #[inline]

@@ -1,6 +1,7 @@
 //! Light paths of the bidirectional methods: what one leaves behind.
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
+use super::cause::Cause;
 use super::eye::EyeMeasure;
 use super::light::{Emitted, LightPass};
 use super::light_vertex::{LightVertex, Scatterer};
@@ -39,6 +40,9 @@ impl Splat {
     /// Adds the weighted light to the pixel's measure.
     #[inline]
     pub fn apply(&self, levels: &MergeLevels, measure: &mut EyeMeasure) {
+        if !self.value.is_finite() {
+            return measure.reject(Cause::Splat);
+        }
         add(measure, levels, self.class, self.value, self.ratios);
     }
 }
@@ -69,6 +73,8 @@ pub struct Deposits {
     pub splats: Vec<Splat>,
     /// For the next pass, of all paths so far.
     pub photons: Vec<MergePhoton>,
+    /// Paths that ended because their weight was not finite.
+    pub lost: u64,
 }
 
 struct LightWalk<'a, 's, R> {
@@ -112,7 +118,15 @@ impl<R: Record> LightWalk<'_, '_, R> {
         // Density of the rays of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();
         let value = vertex.throughput() * f * (pdf_a / light_paths);
-        // Written so that NaN is dropped here, before it costs a ray.
+        // What is no number is the end of the sample that it would have come to, and costs no ray.
+        if value.is_nan() {
+            if let Some(((x, y), _)) = eye.camera.pixel(sample.film, || draws.two(Purpose::Splat)) {
+                let (pixel, light, group) = (y * eye.camera.size().0 + x, vertex.depth(), self.group);
+                let (class, ratios) = (PathClass::Indirect, Ratios::ALONE);
+                self.left.splats.push(Splat { pixel, light, class, group, value: Rgb::NAN, ratios });
+            }
+            return;
+        }
         if !is_lit(value) {
             return;
         }
@@ -208,6 +222,10 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
             }
         }
         if self.shared.ends_light(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
+    }
+
+    fn lost(&mut self) {
+        self.left.lost += 1;
     }
 
     #[inline]

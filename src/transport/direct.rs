@@ -69,11 +69,17 @@ pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f3
         scattered += f * if sample.delta { 1.0 } else { balance(sample.pdf_w, tries * pdf) };
     }
     let arriving = scattered * sample.radiance / sample.pdf_w * vertex.next_event_share();
-    // NaN is dropped here, before it costs a ray.
+    // What is no number is the sample's end whatever is in the way, and costs no ray.
+    if arriving.is_nan() {
+        return Rgb::NAN;
+    }
     if !is_lit(arriving) {
         return Rgb::ZERO;
     }
-    arriving * vertex.shadow_ray(scene, sample.wi, sample.target, token(scene, draws, Purpose::ShadowAlpha)).left
+    let token = token(scene, draws, Purpose::ShadowAlpha);
+    let left = vertex.shadow_ray(scene, sample.wi, sample.target, token).left;
+    // Nothing of infinitely much is nothing.
+    if is_lit(left) { arriving * left } else { Rgb::ZERO }
 }
 
 #[inline]

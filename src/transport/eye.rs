@@ -19,6 +19,7 @@
 //! surface behind as well ([`super::flight`]).
 
 use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
+use super::cause::Cause;
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
@@ -76,9 +77,17 @@ pub struct EyeMeasure {
     pub features: Features,
     /// First visible hit.
     pub first: Option<FirstHit>,
+    /// What was not finite, if anything: the sample is to be rejected.
+    pub broken: Option<Cause>,
 }
 
 impl EyeMeasure {
+    /// Something that is not finite has come to the sample; what came first is its cause.
+    #[cold]
+    pub fn reject(&mut self, cause: Cause) {
+        self.broken.get_or_insert(cause);
+    }
+
     /// The radiance estimate of a level.
     #[inline]
     pub fn radiance(&self, level: usize) -> Rgb {
@@ -158,6 +167,9 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             return;
         }
         let arriving = throughput * radiance;
+        if !arriving.is_finite() {
+            return self.measure.reject(Cause::Emission);
+        }
         let weighted = match scattered {
             Some(s) if !s.lobe.has(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
             // Behind a perfect mirror or clear glass next-event estimation cannot see it, but photons may.
@@ -203,10 +215,13 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         self.classes.is_all() || leads(self.sight, self.lobes, set, self.classes)
     }
 
-    /// Where direct light at a vertex belongs.
+    /// Adds direct light at a vertex.
     #[inline]
-    fn direct(&mut self) -> &mut Rgb {
-        if self.sight.is_clear() { &mut self.measure.direct } else { &mut self.measure.indirect }
+    fn add_direct(&mut self, light: Rgb) {
+        if !light.is_finite() {
+            self.measure.reject(Cause::DirectLight);
+        }
+        *if self.sight.is_clear() { &mut self.measure.direct } else { &mut self.measure.indirect } += light;
     }
 
     /// Direct light and photons at a vertex from which the path goes on whatever its lobes, and with which of them.
@@ -229,8 +244,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             let lit = self.lit_lobes(broad, seen);
             if lit != (LobeSet::NONE, LobeSet::NONE) {
                 let sets = [(lit.0, tries(broad, chance)), (lit.1, tries(seen, 1.0 - chance))];
-                let direct = vertex.throughput * next_event(self.scene, vertex, sets);
-                *self.direct() += direct;
+                self.add_direct(vertex.throughput * next_event(self.scene, vertex, sets));
             }
             self.gather(vertex, broad, seen, tries(seen, 1.0 - chance));
         }
@@ -321,11 +335,19 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         }
         let sums = batch.finish(&mut counter);
         let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
+        let mut finite = true;
         for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
-            into[usize::from(level)] += vertex.throughput * (FRAC_1_PI / radius2) * sum;
+            let light = vertex.throughput * (FRAC_1_PI / radius2) * sum;
+            finite &= light.is_finite();
+            into[usize::from(level)] += light;
         }
         for (level, sum) in order.into_iter().zip(glints.into_iter().flat_map(Merging::finish)) {
-            self.measure.indirect_photons[usize::from(level)] += vertex.throughput * sum;
+            let light = vertex.throughput * sum;
+            finite &= light.is_finite();
+            self.measure.indirect_photons[usize::from(level)] += light;
+        }
+        if !finite {
+            self.measure.reject(Cause::Photons);
         }
     }
 }
@@ -390,8 +412,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
             let lit = self.lit_lobes(broad, onward);
             if lit != (LobeSet::NONE, LobeSet::NONE) {
-                let direct = vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival);
-                *self.direct() += direct;
+                self.add_direct(vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival));
             }
             self.gather(vertex, broad, onward, survival);
         }
@@ -445,6 +466,11 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             for (sum, gathered) in photons.iter_mut().zip(gathered.into_iter().flatten()) {
                 *sum += gathered;
             }
+            if !direct.is_finite() {
+                measure.reject(Cause::DirectLight);
+            } else if !gathered.iter().flatten().all(|light| light.is_finite()) {
+                measure.reject(Cause::Photons);
+            }
         }
         Next::Stop
     }
@@ -453,9 +479,12 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
         let sight = self.arrived(scattered);
         if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(sight) {
-            let light = if sight.is_clear() { &mut self.measure.volume } else { &mut self.measure.indirect };
-            *light += vertex.throughput
+            let light = vertex.throughput
                 * next_event(self.scene, vertex, [(LobeSet::BROAD, SECOND_STRATEGY), (LobeSet::NONE, 0.0)]);
+            if !light.is_finite() {
+                self.measure.reject(Cause::DirectLight);
+            }
+            *if sight.is_clear() { &mut self.measure.volume } else { &mut self.measure.indirect } += light;
         }
     }
 
@@ -475,6 +504,10 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         self.glints.scatter(vertex.surface.ng, sample);
+    }
+
+    fn lost(&mut self) {
+        self.measure.reject(Cause::Path);
     }
 }
 

@@ -152,9 +152,9 @@ impl<K: Kernel> Merging<'_, K> {
         let Merging { shading, ng, onward, .. } = *self;
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, onward);
         let cosine = photon.cosine();
-        // Written so that what is no number is left out.
         let (cos, eye) = (photon.wi.dot(ng).abs(), pdf * self.going);
-        if !(eye > 0.0 && cosine > 0.0 && cos > 0.0) {
+        // What is no number goes on, for the sample to be rejected by.
+        if eye <= 0.0 || cosine <= 0.0 || cos <= 0.0 {
             return Rgb::ZERO;
         }
         // Area within which a photon is expected for every eye path.

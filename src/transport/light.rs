@@ -201,6 +201,8 @@ pub struct Photons {
     pub surface: ByKind<Vec<Photon>>,
     /// In media.
     pub volume: Vec<VolumePhoton>,
+    /// Paths that ended because their weight was not finite.
+    pub lost: u64,
 }
 
 /// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or
@@ -326,6 +328,10 @@ impl<'a> Visitor<'a> for Deposit<'_> {
             });
         }
         Next::Continue(self.onward)
+    }
+
+    fn lost(&mut self) {
+        self.photons.lost += 1;
     }
 }
 

@@ -22,51 +22,55 @@
 //! A vertex in a medium is one whose cosine is 1, whose densities are per volume, and where nothing is merged; flight
 //! through media multiplies the densities of both its ends ([`MisState::fly`]).
 //!
+//! Sums are in f64: densities are f32, and the products of those of a few vertices are not, where lamps are as small as
+//! dust and lobes as sharp as glass.
+//!
 //! Roulette is left out of all densities: weights need only sum to one. Delta lobes count as if their forward and
 //! reverse densities were equal \[(53) to (55)\], which neglects n^2 ratios, the same for all strategies.
 
 use crate::light::EmissionDensity;
-use crate::math::Vec2;
+use crate::math::DVec2;
 use crate::medium::Flight;
 
-/// Directions nearer to a surface (cosine) than this count as if they were this far from it.
-const LEAST_COSINE: f32 = 1e-6;
+/// Directions nearer to a surface (cosine) than this count as if they were this far from it: so near that f32 hardly
+/// tells them from along it.
+const LEAST_COSINE: f32 = 1e-30;
 
 /// `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: how many merges there are for a connection, per unit of density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eta {
-    value: f32,
+    value: f64,
     /// What a merge of either kind is worth, see [`Merges`].
     worth: Merges,
 }
 
 /// A number each for merges where all earlier vertices of the eye path are delta (`x`), and for those that share a path
 /// which might have gone elsewhere (`y`).
-pub type Merges = Vec2;
+pub type Merges = DVec2;
 
 /// The merge of a vertex: `clear` says that all earlier vertices of the eye path are delta.
 #[inline]
 pub fn one_merge(clear: bool) -> Merges {
-    if clear { Vec2::X } else { Vec2::Y }
+    if clear { DVec2::X } else { DVec2::Y }
 }
 
 impl Eta {
     /// Nothing is merged.
-    pub const NONE: Eta = Eta { value: 0.0, worth: Vec2::ONE };
+    pub const NONE: Eta = Eta { value: 0.0, worth: DVec2::ONE };
     /// Nothing but merging.
-    pub const MERGE_ONLY: Eta = Eta { value: f32::INFINITY, worth: Vec2::ONE };
+    pub const MERGE_ONLY: Eta = Eta { value: f64::INFINITY, worth: DVec2::ONE };
 
     /// `light_paths` of a pass merged within a squared radius, one connected; merges count as if they were independent.
     #[inline]
     pub fn new(radius2: f32, light_paths: f32) -> Eta {
-        Eta { value: std::f32::consts::PI * radius2 * light_paths, worth: Vec2::ONE }
+        Eta { value: std::f64::consts::PI * f64::from(radius2) * f64::from(light_paths), worth: DVec2::ONE }
     }
 
     /// The same where so many photons of a pass are expected in a disc, all of one eye path.
     #[must_use]
     #[inline]
     pub fn sharing(self, photons: f32) -> Eta {
-        Eta { worth: Vec2::new(1.0, 1.0 / (1.0 + photons)), ..self }
+        Eta { worth: DVec2::new(1.0, 1.0 / (1.0 + f64::from(photons))), ..self }
     }
 }
 
@@ -74,7 +78,7 @@ impl Eta {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratios {
     /// The part without eta.
-    pub plain: f32,
+    pub plain: f64,
     /// The coefficients of eta.
     pub merged: Merges,
     /// Of a merge: its own part of the coefficients.
@@ -83,20 +87,21 @@ pub struct Ratios {
 
 impl Ratios {
     /// No other strategy can do it.
-    pub const ALONE: Ratios = Ratios { plain: 1.0, merged: Vec2::ZERO, own: Vec2::ZERO };
+    pub const ALONE: Ratios = Ratios { plain: 1.0, merged: DVec2::ZERO, own: DVec2::ZERO };
 
     /// Weight of any strategy but merging \[(37), the balance heuristic\].
     #[inline]
     pub fn weight(self, eta: Eta) -> f32 {
         let merged = self.merged.dot(eta.worth);
         // Without the test a path that cannot be merged would weigh 0 * infinity under MERGE_ONLY.
-        1.0 / if merged > 0.0 { self.plain + eta.value * merged } else { self.plain }
+        let sum = if merged > 0.0 { self.plain + eta.value * merged } else { self.plain };
+        (1.0 / sum) as f32
     }
 
     /// Weight of merging; eta above 0.
     #[inline]
     pub fn merge_weight(self, eta: Eta) -> f32 {
-        self.own.dot(eta.worth) / (self.merged.dot(eta.worth) + self.plain / eta.value)
+        (self.own.dot(eta.worth) / (self.merged.dot(eta.worth) + self.plain / eta.value)) as f32
     }
 }
 
@@ -104,9 +109,9 @@ impl Ratios {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MisState {
     /// dVCM \[(31)\].
-    pub d_vcm: f32,
+    pub d_vcm: f64,
     /// The part of dVC \[(32)\] without eta.
-    pub plain: f32,
+    pub plain: f64,
     /// The coefficients of eta in dVC, but for the merge at the vertex before.
     pub merged: Merges,
     /// The merge at the vertex before.
@@ -118,15 +123,16 @@ impl MisState {
     /// [`MisState::received`] says otherwise. A delta light cannot be run into.
     #[inline]
     pub fn light(start: &EmissionDensity) -> MisState {
-        let plain = if start.delta { 0.0 } else { start.cos / (start.start * start.onward) };
-        MisState { d_vcm: 1.0 / start.onward, plain, ..MisState::default() }
+        let onward = f64::from(start.onward);
+        let plain = if start.delta { 0.0 } else { f64::from(start.cos) / (f64::from(start.start) * onward) };
+        MisState { d_vcm: 1.0 / onward, plain, ..MisState::default() }
     }
 
     /// An eye path's start \[(31)\]: light paths that are connected to the camera for every eye path of a pixel, over
     /// the density per solid angle of that eye path; 0 when the camera cannot be connected to.
     #[inline]
     pub fn camera(light_paths: f32, camera_pdf_w: f32) -> MisState {
-        let d_vcm = if camera_pdf_w > 0.0 { light_paths / camera_pdf_w } else { 0.0 };
+        let d_vcm = if camera_pdf_w > 0.0 { f64::from(light_paths) / f64::from(camera_pdf_w) } else { 0.0 };
         MisState { d_vcm, ..MisState::default() }
     }
 
@@ -136,9 +142,9 @@ impl MisState {
     #[inline]
     pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
         // A ray along the surface must not make sums that are not numbers.
-        let inverse = 1.0 / cos.max(LEAST_COSINE);
+        let inverse = 1.0 / f64::from(cos.max(LEAST_COSINE));
         MisState {
-            d_vcm: self.d_vcm * distance2 * inverse,
+            d_vcm: self.d_vcm * f64::from(distance2) * inverse,
             plain: self.plain * inverse,
             merged: self.merged * inverse,
             last: self.last * inverse,
@@ -150,7 +156,7 @@ impl MisState {
     #[must_use]
     #[inline]
     pub fn received(self, chosen: f32) -> MisState {
-        MisState { d_vcm: self.d_vcm * chosen, ..self }
+        MisState { d_vcm: self.d_vcm * f64::from(chosen), ..self }
     }
 
     /// Flight through media to where the path has arrived: densities per length, or probabilities, that all it takes
@@ -159,9 +165,10 @@ impl MisState {
     #[must_use]
     #[inline]
     pub fn fly(self, flight: Flight) -> MisState {
-        let ratio = flight.reverse / flight.forward;
+        let (forward, reverse) = (f64::from(flight.forward), f64::from(flight.reverse));
+        let ratio = reverse / forward;
         MisState {
-            d_vcm: self.d_vcm / flight.forward,
+            d_vcm: self.d_vcm / forward,
             plain: self.plain * ratio,
             merged: self.merged * ratio,
             last: self.last * ratio,
@@ -173,6 +180,7 @@ impl MisState {
     #[must_use]
     #[inline]
     pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: Merges) -> MisState {
+        let [cos, pdf_w, reverse_pdf_w] = [cos, pdf_w, reverse_pdf_w].map(f64::from);
         let ratio = cos / pdf_w;
         MisState {
             d_vcm: 1.0 / pdf_w,
@@ -186,13 +194,15 @@ impl MisState {
     #[must_use]
     #[inline]
     pub fn scatter_delta(self, cos: f32) -> MisState {
-        MisState { d_vcm: 0.0, plain: self.plain * cos, merged: (self.merged + self.last) * cos, last: Vec2::ZERO }
+        let cos = f64::from(cos);
+        MisState { d_vcm: 0.0, plain: self.plain * cos, merged: (self.merged + self.last) * cos, last: DVec2::ZERO }
     }
 
     /// Densities of all strategies that end this side earlier, over that of ending here; `reverse_pdf_w` is the density
     /// of scattering back along the path.
     #[inline]
     fn earlier(&self, reverse_pdf_w: f32) -> Side {
+        let reverse_pdf_w = f64::from(reverse_pdf_w);
         Side { plain: self.d_vcm + self.plain * reverse_pdf_w, merged: (self.merged + self.last) * reverse_pdf_w }
     }
 }
@@ -200,7 +210,7 @@ impl MisState {
 /// One side's part of [`Ratios`].
 #[derive(Clone, Copy)]
 struct Side {
-    plain: f32,
+    plain: f64,
     merged: Merges,
 }
 
@@ -208,9 +218,9 @@ struct Side {
 /// never merged.
 #[inline]
 pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
-    let emission = light.start * light.onward;
-    let plain = 1.0 + light.direct * eye.d_vcm + emission * eye.plain;
-    Ratios { plain, merged: eye.merged * emission, own: Vec2::ZERO }
+    let emission = f64::from(light.start) * f64::from(light.onward);
+    let plain = 1.0 + f64::from(light.direct) * eye.d_vcm + emission * eye.plain;
+    Ratios { plain, merged: eye.merged * emission, own: DVec2::ZERO }
 }
 
 /// Next-event estimation \[(44), (45)\].
@@ -226,9 +236,10 @@ pub fn next_event(
     (light_pdf_w, arrival_pdf_a): (f32, f32),
     delta: bool,
 ) -> Ratios {
-    let hit = if delta { 0.0 } else { pdf_w / light_pdf_w };
+    let hit = if delta { 0.0 } else { f64::from(pdf_w) / f64::from(light_pdf_w) };
+    let arrival_pdf_a = f64::from(arrival_pdf_a);
     let eye = eye.earlier(reverse_pdf_w);
-    Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: eye.merged * arrival_pdf_a, own: Vec2::ZERO }
+    Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: eye.merged * arrival_pdf_a, own: DVec2::ZERO }
 }
 
 /// A light vertex connected to the camera \[(46), (47)\]: density of an eye path's arrival per area there, over the
@@ -237,8 +248,8 @@ pub fn next_event(
 #[inline]
 pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
     let light = light.earlier(reverse_pdf_w);
-    let scale = camera_pdf_a / light_paths;
-    Ratios { plain: 1.0 + scale * light.plain, merged: light.merged * scale, own: Vec2::ZERO }
+    let scale = f64::from(camera_pdf_a) / f64::from(light_paths);
+    Ratios { plain: 1.0 + scale * light.plain, merged: light.merged * scale, own: DVec2::ZERO }
 }
 
 /// One side of a connection.
@@ -258,10 +269,11 @@ pub struct End<'a> {
 #[inline]
 pub fn connect(light: &End<'_>, eye: &End<'_>) -> Ratios {
     let (l, e) = (light.mis.earlier(light.reverse_pdf_w), eye.mis.earlier(eye.reverse_pdf_w));
+    let (by_eye, by_light) = (f64::from(light.arrival_pdf_a), f64::from(eye.arrival_pdf_a));
     Ratios {
-        plain: light.arrival_pdf_a * l.plain + 1.0 + eye.arrival_pdf_a * e.plain,
-        merged: (l.merged + light.merges) * light.arrival_pdf_a + (e.merged + eye.merges) * eye.arrival_pdf_a,
-        own: Vec2::ZERO,
+        plain: by_eye * l.plain + 1.0 + by_light * e.plain,
+        merged: (l.merged + light.merges) * by_eye + (e.merged + eye.merges) * by_light,
+        own: DVec2::ZERO,
     }
 }
 

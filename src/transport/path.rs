@@ -5,6 +5,7 @@
 
 use super::bidirectional::{Record, Technique};
 use super::bidirectional_eye::{look, look_in_medium};
+use super::cause::Cause;
 use super::eye::{Eye, EyeMeasure};
 use super::glow::Glow;
 use super::segment::token;
@@ -15,7 +16,7 @@ use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{Group, Receiver};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::plan::{ClassSet, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream};
@@ -60,6 +61,9 @@ impl<R: Record> PathTracer<'_, R> {
             return;
         }
         let way = vertex.shadow_ray(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
+        if !is_lit(way.left) {
+            return;
+        }
         let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);
@@ -75,6 +79,9 @@ impl<R: Record> PathTracer<'_, R> {
         let (class, _) = of;
         if !self.classes.has(class) {
             return;
+        }
+        if !light.is_finite() {
+            return self.measure.reject(technique.cause());
         }
         if weight > 0.0 {
             self.record.arrival(technique, of, 0, light / weight, weight);
@@ -114,6 +121,10 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.lit(vertex);
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
         self.next()
+    }
+
+    fn lost(&mut self) {
+        self.measure.reject(Cause::Path);
     }
 
     fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {

@@ -54,6 +54,13 @@ impl Located for MergePhoton {
     }
 }
 
+/// A partial sum as a photon keeps it. What is too large for it leaves merging no weight, and may be anything large but
+/// infinite, of which nothing would be no number.
+#[inline]
+fn single(sum: f64) -> f32 {
+    sum.min(f64::from(f32::MAX)) as f32
+}
+
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
@@ -63,9 +70,9 @@ impl MergePhoton {
             wi: vertex.wo,
             ng: vertex.surface.ng,
             flux,
-            d_vcm: mis.d_vcm,
-            plain: mis.plain,
-            merged: mis.merged.y + mis.last.y,
+            d_vcm: single(mis.d_vcm),
+            plain: single(mis.plain),
+            merged: single(mis.merged.y + mis.last.y),
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             beam,
             band: Band::of(vertex.wavelength.as_ref()),
@@ -76,26 +83,27 @@ impl MergePhoton {
     /// Partial sums of the weights.
     #[inline]
     pub fn mis(&self) -> MisState {
-        let merged = Merges::new(0.0, self.merged);
-        MisState { d_vcm: self.d_vcm, plain: self.plain, merged, last: Merges::ZERO }
+        let [d_vcm, plain, merged] = [self.d_vcm, self.plain, self.merged].map(f64::from);
+        MisState { d_vcm, plain, merged: Merges::new(0.0, merged), last: Merges::ZERO }
     }
 }
 
-/// Merges the photons around `vertex`, of all levels with one query: calls `add(class, level, radiance)`.
+/// Merges the photons around `vertex`, of all levels with one query: calls `add(class, level, radiance)`. Returns whether
+/// all that was found is finite.
 #[inline]
 #[allow(clippy::too_many_arguments, reason = "what a merge needs, by reference")]
 pub(super) fn merge_photons<R: Record>(
-    photons: &PhotonMap<MergePhoton>,
-    levels: &MergeLevels,
+    (photons, levels): (&PhotonMap<MergePhoton>, &MergeLevels),
     vertex: &Vertex<'_, '_>,
     (mis, own): (&MisState, Merges),
     (sight, classes): (EyeSuffix, ClassSet),
     longest: u32,
     record: &mut R,
     mut add: impl FnMut(PathClass, usize, Rgb),
-) {
+) -> bool {
     let radii = levels.radius2();
-    let Some(&largest) = radii.last() else { return };
+    let mut finite = true;
+    let Some(&largest) = radii.last() else { return finite };
     let (ng, shading) = (vertex.surface.ng, vertex.shading);
     let mut merged = Merged::new(vertex, sight, classes);
     photons.within(vertex.surface.p, largest, |photon, distance2| {
@@ -110,8 +118,10 @@ pub(super) fn merge_photons<R: Record>(
         let cosine = photon.wi.dot(photon.ng).abs();
         let value = vertex.throughput * f * photon.flux * weight / cosine;
         if cosine <= 0.0 || !is_lit(value) {
+            finite &= cosine <= 0.0 || value.is_finite();
             return;
         }
+        finite &= value.is_finite();
         let shares = merged.shares(photon.beam, photon.wi, f);
         let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
         let ratios = mis::merge(&photon.mis(), mis, pdf, reverse, own);
@@ -133,4 +143,5 @@ pub(super) fn merge_photons<R: Record>(
             }
         }
     });
+    finite
 }

@@ -161,6 +161,8 @@ pub trait Visitor<'a> {
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
         let _ = (vertex, sample);
     }
+    /// The path has ended because its weight is not finite.
+    fn lost(&mut self) {}
     /// The path leaves the scene along `direction` with weight `throughput`; `flight`: densities of its way to
     /// infinity.
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {

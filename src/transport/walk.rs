@@ -97,7 +97,8 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
 ) {
     let PathStart { origin, direction, throughput, interior, ref first, far, channel, hue } = *start;
     let survival_scale = 1.0 / (V::SPARED * throughput.max_element());
-    if !survival_scale.is_finite() {
+    if !(survival_scale.is_finite() && throughput.is_finite()) {
+        end(throughput, visitor);
         return;
     }
     let mut path = Path {
@@ -138,6 +139,15 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         }
         path.depth += 1;
     }
+}
+
+/// Ends a path; one whose weight is not finite is told of.
+#[inline]
+fn end<'a, V: Visitor<'a>>(throughput: Rgb, visitor: &mut V) -> Option<()> {
+    if !throughput.is_finite() {
+        visitor.lost();
+    }
+    None
 }
 
 /// A path under way.
@@ -228,15 +238,18 @@ impl<'a> Path<'a> {
         };
         // Where the channel that has brought it here scatters nothing, it carries nothing.
         if !is_lit(vertex.throughput) {
-            return None;
+            return end(vertex.throughput, visitor);
         }
         let set = match visitor.medium(&vertex, self.scattered) {
             Next::Stop => return None,
             Next::Continue(set) | Next::Choose(set, _) => set & LobeSet::BROAD,
         };
         let survival = vertex.survival(set);
-        if set.is_empty() || depth == self.max_depth || draws.one(Purpose::Roulette) >= survival {
+        if set.is_empty() || depth == self.max_depth {
             return None;
+        }
+        if draws.one(Purpose::Roulette) >= survival {
+            return end(vertex.throughput, visitor);
         }
         let sample = vertex.sample(self.transport, set, 0.0, draws.two(Purpose::Phase))?;
         visitor.scatter_medium(&vertex, &sample);
@@ -266,7 +279,9 @@ impl<'a> Path<'a> {
             let taken = self.take_wavelength();
             crossing.eta(scene, self.direction.dot(surface.ng) < 0.0, &taken)
         });
-        self.lose()?;
+        if self.lose().is_none() {
+            return end(self.throughput, visitor);
+        }
         let wo = -self.direction;
         let shading = scene.scattering.shading(&scene.materials, surface, eta, wo, self.arena);
         let behind = crossing.as_ref().map_or(here, |c| c.interior);
@@ -300,7 +315,7 @@ impl<'a> Path<'a> {
             Some(_) => late_survival(depth),
         };
         if draws.one(Purpose::Roulette) >= survival {
-            return None;
+            return end(self.throughput, visitor);
         }
         let sample = shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction))?;
         visitor.scatter(&vertex, &sample);

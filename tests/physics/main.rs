@@ -27,4 +27,5 @@ mod narrow_spots;
 mod nesting;
 mod photon_mapping;
 mod progressive;
+mod stability;
 mod stopping;

@@ -6,6 +6,8 @@
 //! over the same vertices for all strategies of a path: the weights must sum to one, and no longer do when a bug is
 //! planted in it.
 
+mod sums;
+
 use crate::support;
 
 use bumpalo::Bump;
@@ -448,34 +450,55 @@ struct Tally {
     in_media: usize,
 }
 
-/// Compares all that happens on `paths` random pairs of paths.
-fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
-    let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
-    let surroundings = Surroundings::new(scene, camera.position());
-    let eye = Eye {
-        scene,
-        camera: &camera,
-        interior: surroundings.eye,
-        max_depth: 12,
-        indirect: Indirect::Photons,
-        classes: ClassSet::ALL,
-    };
-    let pixels = (SIZE * SIZE) as f32;
-    let strategies = Strategies::vcm(true);
-    let shared = Bidirectional {
-        eye,
-        surroundings: &surroundings,
-        strategies,
-        light_paths: pixels,
-        merged_paths: 2.0 * pixels,
-        only: None,
-    };
-    let eta = Eta::new(radius * radius, 2.0 * pixels).sharing(SHARING);
-    let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
-    // Wider than eta says, so that enough is merged: weights know nothing of distances.
-    let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
-    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; BUGS.len()], in_media: 0 };
-    for path in 0..paths {
+/// A scene, and what its paths are put together by.
+struct Lab<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    surroundings: &'a Surroundings,
+    shared: Bidirectional<'a>,
+    levels: MergeLevels,
+    eta: Eta,
+    /// The same, as the oracle counts merges.
+    oracle: f64,
+}
+
+impl<'a> Lab<'a> {
+    fn new(scene: &'a Scene, camera: &'a Camera, surroundings: &'a Surroundings, radius: f32) -> Lab<'a> {
+        let eye = Eye {
+            scene,
+            camera,
+            interior: surroundings.eye,
+            max_depth: 12,
+            indirect: Indirect::Photons,
+            classes: ClassSet::ALL,
+        };
+        let pixels = (SIZE * SIZE) as f32;
+        let strategies = Strategies::vcm(true);
+        let shared = Bidirectional {
+            eye,
+            surroundings,
+            strategies,
+            light_paths: pixels,
+            merged_paths: 2.0 * pixels,
+            only: None,
+        };
+        let eta = Eta::new(radius * radius, 2.0 * pixels).sharing(SHARING);
+        let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
+        // Wider than eta says, so that enough is merged: weights know nothing of distances.
+        let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
+        Lab { scene, camera, surroundings, shared, levels, eta, oracle }
+    }
+
+    /// Sum of the weights of all strategies of a path by the recursion.
+    fn sum(&self, whole: &Whole<'_>, bug: Option<Bug>) -> f64 {
+        let Bidirectional { strategies, light_paths, .. } = self.shared;
+        whole.recursive(&strategies, f64::from(light_paths), (self.eta, self.oracle), bug).iter().sum()
+    }
+
+    /// All whole paths that a random pair of paths is put together to.
+    fn paths(&self, path: u32, mut each: impl FnMut(Technique, Strategy, &Whole<'_>, Ratios)) {
+        let Lab { scene, camera, surroundings, shared, ref levels, .. } = *self;
+        let (eye, pixels) = (shared.eye, shared.light_paths);
         let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
         let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
         let stream = Stream::new(1, pass, Domain::EyeIndependent, u64::from(index));
@@ -485,13 +508,13 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         let (mut left, mut by_light, mut by_eye) = (Deposits::default(), Said::default(), Said::default());
         shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
-        let meets = Meets { vertices: &vertices, photons: Some(&map), levels: &levels };
+        let meets = Meets { vertices: &vertices, photons: Some(&map), levels };
         let mut measure = EyeMeasure::default();
         shared.eye_path(&arena, &(shared.eye.start(pixel, stream), stream), &meets, &mut by_eye, &mut measure);
 
         let start = eye.start(pixel, stream);
         let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);
-        let emitted = lights.emit(scene, &surroundings, index);
+        let emitted = lights.emit(scene, surroundings, index);
         let light_notes = emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, Transport::Importance));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);
         let from_eye = &eye_notes.met[..];
@@ -511,7 +534,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                 media: vec![],
                 camera_pdf_w,
             };
-            let (name, strategy) = match technique {
+            let strategy = match technique {
                 Technique::Hit { eye: 1 } => continue,
                 Technique::Hit { eye: 0 } => {
                     if from_eye.is_empty() {
@@ -525,14 +548,14 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     });
                     whole.segment(1.0, None);
                     whole.append(from_eye[..from_eye.len()].iter().rev(), true);
-                    ("hit", Strategy::Hit)
+                    Strategy::Hit
                 }
                 Technique::Hit { eye: t } => {
                     let t = t as usize;
                     whole.light = from_eye[t - 1].emitted.expect("a lamp");
                     whole.segment(square(from_eye[t - 1].distance), from_eye[t - 1].medium);
                     whole.append(from_eye[..t - 1].iter().rev(), true);
-                    ("hit", Strategy::Hit)
+                    Strategy::Hit
                 }
                 Technique::NextEvent { eye: t } => {
                     let met = &from_eye[t as usize - 1];
@@ -584,7 +607,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     whole.segment(distance2, scene.medium);
                     whole.append(from_eye[..t as usize].iter().rev(), true);
                     whole.nodes[0] = node(met, met, sample.wi, met.wo);
-                    ("next event", Strategy::NextEvent)
+                    Strategy::NextEvent
                 }
                 Technique::Connect { light: s, eye: t } => {
                     let (s, t) = (s as usize, t as usize);
@@ -595,7 +618,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     whole.segment(f64::from(b.p.distance_squared(a.p)), scene.medium);
                     whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s] = node(b, b, -d, b.wo);
-                    ("connect", Strategy::Connect(s))
+                    Strategy::Connect(s)
                 }
                 Technique::Camera { light: s } => {
                     let s = s as usize;
@@ -605,7 +628,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     whole.nodes[s - 1] = node(met, met, met.wo, d);
                     whole.segment(f64::from(from.distance_squared(met.p)), scene.medium);
                     whole.camera_pdf_w = f64::from(camera.pdf_w(-d) * pixels);
-                    ("camera", Strategy::Camera)
+                    Strategy::Camera
                 }
                 Technique::Merge { light: s, eye: t } => {
                     let (s, t) = (s as usize, t as usize);
@@ -616,13 +639,38 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
                     let merged = node(a, b, a.wo, b.wo);
                     whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s - 1] = merged;
-                    ("merge", Strategy::Merge(s - 1))
+                    Strategy::Merge(s - 1)
                 }
             };
-            let expected = whole.weight(strategy, &strategies, f64::from(pixels), oracle);
+            each(technique, strategy, &whole, ratios);
+        }
+    }
+}
+
+/// The kind of a strategy.
+fn name(strategy: Strategy) -> &'static str {
+    match strategy {
+        Strategy::Hit => "hit",
+        Strategy::NextEvent => "next event",
+        Strategy::Connect(_) => "connect",
+        Strategy::Camera => "camera",
+        Strategy::Merge(_) => "merge",
+    }
+}
+
+/// Compares all that happens on `paths` random pairs of paths.
+fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
+    let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
+    let surroundings = Surroundings::new(scene, camera.position());
+    let lab = Lab::new(scene, &camera, &surroundings, radius);
+    let Bidirectional { strategies, light_paths, .. } = lab.shared;
+    let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; BUGS.len()], in_media: 0 };
+    for path in 0..paths {
+        lab.paths(path, |technique, strategy, whole, ratios| {
+            let expected = whole.weight(strategy, &strategies, f64::from(light_paths), lab.oracle);
             let found = match strategy {
-                Strategy::Merge(_) => ratios.merge_weight(eta),
-                _ => ratios.weight(eta),
+                Strategy::Merge(_) => ratios.merge_weight(lab.eta),
+                _ => ratios.weight(lab.eta),
             };
             let found = f64::from(found);
             assert!(
@@ -631,17 +679,16 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
             );
             tally.weights += 1;
             tally.in_media += usize::from(whole.nodes.iter().any(|node| node.scatters.in_medium()));
-            *tally.techniques.entry(name).or_default() += 1;
+            *tally.techniques.entry(name(strategy)).or_default() += 1;
             if strategy != Strategy::Hit || whole.strategies().len() > 2 {
-                let sum = |bug| whole.recursive(&strategies, f64::from(pixels), (eta, oracle), bug).iter().sum::<f64>();
-                let error = (sum(None) - 1.0).abs();
+                let error = (lab.sum(whole, None) - 1.0).abs();
                 assert!(error <= TOLERANCE, "{what}, path {path}, {technique:?}: the weights sum to 1 + {error}");
                 tally.sums += 1;
                 for (bug, worst) in BUGS.into_iter().zip(&mut tally.bugs) {
-                    *worst = worst.max((sum(Some(bug)) - 1.0).abs());
+                    *worst = worst.max((lab.sum(whole, Some(bug)) - 1.0).abs());
                 }
             }
-        }
+        });
     }
     println!(
         "{what}: {} weights, {} with media, {} sums, {:?}; planted bugs {:?}",

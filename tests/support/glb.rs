@@ -5,19 +5,26 @@ use std::path::Path;
 
 /// Writes the scene, with the lamp or dark.
 pub fn write(path: &Path, lamp: bool) {
-    std::fs::write(path, bytes(lamp, &json!({"light_units": "radiometric"}))).expect("the scene can be written");
+    let extras = json!({"light_units": "radiometric"});
+    std::fs::write(path, bytes(lamp.then_some(LAMP), &extras)).expect("the scene can be written");
+}
+
+/// The same with a lamp just above the floor, so strong that what it sends there is more than f32 holds.
+pub fn write_blinding(path: &Path) {
+    let extras = json!({"light_units": "radiometric"});
+    std::fs::write(path, bytes(Some((1e37, 0.02)), &extras)).expect("the scene can be written");
 }
 
 /// The same with the lamp, in fog.
 pub fn write_foggy(path: &Path) {
     let medium = json!({"sigma_a": [0.02, 0.02, 0.02], "sigma_s": [0.1, 0.1, 0.1], "g": 0.3});
     let extras = json!({"light_units": "radiometric", "medium": medium});
-    std::fs::write(path, bytes(true, &extras)).expect("the scene can be written");
+    std::fs::write(path, bytes(Some(LAMP), &extras)).expect("the scene can be written");
 }
 
 /// The same without the lamp, under a sky from a file.
 pub fn write_under(path: &Path, sky: &str) {
-    std::fs::write(path, bytes(false, &json!({"environment": {"file": sky}}))).expect("the scene can be written");
+    std::fs::write(path, bytes(None, &json!({"environment": {"file": sky}}))).expect("the scene can be written");
 }
 
 /// So many nodes, each of which places one triangle 2^16 times (EXT_mesh_gpu_instancing), all by the same numbers.
@@ -43,8 +50,12 @@ pub fn write_copies(path: &Path, nodes: usize) {
     std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
 }
 
+/// Intensity of the lamp, and its height.
+const LAMP: (f64, f64) = (20.0, 3.0);
+
 /// Quads as positions and indices: the floor looks up, the mirror along +Z.
-fn bytes(lamp: bool, extras: &Value) -> Vec<u8> {
+fn bytes(lamp: Option<(f64, f64)>, extras: &Value) -> Vec<u8> {
+    let (intensity, height) = lamp.unwrap_or(LAMP);
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
     let mirror: [[f32; 3]; 4] = [[-1.0, 0.1, -1.5], [1.0, 0.1, -1.5], [1.0, 2.0, -1.5], [-1.0, 2.0, -1.5]];
     let mut binary = Vec::new();
@@ -56,17 +67,17 @@ fn bytes(lamp: bool, extras: &Value) -> Vec<u8> {
     let mesh = |name: &str, positions: u32, material: u32| json!({"name": name, "primitives": [{"attributes": {"POSITION": positions}, "indices": 2, "material": material}]});
     // Cameras look along their local -Z: this turn about X looks down at the floor.
     let camera = |name: &str, x: f64| json!({"name": name, "camera": 0, "translation": [x, 3.5, 5.5], "rotation": [-0.27, 0.0, 0.0, 0.962_859_283_7]});
-    let light = json!({"name": "Lamp", "type": "point", "intensity": 20.0});
+    let light = json!({"name": "Lamp", "type": "point", "intensity": intensity});
     let document = json!({
         "asset": {"version": "2.0", "generator": "the tests of caustique"},
         "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [light]}},
         "scene": 0,
-        "scenes": [{"extras": {"caustique": extras}, "nodes": if lamp { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
+        "scenes": [{"extras": {"caustique": extras}, "nodes": if lamp.is_some() { vec![0, 1, 2, 3, 4] } else { vec![0, 1, 3, 4] }}],
         "nodes": [
             {"name": "Floor", "mesh": 0},
             {"name": "Mirror", "mesh": 1},
-            {"name": "Lamp", "translation": [0.5, 3.0, 1.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"name": "Lamp", "translation": [0.5, height, 1.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
             camera("Camera", 0.0),
             camera("Side", 1.0),
         ],

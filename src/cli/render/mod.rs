@@ -210,7 +210,7 @@ impl Telling<'_> {
             }
         }
         summary.tell_full();
-        summary.tell_rejected(&args.output);
+        summary.tell_rejected(&args.output, talk);
         written?;
         described?;
         pictured?;

@@ -7,7 +7,7 @@ use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
 use caustique::pipeline::{Delivery, Place, Reached};
-use caustique::render::{Rendered, StopReason, Told, peak_memory};
+use caustique::render::{Rejections, Rendered, StopReason, Told, peak_memory};
 use std::path::Path;
 
 /// The numbers of a render.
@@ -21,7 +21,7 @@ pub struct Summary {
     told: Told,
     /// Photons are merged or gathered within bandwidths, of one level.
     has_one_bandwidth: bool,
-    rejected: u64,
+    rejections: Rejections,
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
     full: Option<(u64, u32, u64)>,
@@ -41,7 +41,7 @@ impl Summary {
             error: rendered.relative_error(),
             told: rendered.settings.told(),
             has_one_bandwidth: rendered.settings.method.has_bandwidths() && rendered.settings.levels.count < 2,
-            rejected: rendered.rejected(),
+            rejections: rendered.rejections(),
             stop: rendered.stop,
             full: rendered.map_is_full().then(|| {
                 let settings = &rendered.settings;
@@ -92,13 +92,11 @@ impl Summary {
         }
     }
 
-    /// A warning if samples were rejected.
-    pub fn tell_rejected(&self, output: &Path) {
-        if self.rejected > 0 {
-            let (name, n) = (output.display(), self.rejected);
-            say(&format!(
-                "warning: {name}: {n} samples were not finite and are left out; the layer Rejected shows where"
-            ));
+    /// What was left out as not finite, if anything was: a warning where that is much, else for `people` alone.
+    pub fn tell_rejected(&self, output: &Path, people: bool) {
+        let (name, many) = (output.display(), self.rejections.are_many());
+        if let Some(sentence) = self.rejections.sentence().filter(|_| many || people) {
+            say(&format!("{}{name}: {sentence}", if many { "warning: " } else { "" }));
         }
     }
 

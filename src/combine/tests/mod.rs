@@ -2,6 +2,7 @@
 
 mod contract;
 mod equation;
+mod hull;
 mod image;
 
 use super::*;

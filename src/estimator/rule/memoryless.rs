@@ -23,9 +23,10 @@ pub fn radius2_factor(i: u64, alpha: f64) -> f64 {
             let z2 = z * z;
             (1.0 / 12.0 - (1.0 / 360.0 - 1.0 / (1260.0 * z2)) / z2) / z
         };
-        // (a - 1/2) ln a - a - (b - 1/2) ln b + b, with ln a = ln b + ln(a / b)
+        // (a - 1/2) ln a - a - (b - 1/2) ln b + b, with ln a = ln b + ln(a / b); b - a is 1 - alpha, of which the sums
+        // themselves keep fewer digits the larger x is.
         let log_ratio = ((alpha - 1.0) / b).ln_1p();
-        ((a - b) * b.ln() + (a - 0.5) * log_ratio + (b - a) + series(a) - series(b)).exp()
+        ((alpha - 1.0) * b.ln() + (a - 0.5) * log_ratio + (1.0 - alpha) + series(a) - series(b)).exp()
     };
     product(EXACT) * ratio(i as f64) / ratio(EXACT as f64)
 }

@@ -57,7 +57,7 @@ const UNSAID: [(&str, &[&str]); 5] = [
         &["it cannot be decoded: the decoder failed", "the decoder failed", "the file contradicts itself"],
     ),
     ("no mesh has a rim of one edge", &["edge has one face only"]),
-    ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 2n", "not said", "default material"]),
+    ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 3n", "not said", "default material"]),
 ];
 
 /// The files of the loaders.

@@ -1,0 +1,84 @@
+//! What equation (6) promises of any picture: with positive weights its result is a mean of `y_i + z_c - z_i`, and lies
+//! among them.
+
+use super::*;
+
+/// Pixels to each side of the shipped network's window.
+const REACH: usize = 7;
+/// What rounding may add to a mean of some hundreds of terms, in units of the largest number that is summed.
+const ROUNDING: f32 = 1e-5;
+
+/// Least and largest term of a pixel's channel, and what rounding may add.
+fn hull(stack: &LevelStack, valid: &[bool], pixel: usize, c: usize) -> (f32, f32, f32) {
+    let (x, y) = (pixel % stack.width, pixel / stack.width);
+    let (mut least, mut most, mut largest) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
+    for v in y.saturating_sub(REACH)..(y + REACH + 1).min(stack.height) {
+        for u in x.saturating_sub(REACH)..(x + REACH + 1).min(stack.width) {
+            let i = v * stack.width + u;
+            if !valid[i] {
+                continue;
+            }
+            for z in &stack.levels[1..] {
+                let (own, there, here) = (stack.levels[0][i][c], z[i][c], z[pixel][c]);
+                let term = own + here - there;
+                (least, most) = (least.min(term), most.max(term));
+                largest = largest.max(own.abs()).max(there.abs()).max(here.abs());
+            }
+        }
+    }
+    (least, most, ROUNDING * largest)
+}
+
+/// Pixels whose result lies outside.
+fn outside(stack: &LevelStack, image: &[[f32; 3]]) -> usize {
+    let valid = stack.valid();
+    let beyond = |pixel: usize, c: usize| {
+        let (least, most, allowed) = hull(stack, &valid, pixel, c);
+        !(least - allowed..=most + allowed).contains(&image[pixel][c])
+    };
+    (0..image.len()).filter(|&pixel| valid[pixel] && (0..3).any(|c| beyond(pixel, c))).count()
+}
+
+/// A stack whose levels are `of` a pixel's index, times what noise makes of one.
+fn picture(width: usize, height: usize, noise: f32, of: impl Fn(usize) -> f32) -> LevelStack {
+    let mut stack = Random(12).stack(width, height, 5);
+    let mut random = Random(13);
+    for level in &mut stack.levels {
+        for (index, rgb) in level.iter_mut().enumerate() {
+            *rgb = std::array::from_fn(|_| of(index) * (1.0 + noise * (random.next() - 0.5)));
+        }
+    }
+    stack
+}
+
+/// Constant and black pictures, half a picture and single pixels a million times as bright as the rest, and values that
+/// are not finite, in pictures that are one pixel, a row, a column, or more. A result that leaves the hull by a
+/// thousandth is seen.
+#[test]
+fn results_lie_among_their_terms_in_any_picture() {
+    let mut combiner = combiner();
+    for (width, height) in [(1, 1), (1, 40), (40, 1), (2, 3), (33, 26)] {
+        let half = |index: usize| if 2 * (index % width) < width { 1e6 } else { 1.0 };
+        let sparks = |index: usize| if index % 11 == 3 { 1e6 } else { 1.0 };
+        let constant = picture(width, height, 0.0, |_| 3.0);
+        let image = combiner.run(&constant).unwrap();
+        assert_eq!(outside(&constant, &image), 0, "{width} x {height}");
+        let wrong: Vec<_> = image.iter().map(|rgb| rgb.map(|value| 1.001 * value)).collect();
+        assert_eq!(outside(&constant, &wrong), width * height);
+        let black = picture(width, height, 0.0, |_| 0.0);
+        assert!(combiner.run(&black).unwrap().iter().flatten().all(|value| *value == 0.0));
+        for noise in [0.0, 1.0] {
+            for mut stack in [picture(width, height, noise, half), picture(width, height, noise, sparks)] {
+                let image = combiner.run(&stack).unwrap();
+                assert_eq!(outside(&stack, &image), 0, "{width} x {height}, noise {noise}");
+                for (k, value) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().enumerate() {
+                    let level = &mut stack.levels[k + 1];
+                    level.iter_mut().skip(3 * k + 1).step_by(13).for_each(|rgb| rgb[k] = value);
+                }
+                let image = combiner.run(&stack).unwrap();
+                assert!(image.iter().flatten().all(|value| value.is_finite()), "{width} x {height}");
+                assert_eq!(outside(&stack, &image), 0, "{width} x {height}, noise {noise}, not finite");
+            }
+        }
+    }
+}

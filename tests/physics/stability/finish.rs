@@ -1,0 +1,89 @@
+//! The finished picture stays where the bounds of the finish allow, whatever estimate it is made of.
+
+use caustique::finish::bound::{LIMIT, REACH, spread};
+use caustique::finish::{Denoiser, DenoiserChoice, Estimate, Finish, Size, Windows, window};
+use caustique::random::{Domain, Purpose, Stream};
+
+const NONE: f32 = f32::NAN;
+
+/// A picture whose channels differ, with standard errors of a tenth; the guides are those of a flat grey wall.
+fn estimate(size: Size, of: impl Fn(usize) -> f32) -> Estimate {
+    let draw = |index: usize| Stream::new(31, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel);
+    let mean: Vec<[f32; 3]> = (0..size.pixels()).map(|i| [of(i), 0.5 * of(i), of(i) * (0.9 + 0.2 * draw(i))]).collect();
+    let deviation = mean.iter().map(|rgb| rgb.map(|value| 0.1 * value)).collect();
+    let (albedo, normal) = (vec![[0.5; 3]; size.pixels()], vec![[0.0, 0.0, 1.0]; size.pixels()]);
+    Estimate { size, mean, deviation, albedo: Some(albedo), normal: Some(normal) }
+}
+
+/// Pixels of a picture that break a bound: each channel is a number, between zero and the brightest estimate around,
+/// and no further from its own estimate than the limit, where there is one.
+fn outside(estimate: &Estimate, picture: &[[f32; 3]]) -> Vec<usize> {
+    let (size, spread) = (estimate.size, spread(&estimate.deviation, estimate.size));
+    let breaks = |index: usize, c: usize| {
+        let around = window(size, index, REACH).map(|other| estimate.mean[other][c]).filter(|value| value.is_finite());
+        let (value, mean) = (picture[index][c], estimate.mean[index][c]);
+        let most = LIMIT * spread[index][c] * 1.0001;
+        !(0.0..=around.fold(0.0, f32::max)).contains(&value)
+            || (mean.is_finite() && most.is_finite() && (value - mean).abs() > most)
+    };
+    (0..size.pixels()).filter(|&index| (0..3).any(|c| breaks(index, c))).collect()
+}
+
+/// Constant and black pictures, edges and sparks of a million to one, values as large and as small as f32 holds, and
+/// estimates that are no numbers, in pictures of a pixel, a row, a column and more, by every denoiser.
+#[test]
+fn no_denoiser_leaves_the_bounds() {
+    let sizes = [(1, 1), (1, 30), (30, 1), (24, 17)].map(|(width, height)| Size { width, height });
+    let half = |i: usize| if i % 4 < 2 { 1e6 } else { 1.0 };
+    let spark = |i: usize| if i % 13 == 5 { 1e6 } else { 1.0 };
+    let broken = |i: usize| [1.0, f32::INFINITY, 2.0, NONE, 3.0, f32::NEG_INFINITY, 4.0][i % 7];
+    let pictures: [(&str, &dyn Fn(usize) -> f32); 8] = [
+        ("constant", &|_| 3.0),
+        ("black", &|_| 0.0),
+        ("edges", &half),
+        ("sparks", &spark),
+        ("large", &|_| 1e37),
+        ("small", &|_| 1e-37),
+        ("not finite", &broken),
+        ("nothing", &|_| NONE),
+    ];
+    for choice in [DenoiserChoice::None, DenoiserChoice::Own, DenoiserChoice::Oidn] {
+        let (denoiser, _) = Denoiser::open(choice).expect("the denoisers are installed");
+        let mut finish = Finish::new(denoiser, None);
+        for size in sizes {
+            for (name, of) in &pictures {
+                let estimate = estimate(size, of);
+                let picture = finish.picture(&estimate).expect("it is finished");
+                let found = outside(&estimate, &picture);
+                assert!(found.is_empty(), "{choice:?}, {name}, {size:?}: pixels {found:?} of {picture:?}");
+                if *name == "constant" {
+                    let wrong: Vec<[f32; 3]> = picture.iter().map(|rgb| rgb.map(|value| 1.5 * value)).collect();
+                    assert_eq!(outside(&estimate, &wrong).len(), size.pixels(), "what is too bright goes unnoticed");
+                }
+            }
+        }
+    }
+}
+
+/// Means over windows beside pixels a million million times as bright as the rest, as squared errors are: what has left
+/// a window leaves the rounding of f64 behind, 2^-50 of all that the picture holds. In f32 it would leave 2^-24 of it.
+#[test]
+fn windows_forget_what_has_left_them() {
+    let (size, reach) = (Size { width: 64, height: 48 }, 3);
+    let value = |i: usize| if i % 37 == 5 { 1e12 } else { 1.0 + (i % 7) as f32 };
+    let values: Vec<[f32; 1]> = (0..size.pixels()).map(|i| [value(i)]).collect();
+    let counts: Vec<bool> = (0..size.pixels()).map(|i| i % 5 != 0).collect();
+    let all: f64 = values.iter().map(|[value]| f64::from(*value)).sum();
+    let left = |digits: i32| all * 2f64.powi(-digits);
+    let means = Windows::new(size, reach, &counts).means(&values);
+    let mut dim = 0;
+    for (index, [mean]) in means.iter().enumerate() {
+        let inside: Vec<f64> =
+            window(size, index, reach).filter(|i| counts[*i]).map(|i| f64::from(values[i][0])).collect();
+        let expected = inside.iter().sum::<f64>() / inside.len() as f64;
+        let allowed = left(50) / inside.len() as f64 + 1e-6 * expected;
+        assert!((f64::from(*mean) - expected).abs() < allowed, "pixel {index}: {mean}, not {expected}");
+        dim += usize::from(expected < 10.0 && allowed < 0.1 * expected && left(24) > expected);
+    }
+    assert!(dim > 10, "{dim} windows without a bright pixel");
+}

@@ -1,0 +1,196 @@
+//! Rules for bandwidths over a million iterations, against the same recursions with twice the digits of f64.
+
+use super::exact::Exact;
+use caustique::estimator::rule::adaptive::Adaptive;
+use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings, LEAST_BOUND};
+use caustique::estimator::rule::local::LocalStatistics;
+use caustique::estimator::rule::thinned::Thinned;
+use caustique::estimator::rule::{CountingRule, memoryless, volume};
+use caustique::math::{Frame, Vec3};
+use caustique::photon::kernel::{self, laplacian};
+use caustique::photon::{Kernel, Mark};
+use caustique::transport::Found;
+use std::f64::consts::PI;
+use wide::f32x8;
+
+const MILLION: u64 = 1_000_000;
+
+/// The product of the memoryless rules at every iteration: to 1e-12.
+#[test]
+fn memoryless_rules_follow_their_product() {
+    for alpha in [memoryless::ALPHA, volume::ALPHA] {
+        let (mut product, mut worst) = (Exact::new(1.0), [0.0f64; 2]);
+        for i in 1..=MILLION {
+            if i % 16 == 1 {
+                let cube = volume::radius_factor(i, alpha);
+                let cube = Exact::new(cube) * Exact::new(cube) * Exact::new(cube);
+                worst[0] = worst[0].max(product.error_of(memoryless::radius2_factor(i, alpha)));
+                worst[1] = worst[1].max(product.error_of(cube.value()));
+            }
+            let k = Exact::new(i as f64);
+            product = product * (k + Exact::new(alpha)) / (k + Exact::new(1.0));
+        }
+        println!("alpha {alpha:.3}: off by {worst:?}");
+        assert!(worst.iter().all(|&worst| worst < 1e-12), "{worst:?}");
+    }
+}
+
+/// Local statistics where every iteration finds a photon: to 1e-9. Radii kept in f32 would be off by 1e-6 and more.
+#[test]
+fn local_statistics_follow_their_recursion() {
+    let rule = LocalStatistics { alpha: 2.0 / 3.0 };
+    let mut ours = [rule.begin(1.0, 10.0, 0)];
+    let (mut radius2, mut photons, mut single) = (Exact::new(1.0), Exact::default(), 1.0f32);
+    let alpha = Exact::new(rule.alpha);
+    for i in 1..=MILLION {
+        let found = (i % 3 + 1) as u32;
+        rule.update(i, &mut ours, &mut [], &mut [found, 0, 0, 0, 0]);
+        let new = Exact::new(f64::from(found));
+        let factor = (photons + alpha * new) / (photons + new);
+        (photons, radius2) = (photons + alpha * new, radius2 * factor);
+        single = (f64::from(single) * factor.value()) as f32;
+    }
+    let errors = [radius2.error_of(ours[0].radius2), photons.error_of(ours[0].photons)];
+    let in_f32 = radius2.error_of(f64::from(single));
+    println!("radius squared and photons off by {errors:?}, a radius in f32 by {in_f32:.1e}");
+    assert!(errors.iter().all(|&error| error < 1e-9), "{errors:?}");
+    assert!(in_f32 > 1e-6, "{in_f32:e}");
+}
+
+/// A photon in the frame of +Z: its distance as a share of the radius, and its direction as a share of a turn.
+fn found(radius2: f32, distance: f32, turn: f32) -> Found {
+    let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
+    let distance = distance * radius2.sqrt();
+    let frame = Frame::from_normal(Vec3::Z);
+    Found::one((frame.t * cos + frame.b * sin) * distance, distance * distance, 1.0, Mark::new(1.0, 0.5))
+}
+
+/// The chi-squared rule word for word, counts as integers, for two annuli of six sectors.
+struct Oracle {
+    counts: [u64; 12],
+    radius2: Exact,
+    bound: Exact,
+    /// Reductions so far.
+    reductions: u32,
+}
+
+impl Oracle {
+    /// By the bound as it is rounded, the quantile of twelve cells and that of six.
+    fn after(&mut self, cell: usize, bound: f64, critical: [f64; 2]) {
+        self.counts[cell] += 1;
+        let passes = |counts: &[u64], critical: f64| {
+            let (total, squares) = counts.iter().fold((0, 0), |(total, squares), n| (total + n, squares + n * n));
+            let excess = (squares * counts.len() as u64) as f64 / total as f64 - total as f64;
+            total > 0 && excess <= critical
+        };
+        let total: u64 = self.counts.iter().sum();
+        if (total as f64) < bound || passes(&self.counts, critical[0]) {
+            return;
+        }
+        let factor = if passes(&self.counts[..6], critical[1]) { 0.5 } else { 0.8 };
+        self.radius2 = self.radius2 * Exact::new(factor);
+        self.bound = self.bound * Exact::new(1.2);
+        (self.counts, self.reductions) = ([0; 12], self.reductions + 1);
+    }
+}
+
+/// A million photons, one an iteration, in a field that looks uniform now and not then; sectors are empty for long. The
+/// rule decides as exact counts do each time; each reduction rounds radius and bound once, by 2^-24 and what their
+/// factors are off by, 1.2e-7 together. The rule for photons that differ in weight, of which none does here, agrees to
+/// the bit.
+#[test]
+fn the_chi_squared_rule_decides_as_exact_counts_do() {
+    let settings = ChiSquaredSettings { significance: 1e-3, ..ChiSquaredSettings::default() };
+    let (rule, thinned) = (ChiSquared::new(&settings), Thinned::new(&settings));
+    let frame = Frame::from_normal(Vec3::Z);
+    let (mut ours, mut counts) = ([rule.begin(1.0, 10.0, 0)], [0u32; 12]);
+    let (mut alike, mut alike_counts) = ([thinned.begin(1.0, 10.0, 0)], [0u32; 13]);
+    let bound = Exact::new(f64::from(LEAST_BOUND));
+    let mut oracle = Oracle { counts: [0; 12], radius2: Exact::new(1.0), bound, reductions: 0 };
+    // Quantiles of 11 and 5 degrees of freedom at 1e-3.
+    let critical = [31.264_133_6, 20.515_005_7];
+    for i in 1..=MILLION {
+        // In one sector alone, in the outer annulus alone, in the inner one seldom, and all over.
+        let (sector, outer) = match i / 50_000 % 4 {
+            0 => (0, i % 2),
+            1 => (i % 6, 1),
+            2 => (i / 5 % 6, u64::from(!i.is_multiple_of(5))),
+            _ => (i % 6, i / 6 % 2),
+        };
+        let photon = found(ours[0].radius2, 0.5 + 0.4 * outer as f32, (sector as f32 + 0.5) / 6.0);
+        let (mut tally, mut alike_tally) = Default::default();
+        let least = f64::from(ours[0].bound);
+        // The lower half is numbered backwards.
+        let cell = 6 * outer + if sector < 3 { sector } else { 8 - sector };
+        rule.count(&ours, &mut counts, &mut tally, &frame, &photon);
+        rule.update(i, &mut ours, &mut counts, &mut tally);
+        thinned.count(&alike, &mut alike_counts, &mut alike_tally, &frame, &photon);
+        thinned.update(i, &mut alike, &mut alike_counts, &mut alike_tally);
+        oracle.after(cell as usize, least, critical);
+        assert!(counts.iter().zip(&oracle.counts).all(|(a, b)| u64::from(*a) == *b), "iteration {i}");
+        assert_eq!(alike[0], ours[0], "iteration {i}");
+    }
+    let allowed = 1.2e-7 * f64::from(oracle.reductions);
+    let errors = [oracle.radius2.error_of(f64::from(ours[0].radius2)), oracle.bound.error_of(f64::from(ours[0].bound))];
+    println!("{} reductions: radius squared and bound off by {errors:?}", oracle.reductions);
+    assert!(oracle.reductions > 20 && errors.iter().all(|&error| error < allowed), "{errors:?}, {allowed:e}");
+}
+
+/// The adaptive rule in a field with curvature: the bandwidth that its sums say after a million iterations, to 1e-5,
+/// which is what sums of f32 contributions within a path leave.
+#[test]
+fn the_adaptive_rule_follows_its_sums() {
+    let rule = Adaptive::<kernel::Box>::default();
+    let (mut ours, frame) = ([rule.begin(1.0, 10.0, 0)], Frame::from_normal(Vec3::Z));
+    let (mut shot, mut curvature, mut noise) = (Exact::default(), Exact::default(), Exact::default());
+    let initial = 1.0f64;
+    let mut pilot2 = 4.0f32;
+    for i in 1..=MILLION {
+        // Within the bandwidth, then within the kernel of the Laplacian.
+        let radius2 = f64::from(ours[0].radius2);
+        let photon = match i % 2 {
+            0 => found(ours[0].radius2, 0.3, 0.1),
+            _ => found(pilot2, 0.3 + 0.4 * (i % 17) as f32 / 17.0, 0.1),
+        };
+        let mut tally = Default::default();
+        rule.count(&ours, &mut [], &mut tally, &frame, &photon);
+        rule.update(i, &mut ours, &mut [], &mut tally);
+        let [distance2, ..] = photon.distance2.to_array();
+        let [part, ..] = laplacian(f32x8::splat(distance2 / pilot2)).to_array();
+        let scale = f64::from(pilot2).powi(-2);
+        let within = if f64::from(distance2) < radius2 { 1.0 } else { 0.0 };
+        shot = shot + Exact::new(within) / (Exact::new(PI) * Exact::new(radius2));
+        let part = Exact::new(f64::from(part)) * Exact::new(scale);
+        (curvature, noise) = (curvature + part, noise + part * part);
+        pilot2 = (4.0 * initial * ((i + 1) as f64).powf(-0.2)) as f32;
+    }
+    let n = MILLION as f64;
+    let squared = (curvature * curvature - noise).value() / (n * n);
+    let bias2 = f64::from(<kernel::Box as Kernel>::SECOND_MOMENT).powi(2) * squared;
+    let optimum = 2.0 * shot.value() / n * f64::from(<kernel::Box as Kernel>::ROUGHNESS) / (3.0 * PI * n * bias2);
+    let usual = memoryless::radius2_factor(MILLION + 1, 2.0 / 3.0);
+    let expected = optimum.cbrt().clamp(usual / 64.0, 4.0 * usual);
+    let error = (f64::from(ours[0].radius2) / expected - 1.0).abs();
+    println!("radius squared {:e} off by {error:.1e}; the memoryless rule's is {usual:e}", ours[0].radius2);
+    assert!(error < 1e-5, "{error:e}");
+    assert!(optimum.cbrt() > usual / 64.0 && optimum.cbrt() < 4.0 * usual, "a bound, not sums, sets the bandwidth");
+}
+
+/// Counts without photons, in one sector, and in one annulus: statistics are numbers, and what has no photons passes.
+#[test]
+fn statistics_of_empty_sectors_are_numbers() {
+    assert_eq!(ChiSquared::statistic(&[0; 12]), 0.0);
+    assert_eq!(ChiSquared::statistic(&[5; 12]), 0.0);
+    for n in [1u32, 1000, 1 << 30] {
+        let mut counts = [0; 12];
+        counts[4] = n;
+        assert_eq!(ChiSquared::statistic(&counts), 11.0 * f64::from(n));
+    }
+    for settings in [ChiSquaredSettings::default(), ChiSquaredSettings { annuli: 1, sectors: 1, ..Default::default() }]
+    {
+        let rule = ChiSquared::new(&settings);
+        let (mut bandwidth, mut counts) = ([rule.begin(1.0, 0.0, 0)], vec![0u32; rule.counts()]);
+        rule.update(1, &mut bandwidth, &mut counts, &mut Default::default());
+        assert_eq!((bandwidth[0].radius2, bandwidth[0].bound), (1.0, LEAST_BOUND));
+    }
+}

@@ -1,0 +1,92 @@
+//! Sums over iterations: those of pixels, of their squares, and as many terms as are allowed.
+
+use super::exact::Exact;
+use caustique::estimator::Pixel;
+use caustique::math::{DVec3, Rgb};
+use caustique::random::{Domain, Purpose, Stream};
+use caustique::stat::sum::{Grid, MOST_TERMS, Sum};
+use caustique::stat::{Grids, Moments};
+use caustique::transport::EyeMeasure;
+
+const MILLION: u32 = 1_000_000;
+
+/// Samples as pixels have them: most are dim, and few are a million times as bright.
+fn sample(index: u32) -> f32 {
+    let u = Stream::new(11, 1, Domain::Test, u64::from(index)).vertex(0).two(Purpose::Pixel);
+    10f32.powf(6.0 * u.x.powi(8) - 3.0) * (0.5 + u.y)
+}
+
+/// Mean and variance of the mean of a million values, against sums of twice the digits. What is cut off each term is
+/// less than 2^-30 of the largest, 2^-30 N of the largest for the sum, of squares likewise; here that is a hundredth of
+/// what it may be, for cuts go either way. Sums in f32 miss the bound ten thousand times over.
+#[test]
+fn a_million_values_keep_their_digits() {
+    let values: Vec<f32> = (0..MILLION).map(sample).collect();
+    let largest = values.iter().fold(0.0f32, |most, value| most.max(*value));
+    let grids = Grids::default().holding(f64::from(largest));
+    let (mut moments, mut plain) = (Moments::default(), 0.0f32);
+    let (mut sum, mut squares) = (Exact::default(), Exact::default());
+    for &value in &values {
+        moments.add(Rgb::splat(value), grids.rounding());
+        plain += value;
+        let value = Exact::new(f64::from(value));
+        (sum, squares) = (sum + value, squares + value * value);
+    }
+    let count = Exact::new(f64::from(MILLION));
+    let mean = sum / count;
+    let scatter = squares - sum * mean;
+    let variance = scatter / (count * Exact::new(f64::from(MILLION - 1)));
+    let found = [moments.mean(f64::from(MILLION)).x, moments.variance_of_mean(f64::from(MILLION)).x];
+    let errors = [mean.error_of(found[0]), variance.error_of(found[1])];
+    let in_f32 = mean.error_of(f64::from(plain) / f64::from(MILLION));
+    let cut = 2f64.powi(-30);
+    let bounds = [
+        0.01 * cut * f64::from(largest) / mean.value(),
+        0.01 * cut * f64::from(largest).powi(2) * f64::from(MILLION) / scatter.value(),
+    ];
+    println!("mean and variance off by {errors:?} (bounds {bounds:?}), the mean in f32 by {in_f32:.1e}");
+    assert!(errors[0] < bounds[0] && errors[1] < bounds[1], "{errors:?}, {bounds:?}");
+    assert!(in_f32 > 1e4 * bounds[0], "{in_f32:e}");
+}
+
+/// As many terms as a render may have, each with all digits of its grid set, sum to the integer that they are.
+#[test]
+fn as_many_terms_as_are_allowed_lose_no_digit() {
+    // Of a grid of whole numbers, and of the finer one of multiples of 2^-30.
+    let rounding = Grid::default().holding(1.0).rounding();
+    for unit in [1.0, 2f64.powi(-30)] {
+        let term = (2f64.powi(29) - 1.0) * unit;
+        let (mut sum, mut plain) = (Sum::<f64>::default(), 0.0f32);
+        for _ in 0..MOST_TERMS {
+            sum.add(term, rounding);
+            plain += term as f32;
+        }
+        let expected = MOST_TERMS as f64 * term;
+        assert!(sum.value() == expected && f64::from(plain) != expected, "{} {plain} {expected}", sum.value());
+    }
+    // Two eye paths an iteration.
+    assert!(u32::try_from(2 * MOST_TERMS).is_ok(), "pixels count in 32 bits");
+}
+
+/// A pixel that sees nothing at all for a million iterations, one that sees light once, and one whose every sample is
+/// rejected: means are zero or what they must be, variances and errors are numbers, and counts are right.
+#[test]
+fn pixels_that_see_nothing() {
+    let pixel = |measure: &dyn Fn(u32) -> EyeMeasure| {
+        let mut pixel = Pixel::new(1, 0, [1.0; 2]);
+        (1..=MILLION).for_each(|pass| pixel.add(u64::from(pass), &measure(pass), None));
+        pixel
+    };
+    let light = |direct: Rgb| EyeMeasure { direct, ..EyeMeasure::default() };
+    let never = pixel(&|_| EyeMeasure::default());
+    assert_eq!((never.iterations, never.mean(0), never.variance_of_mean(0)), (MILLION, DVec3::ZERO, DVec3::ZERO));
+    assert_eq!((never.depth(), never.albedo(), never.coverage.hit_fraction()), (None, DVec3::ZERO, 0.0));
+    let once = pixel(&|pass| light(if pass == 77 { Rgb::splat(3e30) } else { Rgb::ZERO }));
+    assert!((once.mean(0).x / 3e24 - 1.0).abs() < 1e-7);
+    let n = f64::from(MILLION);
+    let expected = f64::from(3e30f32).powi(2) * (1.0 - 1.0 / n) / (n * (n - 1.0));
+    assert!((once.variance_of_mean(0).x / expected - 1.0).abs() < 1e-7);
+    let broken = pixel(&|_| light(Rgb::NAN));
+    assert_eq!((broken.iterations, broken.rejected.total(), broken.mean(0)), (0, MILLION, DVec3::ZERO));
+    assert_eq!(broken.variance_of_mean(0), DVec3::INFINITY);
+}
