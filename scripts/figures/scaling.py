@@ -105,10 +105,10 @@ def threads(method):
 
 
 def load(triangles):
-    """What a render of one pixel takes, which is nearly all loading."""
+    """Core-seconds of a render of one pixel, which are nearly all loading."""
     command = [BIN, "render", scene(triangles) + ".glb", "-o", OUT / "a.exr", "--iterations", 1, "--no-combine"]
     runs = [spent([*command, "--width", 1, "--height", 1, "--method", "path", "--threads", 1]) for _ in range(ROUNDS)]
-    return {key: min(run[key] for run in runs) for key in ("core_seconds", "peak_mib")}
+    return min(run["core_seconds"] for run in runs)
 
 
 def main():
@@ -124,10 +124,9 @@ def main():
             rows.append(row | growth(sizes, costs))
             print(rows[-1], flush=True)
     sizes = AXES["triangles"][0]
-    loads = [load(size) for size in sizes]
-    taken = {key: [one[key] for one in loads] for key in ("core_seconds", "peak_mib")}
-    row = {"axis": "triangles", "method": "loading", "sizes": sizes} | taken
-    rows.append(row | growth(sizes, taken["core_seconds"]))
+    taken = [load(size) for size in sizes]
+    row = {"axis": "triangles", "method": "loading", "sizes": sizes, "core_seconds": taken}
+    rows.append(row | growth(sizes, taken))
     print(rows[-1], flush=True)
     values = {"rows": rows, "threads": [threads(method) for method in METHODS]}
     print(values["threads"])
