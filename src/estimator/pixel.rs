@@ -127,6 +127,11 @@ impl Pixel {
         size_of::<Pixel>() + others * size_of::<Moments>() + groups * size_of::<[Sum<DVec3>; 2]>()
     }
 
+    /// Bytes of this one.
+    pub fn size(&self) -> usize {
+        Pixel::bytes(self.levels(), self.groups.len())
+    }
+
     /// Number of levels.
     #[inline]
     pub fn levels(&self) -> usize {

@@ -58,6 +58,11 @@ pub struct Rendered {
 }
 
 impl Rendered {
+    /// Bytes that the sums of a pixel take, those of its levels and light groups among them.
+    pub fn bytes_per_pixel(&self) -> usize {
+        self.pixels.first().map_or(0, Pixel::size)
+    }
+
     /// Whether the maps of [`Method::Pm`], traced once, had no room for the photons of all its light paths.
     pub fn map_is_full(&self) -> bool {
         self.settings.method == Method::Pm && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)

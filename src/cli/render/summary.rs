@@ -22,6 +22,8 @@ pub struct Summary {
     /// Photons are merged or gathered within bandwidths, of one level.
     has_one_bandwidth: bool,
     rejections: Rejections,
+    /// Bytes of a pixel's sums, and how many levels these are of.
+    pixel: (usize, usize),
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
     full: Option<(u64, u32, u64)>,
@@ -42,6 +44,7 @@ impl Summary {
             told: rendered.settings.told(),
             has_one_bandwidth: rendered.settings.method.has_bandwidths() && rendered.settings.levels.count < 2,
             rejections: rendered.rejections(),
+            pixel: (rendered.bytes_per_pixel(), rendered.settings.levels.count),
             stop: rendered.stop,
             full: rendered.map_is_full().then(|| {
                 let settings = &rendered.settings;
@@ -61,7 +64,10 @@ impl Summary {
         if let Some(error) = self.error {
             say(&format!("estimated relative error before the finish {}{}", percent(error), self.told.note()));
         }
-        say(&format!("peak memory {:.2} GiB", peak_memory() as f64 / f64::from(1 << 30)));
+        let peak = peak_memory() as f64 / f64::from(1 << 30);
+        let (bytes, levels) = self.pixel;
+        let levels = if levels > 1 { format!("{levels} levels") } else { "one level".into() };
+        say(&format!("peak memory {peak:.2} GiB; the sums of a pixel, of {levels}, take {bytes} bytes"));
     }
 
     /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, which levels

@@ -7,6 +7,7 @@
 mod header;
 mod read;
 mod write;
+mod zip;
 
 use std::collections::BTreeMap;
 

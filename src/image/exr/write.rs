@@ -5,17 +5,19 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use exr::block::chunk::Chunk;
 use exr::block::writer::ChunksWriter;
 use exr::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
 use exr::math::Vec2;
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LineOrder, SampleType, Text, TimeCode,
+    AttributeValue, ChannelDescription, Chromaticities, Compression as Packing, IntegerBounds, LineOrder, SampleType,
+    Text, TimeCode,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{SmallVec, f16};
 use rayon::prelude::*;
 
-use super::{Attributes, Frame, SOFTWARE, header};
+use super::{Attributes, Frame, SOFTWARE, header, zip};
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Plane, Sample, check};
 use crate::image::atomic;
@@ -113,7 +115,6 @@ fn header(
     options: Options,
 ) -> Result<Header> {
     use exr::meta::BlockDescription::ScanLines;
-    use exr::meta::attribute::Compression as Packing;
     let channels: SmallVec<[ChannelDescription; 5]> = planes
         .iter()
         .map(|(name, source)| {
@@ -193,7 +194,7 @@ fn write_chunks(
                         let start = at.position.y() * width + at.position.x();
                         fill(line.value, &plane.values[start..start + at.sample_count], plane.sample, negated);
                     });
-                    block.compress_to_chunk(&meta.headers)
+                    pack(block, &meta.headers)
                 })
                 .collect();
             for (&(index, _), chunk) in batch.iter().zip(compressed) {
@@ -202,6 +203,16 @@ fn write_chunks(
         }
         Ok(())
     })
+}
+
+/// A block as it stands in the file.
+fn pack(block: UncompressedBlock, headers: &[Header]) -> exr::error::Result<Chunk> {
+    let zipped = matches!(headers[0].compression, Packing::ZIP1 | Packing::ZIP16);
+    // Samples are in the machine's byte order here.
+    if zipped && cfg!(target_endian = "little") {
+        return Ok(zip::chunk(block, &headers[0]));
+    }
+    block.compress_to_chunk(headers)
 }
 
 /// Samples of one line in the machine's byte order.

@@ -52,10 +52,11 @@ pub(super) fn read(
         let cause = format!("index {index} is past the {} vertices", positions.len());
         return Err(fault(place, cause).hint("re-export the mesh with 'Apply Modifiers'"));
     }
-    let mut mesh = Mesh { name: plain, triangles: triangles(mode, &order), positions, ..Mesh::default() };
     if mode == Mode::Triangles && !order.len().is_multiple_of(3) {
         warnings.push(format!("{place}: the last {} of its indices make no triangle", order.len() % 3));
     }
+    let mut mesh = Mesh { name: plain, triangles: triangles(mode, &order), positions, ..Mesh::default() };
+    drop(order);
     reader.attributes(&mut mesh, warnings)?;
     let raw = &document.part("meshes", index)["primitives"][primitive];
     deformation.apply(document, source, raw, &mut mesh, &place, warnings)?;

@@ -22,39 +22,91 @@ pub(super) struct Solid {
 /// Looks at all triangles of `meshes` together. Triangles whose corners fall together bound nothing and are passed
 /// over.
 pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
-    let mut welded: HashMap<[u32; 3], u32> = HashMap::new();
-    // Negative zero is zero.
-    let key = |p: Vec3| p.to_array().map(|x| (x + 0.0).to_bits());
-    let mut edges: Vec<(u32, u32, bool)> = Vec::new();
-    let mut volume = 0.0;
+    let (places, count) = welded(meshes);
+    let faces = || {
+        meshes.iter().zip(&places).flat_map(|(mesh, places)| {
+            let welded = move |corners: &[u32; 3]| (corners.map(|i| places[i as usize]), corners.map(|i| i as usize));
+            let whole = |([a, b, c], _): &([u32; 3], _)| a != b && b != c && c != a;
+            mesh.triangles.iter().map(welded).filter(whole).map(move |(places, corners)| (*mesh, places, corners))
+        })
+    };
     let origin = meshes.iter().find_map(|m| m.positions.first()).map_or(Default::default(), |p| p.as_dvec3());
-    for mesh in meshes {
-        let ids: Vec<u32> = mesh
-            .positions
-            .iter()
-            .map(|&p| {
-                let next = welded.len() as u32;
-                *welded.entry(key(p)).or_insert(next)
-            })
-            .collect();
-        for triangle in &mesh.triangles {
-            let [a, b, c] = triangle.map(|i| ids[i as usize]);
-            if a == b || b == c || c == a {
-                continue;
-            }
-            for (i, j) in [(a, b), (b, c), (c, a)] {
-                edges.push((i.min(j), i.max(j), i < j));
-            }
-            let [p, q, r] = triangle.map(|i| mesh.positions[i as usize].as_dvec3() - origin);
-            volume += p.dot(q.cross(r)) / 6.0;
+    let mut volume = 0.0;
+    for (mesh, _, corners) in faces() {
+        let [p, q, r] = corners.map(|i| mesh.positions[i].as_dvec3() - origin);
+        volume += p.dot(q.cross(r)) / 6.0;
+    }
+    let rims = Rims::of(count, || faces().flat_map(|(_, [a, b, c], _)| [(a, b), (b, c), (c, a)]));
+    Solid { closed: rims.opposite, flipped: rims.paired && !rims.opposite, rim: rims.alone, volume }
+}
+
+/// A number for the place of each vertex, the same for all vertices there, and how many there are.
+fn welded(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
+    // Room for all at once: a table that grows is there twice.
+    let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(meshes.iter().map(|m| m.positions.len()).sum());
+    // Negative zero is zero.
+    let key = |p: &Vec3| p.to_array().map(|x| (x + 0.0).to_bits());
+    let mut place = |p: &Vec3| {
+        let next = known.len() as u32;
+        *known.entry(key(p)).or_insert(next)
+    };
+    let places = meshes.iter().map(|mesh| mesh.positions.iter().map(&mut place).collect()).collect();
+    (places, known.len())
+}
+
+/// How triangles meet in the edges between their places.
+struct Rims {
+    /// There are edges, and each is of two triangles.
+    paired: bool,
+    /// The same, and these run along it in opposite directions.
+    opposite: bool,
+    /// Edges of one triangle.
+    alone: usize,
+}
+
+impl Rims {
+    /// Edges by their lower place and their direction, in lists of the higher places that stand one after the other (a
+    /// counting sort): four bytes an edge, and no sort but that of the few edges at a place.
+    fn of<E: Iterator<Item = (u32, u32)>>(places: usize, edges: impl Fn() -> E) -> Rims {
+        let list = |(i, j): (u32, u32)| 2 * i.min(j) as usize + usize::from(i < j);
+        let mut ends = vec![0usize; 2 * places + 1];
+        edges().for_each(|edge| ends[list(edge) + 1] += 1);
+        // Where lists begin, until they are filled.
+        let mut total = 0;
+        for end in &mut ends {
+            total += *end;
+            *end = total;
+        }
+        let mut highs = vec![0; total];
+        for edge in edges() {
+            let end = &mut ends[list(edge)];
+            highs[*end] = edge.0.max(edge.1);
+            *end += 1;
+        }
+        let mut rims = Rims { paired: total > 0, opposite: total > 0, alone: 0 };
+        let mut start = 0;
+        for end in ends.chunks_exact(2) {
+            rims.at_place(&mut highs[start..end[1]], end[0] - start);
+            start = end[1];
+        }
+        rims
+    }
+
+    /// Adds the edges from one place up to higher ones, the first `down` of which are run along downwards.
+    fn at_place(&mut self, highs: &mut [u32], down: usize) {
+        let (down, up) = highs.split_at_mut(down);
+        down.sort_unstable();
+        up.sort_unstable();
+        if down == up && down.is_sorted_by(|a, b| a < b) {
+            return;
+        }
+        self.opposite = false;
+        highs.sort_unstable();
+        for edge in highs.chunk_by(|a, b| a == b) {
+            self.paired &= edge.len() == 2;
+            self.alone += usize::from(edge.len() == 1);
         }
     }
-    edges.sort_unstable();
-    let same = |a: &(u32, u32, bool), b: &(u32, u32, bool)| (a.0, a.1) == (b.0, b.1);
-    let paired = !edges.is_empty() && edges.chunk_by(same).all(|edge| edge.len() == 2);
-    let opposite = edges.chunk_by(same).all(|edge| edge.first().map(|e| e.2) != edge.last().map(|e| e.2));
-    let rim = edges.chunk_by(same).filter(|edge| edge.len() == 1).count();
-    Solid { closed: paired && opposite, flipped: paired && !opposite, rim, volume }
 }
 
 #[cfg(test)]
@@ -87,6 +139,9 @@ mod tests {
         inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         let found = solid(&[&inside_out]);
         assert!(found.closed && found.volume < 0.0);
+        // A second tetrahedron turned over on the first, so that edges run twice each way.
+        let both = solid(&[&whole, &inside_out]);
+        assert!(!both.closed && !both.flipped && both.rim == 0);
         // The same triangles twice: four on every edge.
         assert!(!solid(&[&whole, &whole]).closed);
         assert!(solid(&[&whole, &tetrahedron(5.0)]).closed);

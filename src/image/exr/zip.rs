@@ -1,0 +1,85 @@
+//! Blocks of pixels as OpenEXR's ZIP compression packs them (OpenEXR Technical Introduction, "Data Compression"): even
+//! bytes before odd ones, each as its difference from the one before, in a zlib stream.
+//!
+//! The `exr` crate deflates with miniz_oxide, which takes three times as long as libdeflate for the same size within half
+//! a percent.
+
+use exr::block::UncompressedBlock;
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
+use exr::meta::header::Header;
+use libdeflater::{CompressionLvl, Compressor};
+
+/// The block of scan lines as it stands in a file with this header; its samples are in the order of little-endian
+/// bytes.
+pub(super) fn chunk(block: UncompressedBlock, header: &Header) -> Chunk {
+    let top = block.index.pixel_position.y() as i32 + header.own_attributes.layer_position.y();
+    let packed = packed(&block.data);
+    Chunk {
+        layer_index: block.index.layer,
+        compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
+            y_coordinate: top,
+            compressed_pixels_le: packed.unwrap_or(block.data),
+        }),
+    }
+}
+
+/// Higher levels take up to a third more time for half a percent fewer bytes.
+const LEVEL: i32 = 1;
+
+/// The bytes packed; `None` where that makes them no fewer: they stand as they are then.
+fn packed(bytes: &[u8]) -> Option<Vec<u8>> {
+    let differences = differences(bytes);
+    let mut packed = vec![0; bytes.len()];
+    let level = CompressionLvl::new(LEVEL).unwrap_or_default();
+    let length = Compressor::new(level).zlib_compress(&differences, &mut packed).ok()?;
+    packed.truncate(length);
+    (length < bytes.len()).then_some(packed)
+}
+
+/// Even bytes, then odd ones; each but the first less its predecessor, plus 128.
+fn differences(bytes: &[u8]) -> Vec<u8> {
+    let apart: Vec<u8> = bytes.iter().step_by(2).chain(bytes.iter().skip(1).step_by(2)).copied().collect();
+    let difference = |pair: &[u8]| pair[1].wrapping_sub(pair[0]).wrapping_add(128);
+    apart.iter().take(1).copied().chain(apart.windows(2).map(difference)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::block::BlockIndex;
+    use exr::math::Vec2;
+    use exr::meta::attribute::{ChannelDescription, Compression, LineOrder, SampleType, Text};
+    use exr::meta::{BlockDescription, MetaData};
+
+    /// The `exr` crate's reader gets back what was packed: what repeats, which becomes small, and noise, which stays as
+    /// it is.
+    #[test]
+    fn readers_unpack_what_is_packed() {
+        let size = Vec2(13, 7);
+        let channels = [("R", SampleType::F16), ("Z", SampleType::F32)];
+        let channels = channels.map(|(name, sample)| ChannelDescription::named(name, sample));
+        let header = Header::new(Text::from("layer"), size, channels.into_iter().collect()).with_encoding(
+            Compression::ZIP16,
+            BlockDescription::ScanLines,
+            LineOrder::Increasing,
+        );
+        let requirements = MetaData::validate(std::slice::from_ref(&header), true).expect("it is a header");
+        let meta = MetaData { requirements, headers: std::iter::once(header).collect() };
+        let mut state = 1u64;
+        let mut noise = |_| {
+            state = crate::random::mix(state.wrapping_add(1));
+            state as u8
+        };
+        let wave = |i: usize| (i / 9 * 31) as u8;
+        let length = size.area() * 6;
+        let pictures = [(0..length).map(wave).collect::<Vec<u8>>(), (0..length).map(&mut noise).collect()];
+        for (data, shrinks) in pictures.into_iter().zip([true, false]) {
+            let index = BlockIndex { layer: 0, pixel_position: Vec2(0, 0), pixel_size: size, level: Vec2(0, 0) };
+            let chunk = chunk(UncompressedBlock { index, data: data.clone() }, &meta.headers[0]);
+            let CompressedBlock::ScanLine(lines) = &chunk.compressed_block else { panic!("scan lines") };
+            assert_eq!(lines.compressed_pixels_le.len() < length, shrinks);
+            let back = UncompressedBlock::decompress_chunk(chunk, &meta, true).expect("it is as the format says");
+            assert!(back.data == data);
+        }
+    }
+}
