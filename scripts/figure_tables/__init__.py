@@ -3,10 +3,10 @@
 A function takes `Figures` and returns Markdown. What it asks `Figures` for stands above its table as the source.
 """
 
-from . import accuracy, blender, comparisons, farms, finished, gallery, rules, sizes, speed
+from . import accuracy, blender, comparisons, farms, finished, gallery, merits, rules, sizes, speed
 from .figures import Figures
 
-_ROOMS = (accuracy, blender, comparisons, farms, finished, gallery, rules, sizes, speed)
+_ROOMS = (accuracy, blender, comparisons, farms, finished, gallery, merits, rules, sizes, speed)
 KINDS = {name: table for room in _ROOMS for name, table in room.KINDS.items()}
 
 __all__ = ["KINDS", "Figures"]
