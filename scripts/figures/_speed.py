@@ -1,0 +1,125 @@
+"""Errors against core-seconds on one thread: what a method's own estimate takes, without a finish.
+
+The merit of some renders is their squared error, trimmed relMSE, times their core-seconds: how long a method takes to
+an error, where the squared error falls as one over time. Programs render in turns, as many iterations as take
+SECONDS_EACH, and core-seconds are those of the process, the start and the reading of the scene left out. LEVELS is the
+number of bandwidth levels [1], or `default`.
+"""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+# Before what reads them: small pictures, one thread.
+for variable, value in {"SET": "all", "WIDTH": "96", "THREADS": "1", "REFERENCE_SECONDS": "30"}.items():
+    os.environ.setdefault(variable, value)
+
+import _references  # noqa: E402
+from _accuracy import geometric, short  # noqa: E402
+from _cache import CACHE, THREADS, WIDTH, Failed, digest, load, making, save, scene_key, timed  # noqa: E402
+from _pictures import Layers, Reference  # noqa: E402
+
+SECONDS = float(os.environ.get("SECONDS_EACH", "2"))
+SEEDS = int(os.environ.get("SEEDS", "2"))
+LEVELS = os.environ.get("LEVELS", "1")
+PLACE = CACHE / "speed"
+# The share of a render that tells how many iterations fill it.
+TRIAL = 0.25
+SETTINGS = {"width": WIDTH, "threads": THREADS, "seconds": SECONDS, "seeds": SEEDS, "levels": LEVELS}
+# Squared errors are taken for no smaller.
+LEAST = 1e-9
+
+
+class Program:
+    """A program to measure."""
+
+    def __init__(self, binary):
+        self.binary = Path(binary)
+        self.key = digest(self.binary)
+
+    def _render(self, scene, options, stop, seed, file):
+        """Renders; returns its history."""
+        command = [self.binary, "render", scene, "-o", file, *options, *stop, "--seed", seed, "--width", WIDTH]
+        command += ["--threads", THREADS, "--no-combine", "--progress", "none"]
+        command += [] if LEVELS == "default" else ["--levels", LEVELS]
+        timed(command, 600 + 50 * SECONDS)
+        said = subprocess.run([self.binary, "info", file, "--json"], check=True, capture_output=True, text=True)
+        return json.loads(said.stdout)["history"]
+
+    def _folder(self, scene, options):
+        name = "".join(c if c.isalnum() else "_" for c in " ".join(map(str, options))).strip("_")
+        return PLACE / self.key / scene_key(scene) / f"{name}-{LEVELS}-{SECONDS:g}s-{WIDTH}"
+
+    def iterations(self, scene, options):
+        """How many iterations fill a render, by what a short one takes before its first and for each."""
+        folder = self._folder(scene, options) / "trial"
+        if not (folder / "run.json").exists():
+            with making(folder) as draft:
+                history = self._render(scene, options, ["--time", TRIAL * SECONDS], 0, draft / "picture.exr")
+                save(draft / "run.json", history)
+        history = load(folder / "run.json")
+        first, last = history[0], history[-1]
+        each = last["cpu_seconds"] / last["iterations"]
+        if last["iterations"] > first["iterations"]:
+            each = (last["cpu_seconds"] - first["cpu_seconds"]) / (last["iterations"] - first["iterations"])
+        fixed = max(first["cpu_seconds"] - first["iterations"] * each, 0)
+        return max(1, round((SECONDS - fixed) / each))
+
+    def render(self, scene, options, seed):
+        """A render of a seed, unless that is done; its picture and what it spent."""
+        folder = self._folder(scene, options) / f"seed{seed}"
+        if not (folder / "run.json").exists():
+            with making(folder) as draft:
+                stop = ["--iterations", self.iterations(scene, options)]
+                save(draft / "run.json", self._render(scene, options, stop, seed, draft / "picture.exr")[-1])
+        return Layers(folder / "picture.exr").get(""), load(folder / "run.json")["cpu_seconds"]
+
+
+def merit(pairs, reference):
+    """The merit of some renders of one kind, pictures with core-seconds, and their mean over the reference's."""
+    found = [reference.measure(picture) for picture, _ in pairs]
+
+    def mean(key):
+        return sum(figures[key] for figures in found) / len(found)
+
+    error, spent = max(mean("relmse_trimmed"), LEAST), sum(seconds for _, seconds in pairs) / len(pairs)
+    return {
+        "merit": error * spent,
+        "error": error,
+        "core_seconds": spent,
+        "mean_ratio": mean("mean_ratio"),
+        "mean_ratio_error": mean("mean_ratio_error") / len(found) ** 0.5,
+    }
+
+
+def taking_turns(renders, reference):
+    """The merits of some kinds of renders by name, each a function of the seed, which take turns."""
+    found = {name: [] for name in renders}
+    for seed in range(1, SEEDS + 1):
+        for name, render in renders.items():
+            found[name].append(render(seed))
+    return {name: merit(pairs, reference) for name, pairs in found.items()}
+
+
+def references():
+    """The scenes asked for, each with its name and its reference; what keeps others out is said."""
+    for scene in _references.scenes():
+        try:
+            yield scene, _references.name(scene), Reference.read(_references.reference(scene)[0])
+        except Failed as failed:
+            print(f"{_references.name(scene)}: no reference: {failed}", flush=True)
+
+
+def stored(found):
+    """Merits for the record."""
+    return {name: {key: short(value) for key, value in of.items()} for name, of in found.items()}
+
+
+def summary(ratios):
+    """Geometric mean, the largest with its name, and how many there are; `ratios`: by name."""
+    if not ratios:
+        return None
+    worst = max(ratios, key=ratios.get)
+    mean = geometric(list(ratios.values()))
+    return {"geometric_mean": short(mean), "worst": short(ratios[worst]), "where": worst, "of": len(ratios)}
