@@ -87,7 +87,8 @@ impl Contacts {
         if !instances.clone().any(passes) {
             return Contacts::default();
         }
-        let triangles = |instance: u32| shapes.meshes[shapes.instances[instance as usize].mesh as usize].triangles.len();
+        let triangles =
+            |instance: u32| shapes.meshes[shapes.instances[instance as usize].mesh as usize].triangles.len();
         let passed: usize = instances.clone().filter(|&instance| passes(instance)).map(triangles).sum();
         if shapes.triangles() > MOST || passed > MOST_PASSED {
             return Contacts { unknown: true, ..Contacts::default() };

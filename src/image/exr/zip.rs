@@ -38,9 +38,19 @@ fn packed(bytes: &[u8]) -> Option<Vec<u8>> {
 
 /// Even bytes, then odd ones; each but the first less its predecessor, plus 128.
 fn differences(bytes: &[u8]) -> Vec<u8> {
-    let apart: Vec<u8> = bytes.iter().step_by(2).chain(bytes.iter().skip(1).step_by(2)).copied().collect();
-    let difference = |pair: &[u8]| pair[1].wrapping_sub(pair[0]).wrapping_add(128);
-    apart.iter().take(1).copied().chain(apart.windows(2).map(difference)).collect()
+    let mut apart = vec![0; bytes.len()];
+    let (even, odd) = apart.split_at_mut(bytes.len().div_ceil(2));
+    let pairs = bytes.chunks_exact(2);
+    if let ([last], Some(end)) = (pairs.remainder(), even.last_mut()) {
+        *end = *last;
+    }
+    for ((pair, even), odd) in pairs.zip(even).zip(odd) {
+        (*even, *odd) = (pair[0], pair[1]);
+    }
+    for i in (1..apart.len()).rev() {
+        apart[i] = apart[i].wrapping_sub(apart[i - 1]).wrapping_add(128);
+    }
+    apart
 }
 
 #[cfg(test)]
