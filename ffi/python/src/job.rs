@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use std::ops::Bound as End;
 
 /// Methods by name; `None` is auto.
-const METHODS: [(&str, Option<Method>); 11] = [
+const METHODS: [(&str, Option<Method>); 12] = [
     ("auto", None),
     ("path", Some(Method::Path)),
     ("light", Some(Method::Light)),
