@@ -110,7 +110,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --method teapot"),
             2,
-            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, ppm, sppm, appm, cppm, bpm, vcm]",
+            "command line: invalid value 'teapot' for '--method <METHOD>' [possible values: auto, path, light, bdpt, pm, ppm, sppm, appm, cppm, bpm, vcm, mlt]",
             help,
         ),
         (
