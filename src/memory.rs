@@ -13,6 +13,10 @@ use std::path::{Path, PathBuf};
 /// Smaller amounts than this are not asked about.
 pub const SMALL: u64 = 16 << 20;
 
+/// Bytes of samples that a byte of an EXR stands for at most: no compression packs better than deflate (1032 to 1) over
+/// run lengths of blocks of 64 samples.
+pub const EXR_PACKED: u64 = 1032 * 64;
+
 /// Bytes that may still be taken, and who says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Available {

@@ -116,6 +116,17 @@ def stored(found):
     return {name: {key: short(value) for key, value in of.items()} for name, of in found.items()}
 
 
+def compared(found, first, second, strange):
+    """Merits for the record, that of the first over that of the second, and what keeps the row from counting: the
+    first word that `strange` has of a picture, if any."""
+    words = {of: strange(figures) for of, figures in found.items()}
+    return {
+        **stored(found),
+        "ratio": short(found[first]["merit"] / found[second]["merit"]),
+        "strange": next(({"of": of, "why": why} for of, why in words.items() if why), None),
+    }
+
+
 def summary(ratios):
     """Geometric mean, the largest with its name, and how many there are; `ratios`: by name."""
     if not ratios:

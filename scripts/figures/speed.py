@@ -51,14 +51,7 @@ def measure(scene, name, method, programs, reference):
     options = ["--method", method]
     renders = {of: partial(one.render, scene, options) for of, one in programs.items()}
     found = _speed.taking_turns(renders, reference)
-    strange = {of: stranger(figures) for of, figures in found.items()}
-    return {
-        "scene": name,
-        "method": method,
-        **_speed.stored(found),
-        "ratio": _speed.short(found["after"]["merit"] / found["before"]["merit"]),
-        "strange": next(({"of": of, "why": why} for of, why in strange.items() if why), None),
-    }
+    return {"scene": name, "method": method, **_speed.compared(found, "after", "before", stranger)}
 
 
 def main():

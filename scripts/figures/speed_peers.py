@@ -41,13 +41,10 @@ def compared(scene, name, peer, ours, reference):
     peers.render(peer, WARM, 0)
     renders = {"ours": partial(ours.render, scene, ["--method", "path"]), "theirs": partial(theirs, peers, peer)}
     found = _speed.taking_turns(renders, reference)
-    strange = {of: _peers.stranger(figures) for of, figures in found.items()}
     return {
         "scene": name,
         "peer": peer,
-        **_speed.stored(found),
-        "ratio": _speed.short(found["ours"]["merit"] / found["theirs"]["merit"]),
-        "strange": next(({"of": of, "why": why} for of, why in strange.items() if why), None),
+        **_speed.compared(found, "ours", "theirs", _peers.stranger),
         "version": load(peers.render(peer, WARM, 0) / "run.json").get("version"),
     }
 

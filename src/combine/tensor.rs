@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::rect::Rect;
 use super::stack::LevelStack;
+use crate::stat::median;
 
 /// Version of channel order and scaling; a network states the one it was trained with.
 pub const VERSION: u32 = 1;
@@ -83,11 +84,7 @@ fn exposure(level: Option<&Vec<[f32; 3]>>) -> f32 {
 
 fn median_depth(depth: &[f32]) -> f32 {
     let mut seen: Vec<f32> = depth.iter().copied().filter(|d| *d > 0.0 && *d < BACKGROUND_DEPTH).collect();
-    if seen.is_empty() {
-        return 1.0;
-    }
-    let middle = seen.len() / 2;
-    *seen.select_nth_unstable_by(middle, f32::total_cmp).1
+    median(&mut seen, f32::total_cmp).unwrap_or(1.0)
 }
 
 /// The input of `rect`, `[channel][y][x]`; zero where `rect` leaves the image, as a convolution's padding is.

@@ -10,6 +10,7 @@
 use crate::camera::{Camera, band, par_pixels};
 use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
 use crate::random::{Domain, Stream, Streams};
+use crate::stat::median;
 use crate::transport::{Eye, GatherPoint, PathStart};
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -94,14 +95,13 @@ pub fn initial_volume_bandwidths(
 fn medians(values: &[f32], width: usize) -> Vec<f32> {
     let height = values.len() / width.max(1);
     let around = |at: usize, end: usize| at.saturating_sub(NEIGHBOURHOOD)..(at + NEIGHBOURHOOD + 1).min(end);
-    let median = |index: usize| {
+    let around_pixel = |index: usize| {
         let (x, y) = (index % width, index / width);
         let mut near: Vec<f32> =
             around(y, height).flat_map(|y| around(x, width).map(move |x| values[y * width + x])).collect();
-        let middle = near.len() / 2;
-        *near.select_nth_unstable_by(middle, f32::total_cmp).1
+        median(&mut near, f32::total_cmp).unwrap_or(0.0)
     };
-    (0..values.len()).into_par_iter().map(median).collect()
+    (0..values.len()).into_par_iter().map(around_pixel).collect()
 }
 
 /// What bandwidths are not to exceed.
@@ -127,11 +127,7 @@ pub fn usual_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
     let every = map.photons().iter().step_by(map.photons().len().div_ceil(SAMPLES).max(1));
     let of = |photon: &P| nearest.radius2(map, photon.position(), photon.normal(), k, f32::INFINITY);
     let mut found: Vec<f32> = every.filter_map(of).collect();
-    if found.is_empty() {
-        return f32::INFINITY;
-    }
-    let middle = found.len() / 2;
-    *found.select_nth_unstable_by(middle, f32::total_cmp).1
+    median(&mut found, f32::total_cmp).unwrap_or(f32::INFINITY)
 }
 
 fn bandwidths<P: Located, const MAPS: usize>(
@@ -176,11 +172,8 @@ fn bandwidths<P: Located, const MAPS: usize>(
     );
     let fallback = std::array::from_fn(|map| {
         let mut known: Vec<f32> = found.iter().flatten().map(|r| r[map]).collect();
-        if known.is_empty() {
-            return bounds.at(span(camera, scene.lights.sky().radius)).max(least);
-        }
-        let middle = known.len() / 2;
-        *known.select_nth_unstable_by(middle, f32::total_cmp).1
+        let usual = || bounds.at(span(camera, scene.lights.sky().radius)).max(least);
+        median(&mut known, f32::total_cmp).unwrap_or_else(usual)
     });
     found.into_iter().map(|r| r.unwrap_or(fallback)).collect()
 }

@@ -129,8 +129,7 @@ pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(
 }
 
 /// A hash of a scene's files: the file itself, and those that it (in its folder, unless they may lie outside) or the
-/// command line names. `None` of a
-/// scene that comes through a pipe, and is gone.
+/// command line names. `None` of a scene that comes through a pipe, and is gone.
 ///
 /// # Errors
 /// The scene cannot be read.

@@ -8,7 +8,7 @@
 //! A chain is the work of one thread at a time, and its draws are asked for from deep within walks that know of no
 //! chain: while one is at work it lies with the thread ([`Chain::during`]).
 
-use super::{GOLDEN, mix, unit};
+use super::{GOLDEN, mix, square, unit};
 use glam::Vec2;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -164,11 +164,6 @@ impl Chain {
         self.coordinates.insert(id, now);
         now.value
     }
-}
-
-/// Uniform on the unit square.
-fn square(bits: u64) -> Vec2 {
-    Vec2::new(unit((bits >> 32) as u32), unit(bits as u32))
 }
 
 /// After so many small steps; what leaves the unit square comes back at the other side.

@@ -120,7 +120,13 @@ fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// The same of 32 bits.
+/// 64 random bits to a point of the unit square.
+#[inline]
+fn square(bits: u64) -> Vec2 {
+    Vec2::new(unit((bits >> 32) as u32), unit(bits as u32))
+}
+
+/// 32 random bits to a number in `[0, 1)`, all of them kept.
 #[inline]
 fn fine(bits: u32) -> f64 {
     f64::from(bits) * (1.0 / 4_294_967_296.0)
@@ -251,8 +257,7 @@ impl Draws {
     #[cold]
     #[inline(never)]
     fn chained(self, purpose: Purpose) -> Vec2 {
-        let bits = self.hash(purpose);
-        Chain::draw_here(self.id(purpose), Vec2::new(unit((bits >> 32) as u32), unit(bits as u32)))
+        Chain::draw_here(self.id(purpose), square(self.hash(purpose)))
     }
 
     /// What tells the coordinates of a chain apart.
@@ -305,10 +310,7 @@ impl Draws {
     pub fn two(self, purpose: Purpose) -> Vec2 {
         match self.source {
             Source::Sequence => self.pair(purpose).point_reversed(self.reversed),
-            Source::Hash => {
-                let bits = self.hash(purpose);
-                Vec2::new(unit((bits >> 32) as u32), unit(bits as u32))
-            }
+            Source::Hash => square(self.hash(purpose)),
             Source::Chain => self.chained(purpose),
         }
     }

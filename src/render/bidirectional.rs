@@ -24,6 +24,7 @@ use crate::photon::PhotonMap;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
+use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
     Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Surroundings,
@@ -285,8 +286,7 @@ impl Iterate for Passes<'_> {
             InitialBandwidth::Fixed(radius) => {
                 let footprints = initial_bandwidths(&eye, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
                 let mut footprints = footprints.into_flattened();
-                let middle = footprints.len() / 2;
-                FOOTPRINT_PIXELS * radius / *footprints.select_nth_unstable_by(middle, f32::total_cmp).1
+                FOOTPRINT_PIXELS * radius / median(&mut footprints, f32::total_cmp).unwrap_or(f32::INFINITY)
             }
             _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
         };

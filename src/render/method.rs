@@ -76,13 +76,13 @@ impl Method {
         }
     }
 
-    /// The strategies of a bidirectional method.
+    /// The strategies of a method whose iteration is a pair of walks for every pixel.
     pub(super) fn strategies(self, camera: &Camera) -> Option<Strategies> {
         match self {
-            Method::Path | Method::Pm => None,
+            Method::Path | Method::Pm | Method::Mlt => None,
             Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => None,
             Method::Light => Some(Strategies::LIGHT),
-            Method::Bdpt | Method::Mlt => Some(Strategies::BDPT),
+            Method::Bdpt => Some(Strategies::BDPT),
             Method::Bpm => Some(Strategies::BPM),
             Method::Vcm => Some(Strategies::vcm(camera.connects())),
         }

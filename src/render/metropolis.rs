@@ -39,6 +39,9 @@ use smallvec::SmallVec;
 /// Steps of a chain, where there are pixels enough for many. Each iteration finds new starts in proportion to their
 /// light, so short ones, which are many, are spread better: 512 had 1.1 to 1.2 times the error.
 const STEPS: usize = 64;
+/// Vertex of an eye path whose draws are the chain's own: its place on the film and how paths are divided.
+const OWN: u32 = u32::MAX;
+
 /// Chains of an iteration at least.
 const CHAINS: usize = 16;
 
@@ -64,14 +67,12 @@ struct Candidate {
     importance: f32,
 }
 
-/// What one path brings to its pixel, by technique.
+/// What one path brings that chains look for.
 #[derive(Default)]
 struct Found {
-    path: u32,
-    candidates: Vec<Candidate>,
-    /// Its own pixel, while a chain is at work.
+    /// The pixel that its eye path starts in.
     pixel: u32,
-    deposits: SmallVec<[Deposit; 4]>,
+    deposits: SmallVec<[(Technique, Deposit); 4]>,
 }
 
 /// What a chain's target density is: the sum of the channels.
@@ -82,14 +83,9 @@ fn importance(value: Rgb) -> f32 {
 
 impl Found {
     fn add(&mut self, technique: Technique, (class, pixel): (PathClass, u32), value: Rgb) {
-        let importance = importance(value);
-        if !chained(class) || importance <= 0.0 {
-            return;
+        if chained(class) && importance(value) > 0.0 {
+            self.deposits.push((technique, Deposit { pixel, part: class.part(), value }));
         }
-        if let Some(division) = Division::of(technique) {
-            self.candidates.push(Candidate { path: self.path, division, importance });
-        }
-        self.deposits.push(Deposit { pixel, part: class.part(), value });
     }
 
     fn splats(&mut self, splats: &[Splat]) {
@@ -165,22 +161,26 @@ impl Walks<'_, '_> {
         }
     }
 
-    /// The path that starts in a pixel, by all techniques.
+    /// The path that starts in a pixel, by all techniques; what chains can start from goes to `candidates`.
     fn ordinary(
         &self,
         arena: &mut Bump,
-        (index, pixel): (u32, UVec2),
+        (path, pixel): (u32, UVec2),
         left: &mut Deposits,
-        found: &mut Found,
+        candidates: &mut Vec<Candidate>,
     ) -> EyeMeasure {
         arena.reset();
-        let streams = self.streams(index);
-        (found.path, found.pixel) = (index, index);
+        let streams = self.streams(path);
+        let mut found = Found { pixel: path, ..Found::default() };
         let mut measure = EyeMeasure::default();
         let first = left.splats.len();
         let within = streams.0.vertex(0).two(Purpose::Pixel);
-        self.walk(self.shared, arena, ((pixel, within), streams), (left, found), &mut measure);
+        self.walk(self.shared, arena, ((pixel, within), streams), (left, &mut found), &mut measure);
         found.splats(&left.splats[first..]);
+        candidates.extend(found.deposits.iter().filter_map(|(technique, deposit)| {
+            let division = Division::of(*technique)?;
+            Some(Candidate { path, division, importance: importance(deposit.value) })
+        }));
         measure
     }
 
@@ -200,8 +200,9 @@ impl Walks<'_, '_> {
             self.walk(&shared, arena, start, (&mut left, &mut found), &mut EyeMeasure::default());
         });
         found.splats(&left.splats);
-        let importance = found.deposits.iter().map(|deposit| importance(deposit.value)).sum();
-        State { deposits: found.deposits, importance }
+        let deposits: SmallVec<[Deposit; 4]> = found.deposits.into_iter().map(|(_, deposit)| deposit).collect();
+        let importance = deposits.iter().map(|deposit| importance(deposit.value)).sum();
+        State { deposits, importance }
     }
 
     /// A chain that starts at `candidate` and takes so many steps. What it finds, with weights that sum to one for a
@@ -244,9 +245,6 @@ impl Walks<'_, '_> {
         deposits
     }
 }
-
-/// Vertex of an eye path whose draws are the chain's own: its place on the film and how paths are divided.
-const OWN: u32 = u32::MAX;
 
 /// Where chains start: `count` of the candidates, in proportion to their importance, by one stratified sequence whose
 /// first number is `u`; and the sum of all importance.
@@ -296,7 +294,7 @@ impl<'a> Metropolis<'a> {
             .par_chunks_mut(TILE_PIXELS)
             .enumerate()
             .map(|(tile, measures)| {
-                let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Found::default());
+                let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Vec::new());
                 for place in tiles.pixels(tile) {
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
@@ -304,9 +302,8 @@ impl<'a> Metropolis<'a> {
                     let EyeMeasure { emission, direct, features, first, broken, .. } = measure;
                     measures[place.at] =
                         EyeMeasure { emission, direct, features, first, broken, ..EyeMeasure::default() };
-                    found.deposits.clear();
                 }
-                (left, found.candidates)
+                (left, found)
             })
             .collect();
         let (mut candidates, mut lost) = (Vec::new(), 0);

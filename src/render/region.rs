@@ -6,6 +6,7 @@ use crate::light::Region;
 use crate::math::Vec3;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
+use crate::stat::median;
 use crate::transport::Eye;
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -37,16 +38,12 @@ pub(super) fn region(eye: &Eye<'_>, seed: u64) -> Option<Region> {
         }
     });
     let seen: Vec<Vec3> = seen.into_iter().flatten().collect();
-    if seen.is_empty() {
-        return None;
-    }
-    let held = ((seen.len() as f64 * HELD.0) as usize).min(seen.len() - 1);
     let along = |axis: usize| {
         let mut values: Vec<f32> = seen.iter().map(|p| p[axis]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+        median(&mut values, f32::total_cmp)
     };
-    let center = Vec3::new(along(0), along(1), along(2));
+    let center = Vec3::new(along(0)?, along(1)?, along(2)?);
+    let held = ((seen.len() as f64 * HELD.0) as usize).min(seen.len() - 1);
     let mut distances: Vec<f32> = seen.iter().map(|p| p.distance(center)).collect();
     let radius = HELD.1 * *distances.select_nth_unstable_by(held, f32::total_cmp).1;
     let whole = lights.sky().radius;

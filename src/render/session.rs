@@ -8,7 +8,7 @@ use super::iterate::Iterate;
 use super::output;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Levels, Settings};
-use super::state::State;
+use super::state::{Rest, State};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
@@ -110,14 +110,15 @@ impl<'a> Session<'a> {
     /// Goes on from a saved state; `None` where it is of another picture or method.
     pub fn resume(stage: &'a Stage<'a>, state: State) -> Option<Session<'a>> {
         let mut session = Session::new(stage);
-        let State { next, done, light_paths, photons, rejected, next_record, history, .. } = state;
-        let State { phases, spent, pilot_seconds, .. } = state;
+        let State { pixels, rest } = state;
+        let Rest { next, done, light_paths, photons, rejected, next_record, history, .. } = rest;
+        let Rest { phases, spent, pilot_seconds, passes, .. } = rest;
         let levels = stage.settings.levels.count;
-        let fits = state.pixels.len() == session.pixels.len()
-            && state.pixels.iter().all(|pixel| pixel.levels() == levels)
-            && session.passes.restore(&state.passes);
+        let fits = pixels.len() == session.pixels.len()
+            && pixels.iter().all(|pixel| pixel.levels() == levels)
+            && session.passes.restore(&passes);
         fits.then(|| Session {
-            pixels: state.pixels,
+            pixels,
             phases,
             spent,
             pilot_seconds,
@@ -137,7 +138,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// None: it is written to memory.
     pub fn state(&self) -> postcard::Result<State<&[Pixel]>> {
-        Ok(State {
+        let rest = Rest {
             next: self.next,
             done: self.done,
             light_paths: self.light_paths,
@@ -148,9 +149,9 @@ impl<'a> Session<'a> {
             phases: self.phases,
             spent: self.spent,
             pilot_seconds: self.pilot_seconds,
-            pixels: &self.pixels,
             passes: self.passes.state()?,
-        })
+        };
+        Ok(State { pixels: &self.pixels, rest })
     }
 
     /// Whether all iterations that were asked for are done, or as many as can be summed.

@@ -10,6 +10,15 @@ use serde::{Deserialize, Serialize};
 /// are functions of the iteration's number.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct State<P = Vec<Pixel>> {
+    /// Pixels, row by row from the top.
+    pub(super) pixels: P,
+    /// All else.
+    pub(super) rest: Rest,
+}
+
+/// What a state holds besides pixels.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Rest {
     /// The next iteration, from 0.
     pub(super) next: u64,
     /// Iterations done.
@@ -30,8 +39,6 @@ pub struct State<P = Vec<Pixel>> {
     pub(super) spent: Spent,
     /// That of pilots.
     pub(super) pilot_seconds: f64,
-    /// Pixels, row by row from the top.
-    pub(super) pixels: P,
     /// What the method's passes have learnt.
     pub(super) passes: Vec<u8>,
 }
@@ -39,41 +46,13 @@ pub struct State<P = Vec<Pixel>> {
 impl<P> State<P> {
     /// The same with other pixels, and its own.
     pub fn exchange<Q>(self, pixels: Q) -> (State<Q>, P) {
-        let State {
-            next,
-            done,
-            light_paths,
-            photons,
-            rejected,
-            next_record,
-            history,
-            phases,
-            spent,
-            pilot_seconds,
-            passes,
-            ..
-        } = self;
-        let state = State {
-            next,
-            done,
-            light_paths,
-            photons,
-            rejected,
-            next_record,
-            history,
-            phases,
-            spent,
-            pilot_seconds,
-            pixels,
-            passes,
-        };
-        (state, self.pixels)
+        (State { pixels, rest: self.rest }, self.pixels)
     }
 }
 
 impl State {
     /// Iterations done.
     pub fn iterations(&self) -> u64 {
-        self.done
+        self.rest.done
     }
 }

@@ -149,8 +149,9 @@ fn warn_of_lights(
     }
 }
 
-/// Adds what is to be said of media that scatter within the way by which rays start off a surface ([`position_error`]): what
-/// happens in there is not seen, so that a share of the light that would come out at once goes deeper.
+/// Adds what is to be said of media that scatter within the way by which rays start off a surface
+/// ([`position_error`]): what happens in there is not seen, so that a share of the light that would come out at once goes
+/// deeper.
 fn warn_of_dense_media(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
     /// Most of a free path that may be skipped: a half-space of albedo 1/2 looks darker by twice as much.
     const SKIPPED: f32 = 0.005;

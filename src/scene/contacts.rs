@@ -84,12 +84,13 @@ impl Contacts {
     pub fn new(shapes: &Shapes, materials: &Materials) -> Contacts {
         let passes = |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].transmits();
         let instances = 0..shapes.instances.len() as u32;
-        if !instances.clone().any(passes) {
+        let passing: Vec<u32> = instances.clone().filter(|&instance| passes(instance)).collect();
+        if passing.is_empty() {
             return Contacts::default();
         }
         let triangles =
             |instance: u32| shapes.meshes[shapes.instances[instance as usize].mesh as usize].triangles.len();
-        let passed: usize = instances.clone().filter(|&instance| passes(instance)).map(triangles).sum();
+        let passed: usize = passing.iter().map(|&instance| triangles(instance)).sum();
         if shapes.triangles() > MOST || passed > MOST_PASSED {
             return Contacts { unknown: true, ..Contacts::default() };
         }
@@ -104,7 +105,6 @@ impl Contacts {
             let mesh = &shapes.meshes[shapes.instances[instance as usize].mesh as usize];
             (0..mesh.triangles.len() as u32).filter_map(move |primitive| triangle(instance, primitive))
         };
-        let passing: Vec<u32> = instances.clone().filter(|&instance| passes(instance)).collect();
         let tree = RTree::bulk_load(passing.iter().flat_map(|&instance| of(instance)).collect());
         let touched_by = |instance: u32| -> Vec<(u32, u32, f32)> {
             let met = |other: Triangle| {

@@ -75,9 +75,8 @@ fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
     let meta = exr::meta::MetaData::read_from_file(path, false).map_err(text)?;
     let length = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
     for header in &meta.headers {
-        // No compression packs better: DWA runs deflate (1032 to 1) over run lengths of blocks of 64 samples.
         let texels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
-        if texels > length.saturating_mul(1032 * 64) {
+        if texels > length.saturating_mul(memory::EXR_PACKED) {
             return Err("it has more texels than the file can hold".into());
         }
         check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;

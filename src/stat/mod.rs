@@ -1,6 +1,7 @@
 //! Running statistics, and fits.
 
 pub mod floor;
+mod median;
 mod moments;
 mod power_law;
 pub mod sum;
@@ -9,6 +10,7 @@ pub mod sum;
 /// mean.
 pub const WORST: f64 = 0.005;
 
+pub use median::median;
 pub use moments::{Grids, Moments, variance_of_mean};
 pub use power_law::PowerLaw;
 pub use sum::{Rounding, Sum, Total};

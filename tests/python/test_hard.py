@@ -1,5 +1,7 @@
 """The suite of hard cases: its judges reject planted faults, its scenes and answers are what they say."""
 
+import contextlib
+import io
 import json
 import math
 import sys
@@ -209,7 +211,10 @@ class Suite(unittest.TestCase):
             states = {}
             for answer, fails in ((right, None), (wrong, None), (wrong, {"path": "why"}), (right, {"path": "why"})):
                 result = self.play(folder, self.case(answer, fails))
-                states[result.state] = suite.finish([result], folder, 1.0)
+                with contextlib.redirect_stdout(io.StringIO()) as said:
+                    states[result.state] = suite.finish([result], folder, 1.0)
+                bad = int(result.state in ("failed", "passed"))
+                self.assertIn(f", {bad} failed, 1 s\n", said.getvalue())
             self.assertEqual(states, {"met": 0, "failed": 1, "known": 0, "passed": 1})
             shown = (folder / "index.html").read_text()
             self.assertIn("data:image/png;base64,", shown)

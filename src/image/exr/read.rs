@@ -100,7 +100,7 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
     }
     // A window of a large picture may be small.
     match u64::try_from(taken) {
-        Ok(taken) if taken <= WHOLE.max(length.saturating_mul(PACKED)) => {
+        Ok(taken) if taken <= WHOLE.max(length.saturating_mul(memory::EXR_PACKED)) => {
             memory::check(taken, "its pixels").map_err(|error| exr::error::Error::NotSupported(error.cause.into()))
         }
         _ => Err(invalid("the display window is too large for its file")),
@@ -109,8 +109,6 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
 
 /// Deflate: 258 bytes by two bits, one for the length and one for the distance.
 const DEFLATE: u128 = 1032;
-/// No compression packs better: deflate over run lengths of blocks of 64 samples.
-const PACKED: u64 = 1032 * 64;
 /// Most bytes of a picture of which a file holds a small window.
 const WHOLE: u64 = 1 << 30;
 
@@ -128,7 +126,7 @@ fn ratio(header: &Header) -> u128 {
         // Two codes of a bit at least and eight bits repeat a sample of two bytes 255 times; a bitmap says which values
         // there are.
         Compression::PIZ => DEFLATE,
-        _ => u128::from(PACKED),
+        _ => u128::from(memory::EXR_PACKED),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
 use crate::render::method::Method;
 use crate::render::settings::{Levels, Settings, Shard};
+use crate::stat::median;
 use crate::transport::MAX_LEVELS;
 
 /// Share of the light paths that are sent to weigh effects.
@@ -67,8 +68,7 @@ pub(super) fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Leve
     let value = |index: usize| {
         let near = window(size, index, REACH);
         let mut near: Vec<f64> = near.map(|index| mean(pixels[index].mean(smoothest))).collect();
-        let middle = near.len() / 2;
-        let median = *near.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let median = median(&mut near, f64::total_cmp).unwrap_or(0.0);
         let own = &pixels[index];
         if levels.two_paths { median.max(mean(own.mean(0)).min(mean(own.mean(smoothest)))) } else { median }
     };

@@ -41,7 +41,6 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         meshes: HashMap::new(),
         worlds: Worlds::new(&document),
         bounds: Vec::new(),
-        flattened: 0,
         divisor: None,
         options: *options,
         scene: SceneExtras::default(),
@@ -99,8 +98,6 @@ struct Reader<'r> {
     worlds: Worlds<'r, 'r>,
     /// Local bounds of the meshes read.
     bounds: Vec<(DVec3, DVec3)>,
-    /// Bytes of the meshes that nodes flatten.
-    flattened: u64,
     /// What divides intensities, once it is known.
     divisor: Option<f32>,
     options: ReadOptions,
@@ -323,11 +320,9 @@ impl Reader<'_> {
     /// Index of a mesh of its own for one on a node whose transform leaves it a plane; `None` where it leaves less.
     fn flattened(&mut self, mesh: u32, transform: &DMat3, place: &str) -> Result<Option<u32>> {
         let Some(flat) = flattened(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
-        self.flattened += flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
-        if self.flattened >= memory::SMALL {
-            let what = "meshes on nodes whose scale is zero along an axis";
-            memory::check(self.flattened, what).map_err(|e| e.within(place))?;
-        }
+        let bytes = flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
+        let what = "meshes on nodes whose scale is zero along an axis";
+        self.document.take(bytes, what).map_err(|e| e.within(place))?;
         self.bounds.push(self.bounds[mesh as usize]);
         self.out.meshes.push(flat);
         Ok(Some(self.out.meshes.len() as u32 - 1))
