@@ -5,6 +5,7 @@
 # Installs what is missing: nightly Rust, cargo-fuzz, and what rendering needs. What has been found to be worth keeping
 # lies in ~/.cache/caustique-fuzz and is gone on with; a fault ends its reader's turn and is kept there, below
 # `faults`. tests/corpus/READER keeps the smallest of it, which `cargo test` reads again.
+# The converter of USD has a fuzzer of its own, scripts/fuzz_usd.py.
 
 set -euo pipefail
 
@@ -31,10 +32,11 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 fuzz/target/$target/release/seeds "$ROOT/target/release/caustique" "$cache/seeds"
 
-# Images are decoded whole, up to a gigabyte and a half, whatever their file's size is; see MOST_TEXELS and MOST_BYTES.
+# Images are decoded whole, up to a gigabyte and a half, whatever their file's size is; see MOST_TEXELS, MOST_BYTES and
+# WHOLE.
 limits() {
     case $1 in
-        png | jpeg | hdr | exr_environment | gltf) echo "-malloc_limit_mb=2048 -rss_limit_mb=4096" ;;
+        png | jpeg | hdr | exr | exr_environment | gltf) echo "-malloc_limit_mb=2048 -rss_limit_mb=4096" ;;
         *) echo "-malloc_limit_mb=512 -rss_limit_mb=2048" ;;
     esac
 }
@@ -43,12 +45,14 @@ status=0
 for reader in "${readers[@]}"; do
     mkdir -p "$cache/corpus/$reader" "$cache/faults/$reader" "$cache/seeds/$reader"
     say "$reader, $seconds s"
+    fault=0
     # shellcheck disable=SC2046
     RAYON_NUM_THREADS=1 ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 \
         "fuzz/target/$target/release/$reader" "$cache/corpus/$reader" "$cache/seeds/$reader" "tests/corpus/$reader" \
         -artifact_prefix="$cache/faults/$reader/" -max_total_time="$seconds" -timeout=10 -max_len=65536 \
-        -print_final_stats=1 -print_funcs=0 $(limits "$reader") >"$cache/$reader.log" 2>&1 || status=$?
+        -print_final_stats=1 -print_funcs=0 $(limits "$reader") >"$cache/$reader.log" 2>&1 || fault=$?
     grep -E 'stat::number_of_executed_units|SUMMARY' "$cache/$reader.log" | sed "s/^/$reader: /" || true
-    [ $status -eq 0 ] || say "$reader: a fault, see $cache/$reader.log"
+    [ $fault -eq 0 ] || say "$reader: a fault, see $cache/$reader.log"
+    [ $fault -eq 0 ] || status=$fault
 done
 exit $status

@@ -66,13 +66,18 @@ class Program:
         fixed = max(first["cpu_seconds"] - first["iterations"] * each, 0)
         return max(1, round((SECONDS - fixed) / each))
 
-    def render(self, scene, options, seed):
-        """A render of a seed, unless that is done; its picture and what it spent."""
+    def done(self, scene, options, seed):
+        """Renders a seed unless that is done; the folder of picture.exr and run.json."""
         folder = self._folder(scene, options) / f"seed{seed}"
         if not (folder / "run.json").exists():
             with making(folder) as draft:
                 stop = ["--iterations", self.iterations(scene, options)]
                 save(draft / "run.json", self._render(scene, options, stop, seed, draft / "picture.exr")[-1])
+        return folder
+
+    def render(self, scene, options, seed):
+        """A render of a seed; its picture and what it spent."""
+        folder = self.done(scene, options, seed)
         return Layers(folder / "picture.exr").get(""), load(folder / "run.json")["cpu_seconds"]
 
 

@@ -23,6 +23,13 @@ def white(material, mesh=None):
     return s.Scene().within(1).add(mesh or shapes.sphere((0, 0, 0), 1), material).seen((0, 0.5, 4), (0, 0, 0), 12)
 
 
+def mirrors():
+    """A closed room of perfect mirrors around a black ball that glows."""
+    walls = shapes.box((-1, -1, -1), (1, 1, 1)).flipped()
+    lamp = s.Scene().add(shapes.sphere((0.2, 0.1, -0.3), 0.5, smooth=False), s.emitter(1))
+    return lamp.add(walls, s.metal(1, 0)).seen((0.8, 0.7, 0.75), (-1, 0.1, 0), 60)
+
+
 #: Light is the same all over the wall, so that wide bandwidths blur nothing.
 WIDE = {None: (), "sppm": ("--initial-bandwidth", "0.3"), "vcm": ("--initial-bandwidth", "0.3")}
 
@@ -67,6 +74,21 @@ def _with(material, layer, roughness, strength):
 
 
 CASES = [
+    Case(
+        "furnace-mirrors",
+        "A closed room of perfect mirrors, in which a ball glows",
+        {"scene": mirrors},
+        Value(
+            1.0,
+            "Mirrors lose nothing, and a ray goes on until it meets the ball: radiance is the ball's along every ray. (What"
+            " bounces between walls beside the ball for ever is of measure zero.)",
+            bound=0.005,
+            resolves=0.1,
+        ),
+        ("path", "bdpt", "vcm", "sppm"),
+        iterations=8,
+        photons=1000,
+    ),
     _closed(0.5, {None: 32, "sppm": 12}, 10000),
     _closed(0.9, {None: 32, "sppm": 4}, 5000),
     _closed(0.99, {None: 48, "sppm": 8}, 500, 0.1, ("path", "sppm")),

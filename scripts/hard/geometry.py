@@ -85,6 +85,14 @@ def mirrored():
     return stage(shapes.Mesh(made.positions * (-1, 1, 1), made.triangles[:, ::-1]))
 
 
+def heap(copies):
+    """So many clear glass balls in one place."""
+    made = stage(None)
+    for _ in range(copies):
+        made = made.add(shapes.sphere((0, 0.5, 0), 0.4), s.glass(1.5))
+    return made
+
+
 def million():
     """10^7 triangles: a floor of 2,237² squares."""
     return floor_of(shapes.grid(1.5, 2237))
@@ -237,6 +245,15 @@ CASES = [
         Exact("without", {"with": 0}, "Nothing is nothing."),
         EYE,
         seeds=2,
+    ),
+    Case(
+        "heap",
+        "Many copies of a glass ball in one place",
+        {"one": partial(heap, 1), "12": partial(heap, 12)},
+        Equal("one", ("12",), "Glass in the same glass is no border.", resolves=0.06),
+        EYE,
+        iterations=4,
+        seeds=FEW,
     ),
     Case(
         "triangles-10^7",

@@ -7,13 +7,15 @@ from pxr import UsdGeom
 from faults import Fault
 from stage import said
 
+# Attributes that are read, and the schema's defaults, which one that is blocked (`= None`) does not have.
+_DEFAULTS = (("horizontalAperture", 20.955), ("verticalAperture", 15.2908), ("focalLength", 50.0))
+
 
 def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True):
     """What a glTF node says to be this camera; `aspect`: width by height of the picture, if it is known."""
     camera, where, get = UsdGeom.Camera(prim), prim.GetPath(), stage.get
     # Tenths of the stage's unit.
-    width, height = (float(get(a)) for a in (camera.GetHorizontalApertureAttr(), camera.GetVerticalApertureAttr()))
-    focal = float(get(camera.GetFocalLengthAttr()))
+    width, height, focal = (float(get(camera.GetPrim().GetAttribute(name), default)) for name, default in _DEFAULTS)
     if not all(math.isfinite(x) and x > 0 for x in (width, height, focal)):
         raise Fault(where, f"its apertures are {width:g} and {height:g}, its focal length {focal:g}",
                     "they have to be above zero")
@@ -33,7 +35,8 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
     keys = {}
     if any(offsets):
         keys["shift"] = [offsets[0] / width, offsets[1] / height]
-    stop, focus = get(camera.GetFStopAttr(), 0.0), get(camera.GetFocusDistanceAttr(), 0.0)
+    stop = get(camera.GetFStopAttr(), 0.0)
+    focus = get(camera.GetFocusDistanceAttr(), 0.0) if stop > 0 else 0.0
     if stop > 0 and focus > 0 and lens:
         keys.update(aperture_radius=focal * unit / (2 * stop), focus_distance=focus * stage.metres)
     elif stop > 0 and lens:
@@ -64,4 +67,7 @@ def exposure(prim, stage):
     """Stops by which a camera brightens its picture."""
     camera = UsdGeom.Camera(prim)
     scale = camera.ComputeLinearExposureScale(stage.time)
+    if not math.isfinite(scale):
+        raise Fault(prim.GetPath(), f"its exposure brightens by {scale}", "look at its exposure, exposure:time, :iso, "
+                    ":fStop and :responsivity")
     return math.log2(scale) if scale > 0 and scale != 1 else 0.0

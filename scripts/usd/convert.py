@@ -10,15 +10,27 @@ stderr, {"prim": where, "fault": what, "hint": remedy or null}, and exit code 1.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-from faults import Fault  # noqa: E402, from this folder
+from faults import Fault, text_of  # noqa: E402, from this folder
 
 
+@contextlib.contextmanager
+def _texts():
+    """USD hands any name or text on as it stands in the file, and each may be the one that is not UTF-8."""
+    try:
+        yield
+    except UnicodeDecodeError as error:
+        raise Fault("", f"it holds a name or text that is not UTF-8: {error.object!r:.80}",
+                    "write the stage again, in UTF-8")
+
+
+@_texts()
 def write(path, out, frame=None, allow_outside=False):
     """Converts the stage at `path` at a time code to the .glb `out`; what is lost, texts."""
     from scene import Scene
@@ -30,6 +42,7 @@ def write(path, out, frame=None, allow_outside=False):
     return stage.losses.lines
 
 
+@_texts()
 def arguments(path, allow_outside=False):
     """Options of `caustique render` by the RenderSettings of the stage at `path`, texts."""
     from render_settings import Settings
@@ -62,7 +75,7 @@ def main(given):
         hint = ("run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip install usd-core "
                 "numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
     except Exception as error:  # whatever USD raises about stages that come from anywhere
-        where, what, hint = "", f"USD says: {' '.join(str(error).split()) or type(error).__name__}", None
+        where, what, hint = "", f"USD says: {text_of(error)}", None
     print(json.dumps({"prim": where, "fault": what, "hint": hint}), file=sys.stderr)
     return 1
 

@@ -1,9 +1,12 @@
 """A binary glTF file in the making (glTF 2.0): a JSON document and a buffer."""
 
 import json
+import math
 import struct
 
 import numpy
+
+from faults import Fault
 
 _FLOAT, _UINT = 5126, 5125
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -85,6 +88,7 @@ class Document:
             self.json["buffers"] = [{"byteLength": len(self._buffer)}]
         if self._used:
             self.json["extensionsUsed"] = sorted(self._used)
+        _check(self.json)
         text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
         size = 12 + 8 + len(text) + (8 + len(self._buffer) if self._buffer else 0)
@@ -92,3 +96,15 @@ class Document:
             file.write(struct.pack("<IIIII", 0x46546C67, 2, size, len(text), 0x4E4F534A) + text)
             if self._buffer:
                 file.write(struct.pack("<II", len(self._buffer), 0x004E4942) + self._buffer)
+
+
+def _check(entry, where="/", key=""):
+    """Raises where a number is not finite, as products of large numbers may come to be: the format has none such."""
+    if isinstance(entry, float) and not math.isfinite(entry):
+        raise Fault(where, f"its {key} comes to {entry}", "make its numbers smaller")
+    if isinstance(entry, dict):
+        for name, part in entry.items():
+            _check(part, entry.get("name", where), name)
+    elif isinstance(entry, list):
+        for part in entry:
+            _check(part, where, key)

@@ -10,7 +10,7 @@ from pxr import Gf
 import textures
 from faults import Fault
 from lights import Light
-from stage import said
+from stage import kind_of, said
 
 
 class Dome:
@@ -28,7 +28,7 @@ class Dome:
         asset = light.get("texture:file", None)
         plain = asset is None or not asset.path
         if self.keys is not None:
-            if plain and "color" in self.keys:
+            if plain and "color" in self.keys and kind_of(self.keys["color"]) == "list":
                 self.keys["color"] = [a + b for a, b in zip(self.keys["color"], light.emitted())]
             else:
                 light.lose("a second dome light is not carried: it gives no light")

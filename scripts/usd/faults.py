@@ -9,6 +9,14 @@ class Fault(Exception):
         self.where, self.fault, self.hint = str(where), fault, hint
 
 
+def text_of(error):
+    """What an error of USD's says, on one line; its words may hold bytes of the file that are no text."""
+    try:
+        return " ".join(str(error).split()) or type(error).__name__
+    except UnicodeDecodeError:
+        return "the file holds bytes that are not UTF-8"
+
+
 class Losses:
     """What is ignored or approximated: a line each, once."""
 

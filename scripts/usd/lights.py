@@ -52,8 +52,9 @@ class Light:
     def emitted(self):
         """Colour times intensity, 3 numbers, before `normalize`."""
         default = 50000.0 if self.prim.GetTypeName() == "DistantLight" else 1.0
-        power = self.get("intensity", default) * 2.0 ** self.get("exposure", 0.0)
-        color = Gf.Vec3f(self.get("color", Gf.Vec3f(1)))
+        stops = self.get("exposure", 0.0)
+        power = self.get("intensity", default) * (2.0 ** stops if stops < 1024 else math.inf)
+        color = Gf.Vec3f(*map(float, self.get("color", Gf.Vec3f(1))))
         # Blender writes white lamps as 6500 K, which the reference tints.
         white = self.stage.by_blender and self.get("colorTemperature", 6500.0) == 6500.0
         if self.get("enableColorTemperature", False) and not white:
@@ -94,6 +95,8 @@ def node(prim, stage, document, matrix):
         light.lose(f"a {kind} is not carried: it gives no light")
         return None
     made = makers[kind](light, document, matrix)
+    if made is None:
+        return None
     keys = {**made.pop("caustique", {}), **said(prim, stage)}
     if keys:
         made["extras"] = {"caustique": keys}
@@ -130,7 +133,8 @@ def _sphere(light, document, matrix):
             light.lose(f"its cone of {math.degrees(angle):g} degrees is taken as 90: beyond there is no light")
             angle = math.pi / 2
         entry["spot"] = {"outerConeAngle": angle, "innerConeAngle": 0.0}
-        keys["blend"] = 1 - (1 - math.cos((1 - softness) * angle)) / (1 - math.cos(angle)) if softness > 0 else 0.0
+        whole = 1 - math.cos(angle)
+        keys["blend"] = 1 - (1 - math.cos((1 - softness) * angle)) / whole if softness > 0 and whole > 0 else 0.0
         if softness > 0:
             light.lose("the edge of its cone falls off by the cosine of the angle, not by the angle")
         if a > 0:
@@ -229,6 +233,8 @@ def _distant(light, document, _matrix):
 def _glowing(light, document, faces, radiance, normals, keys=None):
     """A mesh that shines from its front and takes no light away."""
     triangles, _ = faces.triangles()
+    if not len(triangles):
+        return light.lose("it has no surface: it gives no light")
     entry = {"name": str(light.where), "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
              "extras": {"caustique": {"null_bsdf": True, **(keys or {})}}}
     glow(document, entry, radiance)

@@ -5,9 +5,9 @@ import math
 
 import materialx
 import preview
-from network import Primvar, Reader, Texture, finite
+from network import Primvar, Reader, Texture
 from pxr import UsdShade
-from stage import said
+from stage import finite, said
 from surface import Surface
 from faults import Fault
 from textures import Textures
@@ -84,15 +84,15 @@ class Materials:
         return self._surfaces[key]
 
     def _read(self, material):
-        losses, where = self._stage.losses, material.GetPath()
+        losses, where, identifier = self._stage.losses, material.GetPath(), self._reader.identifier
         mtlx = material.ComputeSurfaceSource("mtlx")[0]
-        kind = mtlx.GetIdAttr().Get() if mtlx else None
+        kind = identifier(mtlx) if mtlx else None
         if kind in _READ:
             return _READ[kind](mtlx, self._reader, losses)
         plain = material.ComputeSurfaceSource()[0]
         if kind and plain and plain.GetPath() != mtlx.GetPath():
-            losses.name(where, f"a surface {kind} is not read: its {plain.GetIdAttr().Get()} takes its place")
-        id_ = plain.GetIdAttr().Get() if plain else None
+            losses.name(where, f"a surface {kind} is not read: its {identifier(plain)} takes its place")
+        id_ = identifier(plain) if plain else None
         if id_ in _READ:
             return _READ[id_](plain, self._reader, losses)
         found = kind or id_

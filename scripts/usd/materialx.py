@@ -57,12 +57,12 @@ _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence
 def surface(shader, reader, losses):
     """The surface of a shader of either model."""
     where = shader.GetPath()
-    given, names = {}, _NAMES[shader.GetIdAttr().Get()]
+    given, names = {}, _NAMES[reader.identifier(shader)]
     for key, (name, default) in sorted(names.items(), key=lambda item: item[0] in _OF):
         if not given.get(_OF.get(key), True):
             given[key] = default
             continue
-        value = reader.read(shader, name, default) if name else default
+        value = _read(reader, shader, name, default, key) if name else default
         if isinstance(value, (Texture, Primvar)) and (key not in _TEXTURED or (
                 isinstance(value, Primvar) and key != "base")):
             losses.name(where, f"what feeds {name} is not carried: it has its default")
@@ -88,6 +88,15 @@ def surface(shader, reader, losses):
         out.sheen_roughness = given["sheen_roughness"]
     _transmit(out, given, where, losses)
     return out
+
+
+def _read(reader, shader, name, default, key):
+    """What feeds an input; presence is a number of one model and a colour of the other, and either is taken."""
+    if key == "presence":
+        found = reader.read(shader, name)
+        if isinstance(found, (int, float)) or isinstance(found, tuple) and len(found) >= 3:
+            return found
+    return reader.read(shader, name, default)
 
 
 def _transmit(out, given, where, losses):

@@ -26,7 +26,7 @@ class Faces:
         if len(self.corners) and not 0 <= self.corners.min() <= self.corners.max() < len(self.points):
             raise Fault(where, f"faceVertexIndices names a point beyond its {len(self.points)} points",
                         "export the mesh again")
-        if not numpy.isfinite(self.points).all():
+        if not (numpy.abs(self.points) <= numpy.finfo(numpy.float32).max).all():
             raise Fault(where, "points has a coordinate that is not finite", "export the mesh again")
         self.face_of_corner = numpy.repeat(numpy.arange(len(self.counts)), self.counts)
         self._mirrored = mirrored
@@ -40,6 +40,9 @@ class Faces:
             UsdGeom.Tokens.varying: (len(self.points), lambda: self.corners),
             UsdGeom.Tokens.faceVarying: (len(self.corners), lambda: numpy.arange(len(self.corners))),
         }
+        if interpolation not in sources:
+            raise Fault(self.where, f"{name} has an interpolation {interpolation}",
+                        f"it is one of {', '.join(sources)}")
         expected, index = sources[interpolation]
         if len(values) != expected:
             raise Fault(self.where, f"{name} has {len(values)} values, and {interpolation} interpolation takes "
@@ -139,6 +142,9 @@ def primvar(prim, name, stage):
         values = numpy.asarray(values, numpy.float64)
     except (TypeError, ValueError):
         return None
+    if not values.size:
+        stage.losses.name(prim.GetPath(), f"its primvar {name} has no values and is ignored")
+        return None
     return values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1), found.GetInterpolation()
 
 
@@ -152,6 +158,10 @@ def authored_normals(prim, faces, stage):
         if values is None or not len(values):
             return None
         found = numpy.asarray(values, numpy.float64), mesh.GetNormalsInterpolation()
+    if found[0].shape[1] != 3:
+        stage.losses.name(prim.GetPath(), f"normals has {found[0].shape[1]} numbers each: they are left out, and "
+                          "its faces are flat")
+        return None
     try:
         return faces.spread(*found, "normals")
     except Fault as fault:

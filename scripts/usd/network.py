@@ -1,13 +1,17 @@
 """Networks of shaders: what feeds an input, as a constant, a texture or a primvar."""
 
 import dataclasses
-import math
 
 from pxr import Gf, Sdf, UsdShade
 
+from stage import kind_of
+
 _WRAPS = {"repeat": 10497, "useMetadata": 10497, "periodic": 10497, "clamp": 33071, "mirror": 33648}
+_CHANNELS = ("r", "g", "b", "a", "rgb")
 # Nodes of MaterialX that hand on what they get, and the input that they get it by.
 _PASSING = ("ND_convert_", "ND_dot_", "ND_normalmap", "ND_extract_", "ND_separate", "ND_swizzle_")
+# Nodes one behind the other that are gone through.
+_DEEPEST = 64
 
 
 @dataclasses.dataclass
@@ -41,11 +45,13 @@ class Reader:
 
     def __init__(self, stage):
         self.stage = stage
+        self._open = []  # inputs that are being read, each for the one before it
 
     def read(self, shader, name, default=None):
-        """The constant, `Texture` or `Primvar` that feeds an input; `default` where nothing does."""
+        """The constant, `Texture` or `Primvar` that feeds an input; `default` where nothing does, or a constant of
+        another kind than it, which is named. A default of None takes any kind."""
         shader_input = shader.GetInput(name)
-        if not shader_input:
+        if not shader_input or not self._enter(shader_input):
             return default
         for attribute in shader_input.GetValueProducingAttributes():
             if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Output:
@@ -53,16 +59,57 @@ class Reader:
             else:
                 found = self.stage.get(attribute)
             if found is not None:
-                return _constant(found)
+                break
+        else:
+            found = None
+        self._open.pop()
+        return default if found is None else self._fitted(shader, name, _constant(found), default)
+
+    def constant(self, shader, name, default):
+        """What `read` gives where it is a constant; else `default`, and a loss."""
+        found = self.read(shader, name, default)
+        if isinstance(found, (Texture, Primvar)):
+            self.stage.losses.name(shader.GetPath(), f"what feeds {name} is not carried: it has its default")
+            return default
+        return found
+
+    def identifier(self, shader):
+        """The identifier of a shader, "" without."""
+        return self.stage.get(shader.GetIdAttr(), "")
+
+    def _enter(self, shader_input):
+        """Begins to read an input, unless that is being done: then what feeds it is fed by it."""
+        path = shader_input.GetAttr().GetPath()
+        if path in self._open or len(self._open) >= _DEEPEST:
+            what = "feeds itself" if path in self._open else f"is more than {_DEEPEST} nodes deep"
+            self.stage.losses.name(path, f"its network {what}: it has its default")
+            return False
+        self._open.append(path)
+        return True
+
+    def _fitted(self, shader, name, found, default):
+        """A constant as the kind that the default is: longer vectors are cut, as a colour with opacity is."""
+        if default is None or isinstance(found, (Texture, Primvar)) or kind_of(found) == kind_of(default) == "text":
+            return found
+        if isinstance(default, tuple) and isinstance(found, tuple):
+            if len(found) >= len(default):
+                return found[:len(default)]
+            if len(found) == 3:
+                return found + default[3:]
+        elif kind_of(found) == kind_of(default) == "number":
+            return found
+        wanted = f"{len(default)} numbers" if isinstance(default, tuple) else f"a {kind_of(default)}"
+        shown = f"{len(found)} numbers" if isinstance(found, tuple) else f"a {kind_of(found)}"
+        self.stage.losses.name(shader.GetPath(), f"what feeds {name} is {shown}, not {wanted}: it has its default")
         return default
 
     def _node(self, shader, output):
         """What a node puts out; None where that is beyond us, which is named."""
-        kind = shader.GetIdAttr().Get() or shader.GetPrim().GetTypeName()
+        kind = self.identifier(shader) or shader.GetPrim().GetTypeName()
         if kind in ("UsdUVTexture", "ND_UsdUVTexture", "ND_UsdUVTexture_23"):
             return self._uv_texture(shader, output)
         if kind.startswith("UsdPrimvarReader") or kind.startswith("ND_geompropvalue") or kind.startswith("ND_UsdPrim"):
-            name = self.read(shader, "varname", None) or self.read(shader, "geomprop", None)
+            name = self.constant(shader, "varname", "") or self.constant(shader, "geomprop", "")
             return Primvar(name) if name else self.read(shader, "fallback")
         if kind.startswith("ND_geomcolor"):
             return Primvar("displayColor")
@@ -77,14 +124,20 @@ class Reader:
 
     def _passed(self, shader, kind, output):
         found = self.read(shader, "in")
-        channel = output[-1] if kind.startswith("ND_separate") else self.read(shader, "channels")
+        channel = output[-1] if kind.startswith("ND_separate") else self.constant(shader, "channels", "")
         if kind.startswith("ND_extract_"):
-            channel = "rgba"[int(self.read(shader, "index", 0))]
+            index = int(self.constant(shader, "index", 0))
+            channel = "rgba"[index] if -4 <= index < 4 else f"at {index}"
         if isinstance(found, Texture) and channel:
-            channel = {"x": "r", "y": "g", "z": "b", "w": "a"}.get(channel, channel)
-            found = dataclasses.replace(found, channel=channel)
+            channel = {"x": "r", "y": "g", "z": "b", "w": "a", "xyz": "rgb"}.get(channel, channel)
+            if channel in _CHANNELS:
+                found = dataclasses.replace(found, channel=channel)
+            else:
+                self.stage.losses.name(shader.GetPath(), f"a channel {channel} is not carried: it hands on all of them")
         if isinstance(found, Texture) and kind.startswith("ND_normalmap"):
-            strength = self.read(shader, "scale", 1.0)
+            strength = self.read(shader, "scale")
+            if not isinstance(strength, (int, float)) and not (isinstance(strength, tuple) and len(strength) == 2):
+                strength = 1.0
             if strength not in (1.0, (1.0, 1.0)):
                 found = dataclasses.replace(found, scale=(2 * _first(strength),) * 2 + (2.0, 1.0), bias=(-1.0,) * 4)
         return found
@@ -93,23 +146,26 @@ class Reader:
         asset = self._asset(shader)
         if asset is None:
             return self.read(shader, "fallback")
-        wraps = tuple(self._wrap(shader, self.read(shader, name, "useMetadata")) for name in ("wrapS", "wrapT"))
+        if output not in _CHANNELS:
+            self.stage.losses.name(shader.GetPath(), f"it has no output {output}: what that feeds has its default")
+            return None
+        constant = self.constant
+        wraps = tuple(self._wrap(shader, constant(shader, name, "useMetadata")) for name in ("wrapS", "wrapT"))
         uv, transform = self._coordinates(shader, "st")
-        return Texture(shader.GetPrim(), asset, output, self.read(shader, "scale", (1.0,) * 4),
-                       self.read(shader, "bias", (0.0,) * 4), self.read(shader, "sourceColorSpace", "auto"), wraps, uv,
+        return Texture(shader.GetPrim(), asset, output, constant(shader, "scale", (1.0,) * 4),
+                       constant(shader, "bias", (0.0,) * 4), constant(shader, "sourceColorSpace", "auto"), wraps, uv,
                        transform)
 
     def _image(self, shader, output):
         asset = self._asset(shader)
         if asset is None:
             return self.read(shader, "default")
-        wraps = tuple(self._wrap(shader, self.read(shader, name, "periodic"))
+        wraps = tuple(self._wrap(shader, self.constant(shader, name, "periodic"))
                       for name in ("uaddressmode", "vaddressmode"))
         uv, transform = self._coordinates(shader, "texcoord")
-        tiling = self.read(shader, "uvtiling")
-        if tiling is not None:
-            transform = (tiling, *transform[1:])
-        kind = shader.GetIdAttr().Get()
+        if self.read(shader, "uvtiling") is not None:
+            transform = (self.constant(shader, "uvtiling", (1.0, 1.0)), *transform[1:])
+        kind = self.identifier(shader)
         space = shader.GetInput("file").GetAttr().GetColorSpace() or ("sRGB" if "_color" in kind else "raw")
         space = "sRGB" if "srgb" in space.lower() else "raw"
         return Texture(shader.GetPrim(), asset, "r" if kind.endswith("_float") else "rgb", space=space, wraps=wraps,
@@ -132,20 +188,28 @@ class Reader:
         """The primvar that places a texture, and what transforms it."""
         still = ((1.0, 1.0), 0.0, (0.0, 0.0))
         given = shader.GetInput(name)
-        for attribute in given.GetValueProducingAttributes() if given else ():
+        if not given or not self._enter(given):
+            return "st", still
+        found = self._placed(given, still)
+        self._open.pop()
+        return found
+
+    def _placed(self, given, still):
+        for attribute in given.GetValueProducingAttributes():
             source = UsdShade.Shader(attribute.GetPrim())
-            kind = source.GetIdAttr().Get() or ""
+            kind = self.identifier(source)
             if kind == "UsdTransform2d":
                 uv, before = self._coordinates(source, "in")
                 if before != still:
                     self.stage.losses.name(source.GetPath(), "a UsdTransform2d before this one is not carried")
-                return uv, (self.read(source, "scale", (1.0, 1.0)), self.read(source, "rotation", 0.0),
-                            self.read(source, "translation", (0.0, 0.0)))
+                return uv, (self.constant(source, "scale", (1.0, 1.0)), self.constant(source, "rotation", 0.0),
+                            self.constant(source, "translation", (0.0, 0.0)))
             if kind.startswith("ND_place2d"):
                 self.stage.losses.name(source.GetPath(), "a node ND_place2d is not carried: texture coordinates stay")
                 return self._coordinates(source, "texcoord")
             if kind.startswith("ND_texcoord"):
-                return "st" if not self.read(source, "index", 0) else f"st{self.read(source, 'index')}", still
+                index = self.constant(source, "index", 0)
+                return f"st{index}" if index else "st", still
             found = self._node(source, attribute.GetBaseName())
             if isinstance(found, Primvar):
                 return found.name, still
@@ -161,8 +225,3 @@ def _constant(value):
 
 def _first(value):
     return value[0] if isinstance(value, tuple) else value
-
-
-def finite(value):
-    """Whether a constant has finite numbers alone."""
-    return all(math.isfinite(x) for x in (value if isinstance(value, tuple) else (value,)))

@@ -1,6 +1,6 @@
 """UsdPreviewSurface, by its specification 2.6, as a `Surface`."""
 
-from network import Texture
+from network import Primvar, Texture
 from surface import Surface
 
 # The same surface as a node of MaterialX.
@@ -9,21 +9,24 @@ MATERIALX = "ND_UsdPreviewSurface_surfaceshader"
 
 def surface(shader, reader, losses):
     """The surface of a shader UsdPreviewSurface, under either name."""
-    where, read = shader.GetPath(), reader.read
+    where, read, constant = shader.GetPath(), reader.read, reader.constant
     out = Surface(base=read(shader, "diffuseColor", (0.18, 0.18, 0.18)), metallic=read(shader, "metallic", 0.0),
                   roughness=read(shader, "roughness", 0.5), normal=read(shader, "normal"),
-                  emission=read(shader, "emissiveColor", (0.0,) * 3), ior=read(shader, "ior", 1.5),
+                  emission=read(shader, "emissiveColor", (0.0,) * 3), ior=constant(shader, "ior", 1.5),
                   coat=read(shader, "clearcoat", 0.0), coat_roughness=read(shader, "clearcoatRoughness", 0.01),
-                  threshold=read(shader, "opacityThreshold", 0.0))
+                  threshold=constant(shader, "opacityThreshold", 0.0))
     if isinstance(out.normal, tuple):
         out.normal = None
-    if read(shader, "useSpecularWorkflow", 0):
+    if constant(shader, "useSpecularWorkflow", 0):
         _by_specular(out, read(shader, "specularColor", (0.0,) * 3), where, losses)
     displacement = read(shader, "displacement", 0.0)
     if displacement != 0:
         losses.name(where, "displacement is not carried: displace the mesh before it is exported")
     opacity = read(shader, "opacity", 1.0)
-    if isinstance(opacity, Texture) or out.threshold > 0 or read(shader, "opacityMode", "transparent") == "presence":
+    if isinstance(opacity, Primvar):
+        opacity = constant(shader, "opacity", 1.0)
+    present = constant(shader, "opacityMode", "transparent") == "presence"
+    if isinstance(opacity, Texture) or out.threshold > 0 or present:
         out.presence = opacity
         if isinstance(opacity, Texture) and out.threshold == 0 and opacity.channel != "a":
             losses.name(where, "its opacity texture is taken for presence: where it is 0 there is nothing, no glass")
@@ -39,7 +42,7 @@ def surface(shader, reader, losses):
 def _by_specular(out, color, where, losses):
     """The specular workflow: `color` is the reflectance at normal incidence, and there is no metal."""
     out.metallic = 0.0
-    if isinstance(color, Texture):
+    if isinstance(color, (Texture, Primvar)):
         losses.name(where, "a texture of specularColor is not carried: use the metallic workflow")
         return
     strongest = max(color)

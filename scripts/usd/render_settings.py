@@ -1,6 +1,7 @@
 """UsdRender: the picture that a stage asks for, and what `caustique:*` says about the way to it."""
 
 import fractions
+import math
 
 from pxr import UsdGeom, UsdRender
 
@@ -84,7 +85,12 @@ class Settings:
     def aspect(self):
         """Width by height of the picture as it is seen, or None."""
         resolution = self.get("resolution")
-        return None if resolution is None else resolution[0] / resolution[1] * self.get("pixelAspectRatio", 1.0)
+        if resolution is None:
+            return None
+        pixel = self.get("pixelAspectRatio", 1.0)
+        if pixel <= 0:
+            raise Fault(self.prim.GetPath(), f"its pixelAspectRatio is {pixel}", "it has to be above zero")
+        return resolution[0] / resolution[1] * pixel
 
     def policy(self):
         """How a camera is fitted to the picture."""
@@ -101,7 +107,10 @@ class Settings:
         window = self.get("dataWindowNDC")
         if window is not None and tuple(window) != (0, 0, 1, 1):
             out["crop"] = self._crop(window)
-        rate = fractions.Fraction(f"{self._stage.stage.GetTimeCodesPerSecond():.6g}")
+        rate = self._stage.stage.GetTimeCodesPerSecond()
+        if not math.isfinite(rate):
+            raise Fault("/", f"timeCodesPerSecond is {rate}", "give it a number")
+        rate = fractions.Fraction(f"{rate:.6g}")
         if rate > 0:
             out["frame_rate"] = [rate.numerator, rate.denominator]
         if not self._stage.time.IsEarliestTime() and not self._stage.time.IsDefault():

@@ -29,6 +29,7 @@ class Scene:
         self._dome = Dome(stage, folder)
         self._meshes = {}
         self._cameras = []
+        self._within = []  # instancers whose prototypes are being visited
 
     def fill(self):
         """Visits the whole stage."""
@@ -64,26 +65,25 @@ class Scene:
 
     def _walk(self, prim, above, shown, purpose, purposes, own_transform=True):
         """Yields for everything that is seen what makes its node of its matrix, and that matrix (the stage's units)."""
-        matrix, get = above, self._stage.get
-        if own_transform and prim.IsA(UsdGeom.Xformable):
-            xformable = UsdGeom.Xformable(prim)
-            local = xformable.GetLocalTransformation(self._stage.time)
-            matrix = local if xformable.GetResetXformStack() else local * above
-            if not numpy.isfinite(numpy.array(matrix)).all():
-                raise Fault(prim.GetPath(), "its transform is not finite", "look at its xformOps")
-        if prim.IsA(UsdGeom.Imageable):
-            imageable = UsdGeom.Imageable(prim)
-            shown = shown and get(imageable.GetVisibilityAttr()) != UsdGeom.Tokens.invisible
-            if imageable.GetPurposeAttr().HasAuthoredValue():
-                purpose = get(imageable.GetPurposeAttr())
-        if prim.IsA(UsdGeom.Camera):
-            self._cameras.append((prim, matrix))
-        elif shown and purpose in purposes:
-            yield from self._seen(prim, matrix, purposes)
-        if prim.IsA(UsdGeom.PointInstancer):
-            return
-        for child in prim.GetFilteredChildren(PREDICATE):
-            yield from self._walk(child, matrix, shown, purpose, purposes)
+        rest, get = [(prim, above, shown, purpose, own_transform)], self._stage.get
+        while rest:  # no recursion: Python's ends before the depth of a stage does
+            prim, matrix, shown, purpose, own_transform = rest.pop()
+            if own_transform and prim.IsA(UsdGeom.Xformable):
+                xformable = UsdGeom.Xformable(prim)
+                local = xformable.GetLocalTransformation(self._stage.time)
+                matrix = local if xformable.GetResetXformStack() else local * matrix
+                _check_place(prim.GetPath(), matrix, "look at its xformOps")
+            if prim.IsA(UsdGeom.Imageable):
+                imageable = UsdGeom.Imageable(prim)
+                shown = shown and get(imageable.GetVisibilityAttr()) != UsdGeom.Tokens.invisible
+                if imageable.GetPurposeAttr().HasAuthoredValue():
+                    purpose = get(imageable.GetPurposeAttr())
+            if prim.IsA(UsdGeom.Camera):
+                self._cameras.append((prim, matrix))
+            elif shown and purpose in purposes:
+                yield from self._seen(prim, matrix, purposes)
+            if not prim.IsA(UsdGeom.PointInstancer):
+                rest += [(child, matrix, shown, purpose, True) for child in prim.GetFilteredChildren(PREDICATE)][::-1]
 
     def _seen(self, prim, matrix, purposes):
         name, kind = str(prim.GetPath()), prim.GetTypeName()
@@ -126,9 +126,15 @@ class Scene:
                 prototype = stage.stage.GetPrimAtPath(targets[index])
                 if not prototype:
                     raise Fault(where, f"its prototype {targets[index]} is not there", "name a prim of the stage")
+                if where in self._within:
+                    raise Fault(where, "it is a part of its own prototypes", "take it out of them")
+                self._within.append(where)
                 parts[index] = list(self._walk(prototype, Gf.Matrix4d(1), True, "default", purposes, False))
+                self._within.pop()
             for make, within in parts[index]:
-                yield make, within * place * matrix
+                at = within * place * matrix
+                _check_place(where, at, "look at its positions, orientations and scales")
+                yield make, at
 
     def _mesh(self, prim):
         """The glTF mesh of a Mesh or another shape: one for all instances that wear the same; None if it is empty."""
@@ -233,6 +239,12 @@ class Scene:
         attributes = {"POSITION": self.document.floats(positions, bounds=True)}
         attributes.update((name, self.document.floats(array)) for name, array in zip(names, values))
         return {"attributes": attributes, "indices": self.document.indices(index), "material": worn.index}
+
+
+def _check_place(where, matrix, hint):
+    """Raises where a transform has a number that single precision does not hold: no file of glTF does."""
+    if not (numpy.abs(numpy.array(matrix)) <= numpy.finfo(numpy.float32).max).all():
+        raise Fault(where, "its transform is not finite", hint)
 
 
 def _named(name, made):

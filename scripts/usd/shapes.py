@@ -5,6 +5,7 @@ import math
 import numpy
 from pxr import UsdGeom
 
+from faults import Fault
 from meshes import Faces
 
 _SIDES, _RINGS = 64, 32
@@ -31,8 +32,15 @@ def of_prim(prim, stage):
     }
     if kind not in profiles:
         return None
-    axis = stage.get(prim.GetAttribute("axis"), "Z") if kind != "Sphere" else "Z"
+    axis = _axis(prim, stage) if kind != "Sphere" else "Z"
     return revolved(prim.GetPath(), profiles[kind](), axis)
+
+
+def _axis(prim, stage):
+    axis = stage.get(prim.GetAttribute("axis"), "Z")
+    if axis not in ("X", "Y", "Z"):
+        raise Fault(prim.GetPath(), f"its axis is {axis}", "it is X, Y or Z")
+    return axis
 
 
 def _arc(radius, at, low, high):
@@ -73,6 +81,7 @@ def revolved(where, profile, axis="Z", sides=_SIDES):
             corners.append(numpy.stack([a, b, c, d], axis=1))
     order = {"Z": [0, 1, 2], "X": [2, 0, 1], "Y": [1, 2, 0]}[axis]
     points, normals = (numpy.concatenate(part)[:, order] for part in (points, normals))
+    corners = corners or [numpy.empty((0, 3), numpy.int64)]  # a profile without length or reach
     counts = numpy.concatenate([numpy.full(len(part), part.shape[1]) for part in corners])
     faces = Faces(where, points, counts, numpy.concatenate([part.reshape(-1) for part in corners]))
     return faces, normals[faces.corners]
@@ -87,7 +96,7 @@ def _cube(where, half):
 
 def _plane(prim, half_width, half_length, stage):
     """By its axis: width along X (along Z where the axis is X), length along Y (Z where the axis is Y)."""
-    axis = stage.get(prim.GetAttribute("axis"), "Z")
+    axis = _axis(prim, stage)
     flat = [(-half_width, -half_length), (half_width, -half_length), (half_width, half_length),
             (-half_width, half_length)]
     place = {"Z": lambda u, v: (u, v, 0), "Y": lambda u, v: (u, 0, -v), "X": lambda u, v: (0, v, -u)}[axis]

@@ -2,10 +2,16 @@
 
 import math
 import os
+import re
 
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
-from faults import Fault, Losses
+from faults import Fault, Losses, text_of
+
+# Lengths and their squares stay numbers between these.
+_LEAST, _MOST = 1e-30, 1e30
+# Keys in keys that `caustique:*` may give.
+_DEEPEST = 64
 
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
@@ -29,10 +35,10 @@ class Stage:
                 self.check_place(layer.realPath, "the stage")
         for error in self.stage.GetCompositionErrors():
             self.losses.name(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
-                             f"composition: {' '.join(str(error).split())}")
+                             f"composition: {text_of(error)}")
         self.time = self._moment(frame)
         self.metres = UsdGeom.GetStageMetersPerUnit(self.stage)
-        if not (math.isfinite(self.metres) and self.metres > 0):
+        if not _LEAST <= self.metres <= _MOST:
             raise Fault("/", f"metersPerUnit is {self.metres}", "it has to be a number above zero")
         self.by_blender = (self.stage.GetRootLayer().documentation or "").startswith("Blender v4.")
         self.z_up = UsdGeom.GetStageUpAxis(self.stage) == UsdGeom.Tokens.z
@@ -40,11 +46,12 @@ class Stage:
         self._bake_skins()
 
     def _moment(self, frame):
-        if frame is not None:
-            return Usd.TimeCode(frame)
-        if self.stage.HasAuthoredTimeCodeRange():
-            return Usd.TimeCode(self.stage.GetStartTimeCode())
-        return Usd.TimeCode.EarliestTime()
+        if frame is None and not self.stage.HasAuthoredTimeCodeRange():
+            return Usd.TimeCode.EarliestTime()
+        moment = self.stage.GetStartTimeCode() if frame is None else frame
+        if not math.isfinite(moment):
+            raise Fault("/", f"its {'startTimeCode' if frame is None else 'frame'} is {moment}", "give it a number")
+        return Usd.TimeCode(moment)
 
     def _axes(self):
         """From the stage's axes to right-handed ones with y up; row vectors."""
@@ -85,6 +92,8 @@ class Stage:
         where = prim.GetPath()
         if not value.path:
             raise Fault(where, "it names no file", "give the texture's path in inputs:file")
+        if "\0" in name:
+            raise Fault(where, f"no file has a name as {value.path!r}", "give the texture's path in inputs:file")
         if not value.resolvedPath:
             # Whether a file outside exists is not told.
             self.check_place(os.path.join(os.path.dirname(self.path), value.path), where)
@@ -94,18 +103,57 @@ class Stage:
         if opened is None:
             raise Fault(where, f"the file {value.path} cannot be read", "check your right to read it")
         with opened:
-            data = bytes(opened.GetBuffer())
+            buffer = opened.GetBuffer()
+        if buffer is None:
+            raise Fault(where, f"the file {value.path} is empty", "write it again")
+        data = bytes(buffer)
         return data, Ar.SplitPackageRelativePathInner(name)[1] or name
 
     def get(self, attribute, default=None):
-        """The value of an attribute at the moment; `default` where it has none."""
+        """The value of an attribute at the moment; `default` where it has none. It is of the kind that the attribute's
+        schema says, and a number or a vector is finite."""
         value = attribute.Get(self.time) if attribute else None
-        return default if value is None else value
+        if value is None:
+            return default
+        # USD hands on a value as the file says it, whatever the schema says.
+        type_ = attribute.GetTypeName()
+        if isinstance(value, Sdf.UnregisteredValue) or kind_of(value) != kind_of(type_.defaultValue):
+            raise Fault(attribute.GetPrim().GetPath(), f"{attribute.GetName()} is a {_named(value)}, not a {type_}",
+                        "give it a value of that type")
+        if not finite(value):
+            raise Fault(attribute.GetPrim().GetPath(), f"{attribute.GetName()} is {value}, which is not finite",
+                        "give it numbers")
+        return value
+
+
+def kind_of(value):
+    """What a value of USD is; numbers count as alike whatever their precision is."""
+    if isinstance(value, (bool, int, float)):
+        return "number"
+    name = re.sub(r"^(Vec\d|Matrix\d|Quat)[dfhi]", r"\1", type(value).__name__)
+    name = re.sub(r"^(Bool|U?Char|U?Short|U?Int|U?Int64|Half|Float|Double)Array$", "list of numbers", name)
+    return {"str": "text", "StringArray": "list of texts", "TokenArray": "list of texts"}.get(name, name)
+
+
+def _named(value):
+    return "value of an unknown type" if isinstance(value, Sdf.UnregisteredValue) else kind_of(value)
+
+
+def finite(value):
+    """Whether a number, vector or matrix, or a tuple of numbers, is finite; true of anything else."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if kind_of(value) == "tuple" or re.fullmatch(r"(Vec|Matrix)\d", kind_of(value)):
+        return all(finite(part) for part in value)
+    return True
 
 
 def _first_line(error):
-    lines = [line.strip() for line in str(error).splitlines() if "Error" in line or "rror:" in line]
-    return (lines or [str(error).strip()])[0]
+    try:
+        lines = str(error).splitlines()
+    except UnicodeDecodeError:
+        return text_of(error)
+    return ([line.strip() for line in lines if "Error" in line or "rror:" in line] or [str(error).strip()])[0]
 
 
 def said(prim, stage):
@@ -117,10 +165,21 @@ def said(prim, stage):
             stage.losses.name(prim.GetPath(), f"{attribute.GetName()} has no value and is ignored")
             continue
         *above, key = attribute.GetName().split(":")[1:]
+        if len(above) > _DEEPEST:
+            stage.losses.name(prim.GetPath(), f"an attribute caustique:* has more than {_DEEPEST} colons: it is "
+                              "ignored")
+            continue
         at = found
         for part in above:
-            at = at.setdefault(part, {})
-        at[key] = plain(value)
+            at = at.setdefault(part, {}) if isinstance(at, dict) else None
+        if not isinstance(at, dict):
+            stage.losses.name(prim.GetPath(), f"{attribute.GetName()} is ignored: what it is a part of has a value of "
+                              "its own")
+            continue
+        try:
+            at[key] = plain(value)
+        except TypeError:
+            stage.losses.name(prim.GetPath(), f"{attribute.GetName()} is a {attribute.GetTypeName()} and is ignored")
     return found
 
 
@@ -130,4 +189,4 @@ def plain(value):
         return value
     if isinstance(value, Sdf.AssetPath):
         return value.resolvedPath or value.path
-    return [plain(part) for part in value]
+    return [plain(part) for part in value]  # what has no parts, such as a quaternion, raises a TypeError

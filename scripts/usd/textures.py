@@ -52,7 +52,7 @@ class Textures:
         if texture.channel != "rgb":
             values = numpy.repeat(self._channel(texture, values), 3, axis=2)
         else:
-            values = values[:, :, :3] * scale + bias
+            values = _colors(values) * scale + bias
         self._clip(texture, values)
         return self._png(_to_srgb(values), name), [1.0] * 3
 
@@ -74,7 +74,7 @@ class Textures:
         scale, bias = texture.scale[:3], texture.bias[:3]
         if scale[0] == scale[1] and scale[2] == 2.0 and bias == (-1.0,) * 3 and _mime(data):
             return self._document.image(data, _mime(data), name), scale[0] / 2
-        values = texels[:, :, :3] * scale + bias
+        values = _colors(texels) * scale + bias
         return self._png(values * 0.5 + 0.5, name), 1.0
 
     def packed(self, parts):
@@ -101,7 +101,7 @@ class Textures:
         else:
             texels, srgb = self._load(base)
             values = self._linear(texels, srgb, base)
-            values = (values[:, :, :3] * base.scale[:3] + base.bias[:3] if base.channel == "rgb" else
+            values = (_colors(values) * base.scale[:3] + base.bias[:3] if base.channel == "rgb" else
                       numpy.repeat(self._channel(base, values), 3, axis=2))
             color, factor = _to_srgb(values), [1.0] * 3
         shape = max(presence.shape, color.shape[:2], key=lambda s: s[0] * s[1])
@@ -232,6 +232,11 @@ def _transform(scale, degrees, translation):
     if tuple(scale) != (1.0, 1.0):
         said["scale"] = list(scale)
     return said
+
+
+def _colors(values):
+    """The colours of values, without their opacity; grey ones are three times the same."""
+    return values[:, :, :3] if values.shape[2] >= 3 else numpy.repeat(values[:, :, :1], 3, axis=2)
 
 
 def _mime(data):

@@ -2,8 +2,8 @@
 //! bidirectional photon mapping, vertex connection and merging.
 //!
 //! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its
-//! pixels. What light paths send to the film is a list per tile, added in the order of tiles, so the sums do not depend
-//! on threads; photons are likewise concatenated and wait for the next iteration.
+//! pixels. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
+//! that have left it, so the sums do not depend on threads; photons are likewise concatenated and wait for the next iteration.
 //!
 //! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone,
 //! the other levels of the second. They share nothing but the photons, those of both light paths.
@@ -27,8 +27,8 @@ use crate::spectrum::Comb;
 use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Surroundings,
-    path_measure,
+    Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
+    Surroundings, path_measure,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -61,6 +61,8 @@ pub struct Passes<'a> {
     tiles: Tiles,
     /// Measures of the iteration, one list per pair.
     measures: Vec<Vec<EyeMeasure>>,
+    /// What the light paths of each tile have left; lists that are kept grow but once.
+    left: Vec<Deposits>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     /// What is looked at besides the picture, by tile, if anything is.
@@ -113,6 +115,7 @@ impl<'a> Passes<'a> {
             pairs,
             tiles,
             measures,
+            left: (0..tiles.count()).map(|_| Deposits::default()).collect(),
             photons: None,
             watches,
             covered: 0.0,
@@ -185,18 +188,16 @@ impl<'a> Passes<'a> {
         let merges = map.map_or(0, |map| map.photons().len());
         let mut rejected = map.map_or(0, PhotonMap::rejected);
         let bandwidths: &[Pixel] = pixels;
-        let mut photons: Vec<Vec<MergePhoton>> = Vec::new();
+        let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
         let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
             let streams = Streams::in_sequence(seed, i, pair.eye);
-            let left: Vec<Deposits> = measures
-                .par_chunks_mut(TILE_PIXELS)
-                .zip(watches.par_iter_mut())
-                .enumerate()
-                .map(|(tile, (measures, watch))| {
-                    let (mut left, mut arena) = (Deposits::default(), Bump::new());
+            measures.par_chunks_mut(TILE_PIXELS).zip(watches.par_iter_mut()).zip(&mut self.left).enumerate().for_each(
+                |(tile, ((measures, watch), left))| {
+                    left.clear();
+                    let mut arena = Bump::new();
                     for places in tiles.groups(tile) {
                         let mut starts = shared.eye.starts(&places, streams);
                         for (place, start) in places.iter().flatten().zip(starts.iter_mut().flatten()) {
@@ -205,31 +206,34 @@ impl<'a> Passes<'a> {
                             start.0.hue = pass.hue(index);
                             arena.reset();
                             let mut vertices = LightVertices::new_in(&arena);
-                            shared.light_path(pass, index, false, &mut vertices, &mut left, &mut ());
+                            shared.light_path(pass, index, false, &mut vertices, left, &mut ());
                             let levels = levels(bandwidths[index as usize].bandwidths[0], pair);
                             let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                             watch.begin(place.at, own);
                             shared.eye_path(&arena, start, &meets, watch, &mut measures[place.at]);
                         }
                     }
-                    left
-                })
-                .collect();
-            for left in left {
-                rejected += left.lost;
-                for splat in left.splats {
-                    let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
-                    let (tile, slot) = tiles.place(splat.pixel);
-                    watches[tile].splat(slot, own, &splat, &levels);
-                    splat.apply(&levels, &mut measures[tile * TILE_PIXELS + slot]);
-                }
-                photons.push(left.photons);
-            }
+                },
+            );
+            let splats = SplatsByTile::new(&self.left, &tiles);
+            measures.par_chunks_mut(TILE_PIXELS).zip(watches.par_iter_mut()).enumerate().for_each(
+                |(tile, (measures, watch))| {
+                    for splat in splats.of(tile) {
+                        let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
+                        let (_, slot) = tiles.place(splat.pixel);
+                        watch.splat(slot, own, splat, &levels);
+                        splat.apply(&levels, &mut measures[slot]);
+                    }
+                },
+            );
+            rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
+            photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
+            self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
         self.add(i, pixels, watches);
         if shared.strategies.merge && self.settings.shard.count == 1 {
-            self.photons = Some((i, PhotonMap::build(photons.concat())));
+            self.photons = Some((i, PhotonMap::build(photons)));
         }
         Work { light_paths: walked, photons: merges, rejected }
     }
@@ -263,6 +267,43 @@ impl<'a> Passes<'a> {
             let groups = watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
             pixel.add_with_groups(i, measure, others, groups);
         });
+    }
+}
+
+/// Splats by the tile that they go to, each tile's in the order of the tiles that have left them: whoever adds them, the
+/// sums are the same.
+struct SplatsByTile<'l> {
+    left: &'l [Deposits],
+    /// The tile that has left a splat, and its place there.
+    order: Vec<(u32, u32)>,
+    /// Where in `order` each tile's end.
+    ends: Vec<usize>,
+}
+
+impl<'l> SplatsByTile<'l> {
+    fn new(left: &'l [Deposits], tiles: &Tiles) -> SplatsByTile<'l> {
+        let all =
+            || left.iter().enumerate().flat_map(|(from, left)| left.splats.iter().enumerate().map(move |s| (from, s)));
+        // A counting sort.
+        let mut ends = vec![0; tiles.count() + 1];
+        all().for_each(|(_, (_, splat))| ends[tiles.place(splat.pixel).0 + 1] += 1);
+        for tile in 0..tiles.count() {
+            ends[tile + 1] += ends[tile];
+        }
+        let mut order = vec![(0, 0); ends[tiles.count()]];
+        for (from, (at, splat)) in all() {
+            let next = &mut ends[tiles.place(splat.pixel).0];
+            order[*next] = (from as u32, at as u32);
+            *next += 1;
+        }
+        SplatsByTile { left, order, ends }
+    }
+
+    /// Those of a tile.
+    fn of(&self, tile: usize) -> impl Iterator<Item = &'l Splat> {
+        let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
+        let left = self.left;
+        self.order[start..self.ends[tile]].iter().map(move |&(from, at)| &left[from as usize].splats[at as usize])
     }
 }
 

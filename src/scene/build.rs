@@ -1,9 +1,9 @@
 //! From a description to a scene: places and bakes meshes, makes lights, commits to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
-use super::{Contacts, Nestings, Scene, Survey};
+use super::{Contacts, Nestings, Scene, Survey, dense};
 use crate::error::Result;
-use crate::geometry::{Instance, Mesh, Placement, Shapes, error as position_error};
+use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUPS, Sky};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
@@ -38,7 +38,9 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
 
     let shapes = Arc::new(place(&mut description, origin));
-    let materials = Arc::new(Materials { list: description.materials, textures: description.textures.into() });
+    let mut materials = Materials { list: description.materials, textures: description.textures.into() };
+    dense::thin(&shapes, &mut materials, &mut description.medium, &mut warnings);
+    let materials = Arc::new(materials);
     let (tracer, bodiless) = tracers(&shapes, &materials, threads)?;
 
     let sky = Sky {
@@ -63,7 +65,6 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
             shapes.instances[instance as usize].name
         ));
     }
-    warn_of_dense_media(&shapes, &materials, &mut warnings);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     Ok(Scene {
         source: description.source,
@@ -146,30 +147,6 @@ fn warn_of_lights(
              scene the medium instead)"
                 .into(),
         );
-    }
-}
-
-/// Adds what is to be said of media that scatter within the way by which rays start off a surface
-/// ([`position_error`]): what happens in there is not seen, so that a share of the light that would come out at once goes
-/// deeper.
-fn warn_of_dense_media(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
-    /// Most of a free path that may be skipped: a half-space of albedo 1/2 looks darker by twice as much.
-    const SKIPPED: f32 = 0.005;
-    for instance in &shapes.instances {
-        let Some(medium) = materials.list[instance.material as usize].medium.filter(MediumParameters::scatters) else {
-            continue;
-        };
-        let mesh = &shapes.meshes[instance.mesh as usize];
-        let errors =
-            (0..mesh.triangles.len() as u32).map(|primitive| position_error(instance.corners(mesh, primitive)));
-        let (path, skipped) = (1.0 / medium.sigma_t().max_element(), errors.fold(0.0, f32::max));
-        if skipped > SKIPPED * path {
-            warnings.push(format!(
-                "object \"{}\": light goes {path:.1e} m in its medium, and rays start {skipped:.1e} m behind a surface \
-                 where it is: it looks too dark (take a thinner medium, or make the scene smaller)",
-                instance.name
-            ));
-        }
     }
 }
 

@@ -90,6 +90,8 @@ fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
         )
         .first_valid_layer()
         .all_attributes()
+        // Where threads of the decoder panic, the program ends, and nobody can catch that.
+        .non_parallel()
         .from_file(path)
         .map_err(text)?;
     let size = image.layer_data.size;

@@ -3,6 +3,7 @@
 mod build;
 pub mod contact;
 mod contacts;
+mod dense;
 pub mod description;
 pub mod environment_file;
 mod folder;

@@ -77,6 +77,15 @@ pub struct Deposits {
     pub lost: u64,
 }
 
+impl Deposits {
+    /// Nothing is left; the lists keep their room.
+    pub fn clear(&mut self) {
+        self.splats.clear();
+        self.photons.clear();
+        self.lost = 0;
+    }
+}
+
 struct LightWalk<'a, 's, R> {
     shared: &'a Bidirectional<'a>,
     mis: MisState,

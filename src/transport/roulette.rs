@@ -5,16 +5,19 @@
 const LATE: u32 = 64;
 /// After this many all but such light is gone.
 const TRAPPED: u32 = 1 << 16;
+/// The same where nothing but perfect mirrors and clear glass is met: what gets so far between them most often never
+/// comes out, and there is no next-event estimation on the way that could have found anything.
+const TRAPPED_IN_MIRRORS: u32 = 1 << 8;
 
 /// Least probability of going on: keeps the weight of what survives bounded.
 const LEAST_SURVIVAL: f32 = 0.02;
 
-/// Probability of going on where a path of `depth` keeps a share `expected` of its weight.
+/// Probability of going on where a path of `depth` keeps a share `expected` of its weight; `mirrored` by a delta lobe.
 #[inline]
-pub(super) fn survival(expected: f32, depth: u32) -> f32 {
+pub(super) fn survival(expected: f32, depth: u32, mirrored: bool) -> f32 {
     // Written so that NaN ends the path.
     let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
-    survival.min(late_survival(depth))
+    survival.min(late_survival(depth, mirrored))
 }
 
 /// Probability of going on at most.
@@ -25,10 +28,11 @@ pub(super) fn survival(expected: f32, depth: u32) -> f32 {
 /// for c = 1/2 it grows as a logarithm only for what comes back out of a half space that absorbs nothing, `f(n) ~
 /// n^-3/2`. A trapped path then has 16 sqrt(n) bounces among the first n on average: with c = 2 from some n on, an end.
 #[inline]
-pub(super) fn late_survival(depth: u32) -> f32 {
+pub(super) fn late_survival(depth: u32, mirrored: bool) -> f32 {
+    let trapped = if mirrored { TRAPPED_IN_MIRRORS } else { TRAPPED };
     let c = if depth <= LATE {
         return 1.0;
-    } else if depth <= TRAPPED {
+    } else if depth <= trapped {
         0.5
     } else {
         2.0

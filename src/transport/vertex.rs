@@ -52,8 +52,8 @@ impl Vertex<'_, '_> {
     /// The same if the visitor chooses these lobes with probability `chance`.
     #[inline]
     pub fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
-        let albedo = self.shading.albedo(set);
-        survival((self.throughput * albedo).max_element() * self.survival_scale / chance, self.depth)
+        let expected = (self.throughput * self.shading.albedo(set)).max_element() * self.survival_scale / chance;
+        survival(expected, self.depth, self.shading.bsdf.lobes() & set == LobeSet::DELTA)
     }
 }
 

@@ -1,0 +1,227 @@
+"""Stages with a fault in them: each ends with a `Fault` or a loss that names the prim, and with no other exception."""
+
+import contextlib
+import io
+import itertools
+import json
+import unittest
+
+import numpy
+from PIL import Image
+
+import usd_support
+from faults import Fault
+from usd_support import convert
+
+MESH = """def Mesh "Mesh" {
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    uniform token subdivisionScheme = "none"
+    %s
+}
+"""
+WORN = (MESH % "rel material:binding = </Material>").replace(
+    '"Mesh" {', '"Mesh" (prepend apiSchemas = ["MaterialBindingAPI"]) {') + """def Material "Material" {
+    token outputs:surface.connect = </Material/Surface.outputs:surface>
+    def Shader "Surface" {
+        %s
+        token outputs:surface
+    }
+    %s
+}
+"""
+PREVIEW = 'uniform token info:id = "UsdPreviewSurface"\n'
+
+
+def worn(surface, nodes="", kind=PREVIEW):
+    """A mesh that wears a surface with these inputs, and what else stands in its material."""
+    return WORN % (kind + surface, nodes)
+
+
+def textured(surface, texture, output="float3 outputs:rgb", kind="UsdUVTexture"):
+    """A mesh whose surface is fed by a texture."""
+    return worn(surface, f'def Shader "Texture" {{\nuniform token info:id = "{kind}"\n{texture}\n{output}\n}}')
+
+
+def prim(kind, attributes):
+    """A prim, /P, of a kind."""
+    return f'def {kind} "P" {{\n{attributes}\n}}\n'
+
+
+BASE = "color3f inputs:diffuseColor.connect = </Material/Texture.outputs:{}>"
+FILE = "asset inputs:file = @grey.png@\n"
+
+
+class Faults(usd_support.Stages):
+    names = itertools.count()
+
+    def outcome(self, text, frame=None):
+        """What a stage of this text is refused for, or what is lost of it."""
+        # A name of its own: USD holds on to files that it has read.
+        self.path = self.dir / f"{next(self.names)}.usda"
+        self.path.write_bytes(b"#usda 1.0\n" + (text if isinstance(text, bytes) else text.encode()))
+        try:
+            lost = convert.write(str(self.path), str(self.dir / "out.glb"), frame)
+            convert.arguments(str(self.path))
+        except Fault as fault:
+            return f"{fault} ({fault.hint})"
+        return "\n".join(lost)
+
+    def check(self, *cases):
+        for text, said in cases:
+            with self.subTest(said):
+                self.assertIn(said, self.outcome(text))
+
+    def test_values_of_another_type_than_their_schema_has(self):
+        self.check(
+            (prim("Sphere", 'string radius = "x"'), "/P: radius is a text, not a double"),
+            (prim("Sphere", 'flot radius = 1'), "/P: radius is a value of an unknown type, not a double"),
+            (MESH % "int2 holeIndices = (1, 2)", "/Mesh: holeIndices is a Vec2, not a int[]"),
+            (prim("SphereLight", 'token inputs:intensity = "a"'), "/P: inputs:intensity is a text, not a float"),
+            (prim("DomeLight", 'string inputs:texture:file = "a"'), "/P: inputs:texture:file is a text, not a asset"),
+            (prim("RenderSettings", 'float resolution = 2'), "/P: resolution is a number, not a int2"),
+        )
+
+    def test_numbers_that_are_none(self):
+        self.check(
+            (prim("Camera", 'float fStop = nan'), "/P: fStop is nan, which is not finite"),
+            (prim("Camera", 'float exposure = 1e38'), "/P: its exposure brightens by inf"),
+            (prim("SphereLight", 'float inputs:exposure = 1e38'), "/P: its colour or intensity is not finite"),
+            (prim("DistantLight", 'float inputs:intensity = inf'), "/P: inputs:intensity is inf"),
+            (worn("float inputs:roughness = nan"), "/Material/Surface: inputs:roughness is nan"),
+            (MESH.replace("(1, 0, 0)", "(1e39, 0, 0)").replace("point3f", "point3d") % "", "points"),
+            (prim("RenderSettings", 'custom float caustique:exposure = nan'), "/P: caustique:exposure is nan"),
+            (prim("RenderSettings", "int2 resolution = (2, 2)\nfloat pixelAspectRatio = 0") + 'def Camera "C" {}',
+             "/P: its pixelAspectRatio is 0"),
+            ('(\ntimeCodesPerSecond = nan\n)', "timeCodesPerSecond is nan"),
+            ('(\nstartTimeCode = inf\nendTimeCode = 2\n)', "its startTimeCode is inf"),
+            ('(\nmetersPerUnit = 1e300\n)', "metersPerUnit is 1e+300"),
+            (prim("Sphere", 'double3 xformOp:scale = (1e200, 1, 1)\nuniform token[] xformOpOrder = ["xformOp:scale"]'),
+             "/P: its transform is not finite"),
+        )
+        self.assertIn("its frame is nan", self.outcome("", float("nan")))
+
+    def test_words_that_mean_nothing(self):
+        self.check(
+            (prim("Cone", 'uniform token axis = "W"'), "/P: its axis is W (it is X, Y or Z)"),
+            (prim("Plane", 'uniform token axis = ""'), "/P: its axis is "),
+            (MESH % 'color3f[] primvars:displayColor = [(1, 0, 0)] ( interpolation = "most" )',
+             "/Mesh: displayColor has an interpolation most"),
+            (textured(BASE.format("q"), FILE, "float3 outputs:q"), "/Material/Texture: it has no output q"),
+        )
+
+    def test_bytes_that_are_no_text(self):
+        self.check(
+            (b'def Sphere "S" { custom string caustique:name = "\xff" }', "not UTF-8"),
+            (b'def \xff\xfe "S" {}', "UTF-8"),
+            (b'(\ndoc = "\xff"\n)', "not UTF-8"),
+            (b'\xff def Sphere {', "USD cannot read it"),
+        )
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said):
+            self.assertEqual(convert.main([str(self.path), "--arguments"]), 1)
+        self.assertIn("USD cannot read it", json.loads(said.getvalue())["fault"])
+
+    def test_what_feeds_itself(self):
+        node = ('def Shader "{0}" {{\nuniform token info:id = "ND_convert_color3_vector3"\n'
+                "color3f inputs:in.connect = </Material/{1}.outputs:out>\nfloat3 outputs:out\n}}\n")
+        surface = "color3f inputs:diffuseColor.connect = </Material/A.outputs:out>"
+        place = ('def Shader "Place" {\nuniform token info:id = "UsdTransform2d"\n'
+                 "float2 inputs:in.connect = </Material/Place.outputs:result>\nfloat2 outputs:result\n}\n")
+        chain = "".join(node.format(f"N{k}", f"N{k + 1}") for k in range(400))
+        self.image("L")
+        self.check(
+            (worn(surface, node.format("A", "B") + node.format("B", "A")),
+             "/Material/A.inputs:in: its network feeds itself"),
+            (worn(surface.replace("/A.", "/N0."), chain), "its network is more than 64 nodes deep"),
+            (textured(BASE.format("rgb"), FILE + "float2 inputs:st.connect = </Material/Place.outputs:result>").replace(
+                'def Shader "Texture"', place + 'def Shader "Texture"'),
+             "/Material/Place.inputs:in: its network feeds itself"),
+            ('def PointInstancer "I" {\nint[] protoIndices = [0]\npoint3f[] positions = [(0, 0, 0)]\n'
+             "rel prototypes = </I>\n}", "/I: it is a part of its own prototypes"),
+        )
+
+    def test_constants_of_another_kind_than_an_input_takes(self):
+        at = "/Material/Surface: what feeds "
+        primvar = 'def Shader "Texture" {\nuniform token info:id = "UsdPrimvarReader_float"\n' \
+                  'string inputs:varname = "v"\nfloat outputs:result\n}'
+        connected = "float inputs:{}.connect = </Material/Texture.outputs:result>"
+        open_pbr = 'uniform token info:id = "ND_open_pbr_surface_surfaceshader"\n'
+        self.check(
+            (worn('string inputs:roughness = "x"'), at + "roughness is a text, not a number: it has its default"),
+            (worn("float inputs:diffuseColor = 1"), at + "diffuseColor is a number, not 3 numbers: it has its default"),
+            (worn("float2 inputs:emissiveColor = (1, 2)"), at + "emissiveColor is 2 numbers, not 3 numbers"),
+            (worn(connected.format("ior"), primvar), at + "ior is not carried: it has its default"),
+            (worn(connected.format("opacity"), primvar), at + "opacity is not carried: it has its default"),
+            (worn("int info:id = 4", kind=""), "/Material/Surface: info:id is a number, not a token"),
+            (worn("float inputs:base_color = 1", kind=open_pbr).replace("surface.c", "mtlx:surface.c"),
+             at + "base_color is a number, not 3 numbers"),
+        )
+        # A colour with opacity is one without.
+        self.assertEqual(self.outcome(worn("color4f inputs:diffuseColor = (1, 0.5, 0, 1)")), "")
+        document, _ = usd_support.read_glb(self.dir / "out.glb")
+        self.assertEqual(document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"], [1, 0.5, 0, 1])
+
+    def image(self, mode):
+        """A grey image of a mode of Pillow's, "L" or with opacity "LA"."""
+        Image.fromarray(numpy.full((2, 2) if mode == "L" else (2, 2, 2), 128, numpy.uint8)).save(self.dir / "grey.png")
+
+    def test_textures(self):
+        self.image("LA")
+        # Grey with opacity, as a colour.
+        self.assertEqual(self.outcome(textured(BASE.format("rgb"), FILE)), "/Mesh: it has no primvar st for the "
+                         "textures of its material: they are one colour on it")
+        (self.dir / "none.png").touch()
+        self.check(
+            (textured(BASE.format("rgb"), "asset inputs:file = @none.png@"),
+             "/Material/Texture: the file none.png is empty"),
+            (textured(BASE.format("rgb"), "asset inputs:file = @a\0.png@"), "/Material/Texture: no file has a name as"),
+            (textured(BASE.format("rgb"), FILE + "float3 inputs:scale = (1, 1, 1)"), "it has no primvar st"),
+            (textured(BASE.format("rgb"), FILE + "float inputs:scale = 1"),
+             "/Material/Texture: what feeds scale is a number, not 4 numbers"),
+        )
+
+    def test_what_has_no_values_or_no_surface(self):
+        self.check(
+            (MESH % "color3f[] primvars:displayColor = []",
+             "/Mesh: its primvar displayColor has no values and is ignored"),
+            (MESH % "float2[] primvars:normals = [(0, 1)] ( interpolation = \"uniform\" )",
+             "/Mesh: normals has 2 numbers each: they are left out"),
+            (prim("CylinderLight", 'float inputs:radius = 0'), "/P: it has no surface: it gives no light"),
+        )
+        self.assertEqual(self.outcome('def Cylinder "C" {\ndouble radius = 0\ndouble height = 0\n}'), "")
+        self.assertEqual(self.outcome('def Camera "C" {\nfloat horizontalAperture = None\n}'), "")
+        self.outcome('def SphereLight "L" ( prepend apiSchemas = ["ShapingAPI"] ) {\n'
+                     "float inputs:shaping:cone:angle = 0\nfloat inputs:shaping:cone:softness = 0.5\n}")
+
+    def test_what_a_stage_may_not_say_of_its_render(self):
+        self.check(
+            ('def RenderSettings "R" {\ncustom int caustique:medium = 1\ncustom int caustique:medium:g = 2\n}',
+             "/R: caustique:medium:g is ignored: what it is a part of has a value of its own"),
+            (prim("RenderSettings", "custom int caustique:medium" + 1500 * ":a" + " = 1"),
+             "/P: an attribute caustique:* has more than 64 colons: it is ignored"),
+            (prim("RenderSettings", "custom quatf caustique:seed = (1, 0, 0, 0)"),
+             "/P: caustique:seed is a quatf and is ignored"),
+        )
+
+    def test_prims_as_deep_as_python_is_not(self):
+        depth = 1500
+        self.assertEqual(self.outcome(depth * 'def Xform "P" {\n' + prim("Sphere", "") + depth * "}\n"), "")
+        document, _ = usd_support.read_glb(self.dir / "out.glb")
+        self.assertEqual(document["nodes"][0]["name"], (depth + 1) * "/P")
+
+    def test_a_binary_stage_cut_short(self):
+        self.outcome(MESH % "")
+        self.stage = usd_support.Usd.Stage.Open(str(self.path))
+        binary = self.dir / "whole.usdc"
+        self.stage.Export(str(binary))
+        data = binary.read_bytes()
+        for size in (10, len(data) // 2, len(data) - 1):
+            (self.dir / "cut.usdc").write_bytes(data[:size])
+            with self.assertRaisesRegex(Fault, "USD cannot read it"):
+                convert.write(str(self.dir / "cut.usdc"), str(self.dir / "out.glb"))
+
+
+if __name__ == "__main__":
+    unittest.main()
