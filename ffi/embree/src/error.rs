@@ -86,6 +86,9 @@ impl Error {
             Error::BadTransform { .. } => {
                 Some("give the object a finite scale that is not zero along any axis, or leave it out".into())
             }
+            Error::Embree { message, .. } if message.contains("memory") => {
+                Some("render fewer or simpler meshes, or with more memory".into())
+            }
             _ => None,
         }
     }
