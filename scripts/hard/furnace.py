@@ -80,8 +80,8 @@ CASES = [
         {"scene": mirrors},
         Value(
             1.0,
-            "Mirrors lose nothing, and a ray goes on until it meets the ball: radiance is the ball's along every ray. (What"
-            " bounces between walls beside the ball for ever is of measure zero.)",
+            "Mirrors lose nothing, and a ray goes on until it meets the ball, but for a set of measure zero: radiance is the"
+            " ball's along every ray.",
             bound=0.005,
             resolves=0.1,
         ),
