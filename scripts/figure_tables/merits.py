@@ -82,11 +82,11 @@ def vcm_bandwidths(figures):
 
 
 KINDS = {
-    "vcm-bandwidths": vcm_bandwidths,
     "before": before,
     "before-summary": before_summary,
     "path-peers": peers,
     "path-peers-summary": peers_summary,
     "photons-gain": photons,
     "photons-gain-scenes": photons_by_scene,
+    "vcm-bandwidths": vcm_bandwidths,
 }

@@ -26,6 +26,8 @@ LEVELS = os.environ.get("LEVELS", "1")
 PLACE = CACHE / "speed"
 # The share of a render that tells how many iterations fill it.
 TRIAL = 0.25
+# Least iterations of it.
+SOME = 4
 SETTINGS = {"width": WIDTH, "threads": THREADS, "seconds": SECONDS, "seeds": SEEDS, "levels": LEVELS}
 # Squared errors are taken for no smaller.
 LEAST = 1e-9
@@ -52,17 +54,18 @@ class Program:
         return PLACE / self.key / scene_key(scene) / f"{name}-{LEVELS}-{SECONDS:g}s-{WIDTH}"
 
     def iterations(self, scene, options):
-        """How many iterations fill a render, by what a short one takes before its first and for each."""
+        """How many iterations fill a render, by what a short one takes before its first and for each. A start that takes
+        longer than the trial leaves one iteration in it, which tells nothing of the others: a second trial has more."""
         folder = self._folder(scene, options) / "trial"
         if not (folder / "run.json").exists():
             with making(folder) as draft:
                 history = self._render(scene, options, ["--time", TRIAL * SECONDS], 0, draft / "picture.exr")
+                if history[-1]["iterations"] < SOME:
+                    history = self._render(scene, options, ["--iterations", SOME], 0, draft / "picture.exr")
                 save(draft / "run.json", history)
         history = load(folder / "run.json")
         first, last = history[0], history[-1]
-        each = last["cpu_seconds"] / last["iterations"]
-        if last["iterations"] > first["iterations"]:
-            each = (last["cpu_seconds"] - first["cpu_seconds"]) / (last["iterations"] - first["iterations"])
+        each = (last["cpu_seconds"] - first["cpu_seconds"]) / (last["iterations"] - first["iterations"])
         fixed = max(first["cpu_seconds"] - first["iterations"] * each, 0)
         return max(1, round((SECONDS - fixed) / each))
 

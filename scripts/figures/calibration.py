@@ -14,14 +14,14 @@ pictures are counted apart.
 """
 
 import os
-import subprocess
 import sys
 
 import _accuracy
 import _references
 from _accuracy import BUDGETS, METHODS, SEEDS, geometric, short
 from _cache import THREADS, WIDTH, program
-from record import ROOT, record
+from _plots import draw
+from record import record
 
 FACTOR, RARE = 1.5, 0.5
 
@@ -94,11 +94,7 @@ def main():
         [row["scene"], row["budget"], row["seed"], *map(short, (row["told"], row["true"], row["rare"]))] for row in found
     ]
     record("calibration", values)
-    python = ROOT / ".venv-python" / "bin" / "python"
-    if python.exists():
-        subprocess.run([python, ROOT / "scripts" / "figures" / "_calibration_plot.py"], check=True)
-    else:
-        print("docs/calibration.svg is as it was: scripts/python.sh makes what draws it", file=sys.stderr)
+    draw("calibration")
 
 
 if __name__ == "__main__":

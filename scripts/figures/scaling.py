@@ -5,19 +5,19 @@ threads, by `path`, `vcm` and `sppm`; and what loading takes, against triangles.
 A rough floor under triangles that shine, each a lamp of its own, with a ball of glass on it. Core-seconds are those of
 one thread, which other work on the machine changes little, of iterations after the first; the least of ROUNDS (2). An
 exponent is the slope of the least squares in logarithms; the steepest step is the largest exponent between neighbours.
-Draws docs/scaling.svg, where there is .venv-python
-(scripts/python.sh). Fails if any step costs more than n log n would. LARGEST (10000000) triangles shorten a trial.
+Draws docs/scaling.svg, where there is .venv-python (scripts/python.sh). Fails if any step costs more than n log n
+would. LARGEST (10000000) triangles shorten a trial.
 """
 
 import math
 import os
 import shutil
-import subprocess
 import sys
 
 import numpy as np
 from _iteration import WHOLE as BIN
 from _iteration import fastest, history, stretches
+from _plots import draw
 from _processes import spent
 from record import ROOT, record
 
@@ -134,9 +134,7 @@ def main():
     print(values["threads"])
     shutil.rmtree(OUT)
     record("scaling", values)
-    python = ROOT / ".venv-python" / "bin" / "python"
-    if python.exists():
-        subprocess.run([python, ROOT / "scripts" / "figures" / "_scaling_plot.py"], check=True)
+    draw("scaling")
     worse = [f"{row['method']} by {row['axis']}" for row in rows if not row["within"]]
     if worse:
         sys.exit(f"scaling: error: faster than n log n: {', '.join(worse)}")

@@ -6,9 +6,9 @@ use crate::estimator::Pixel;
 use crate::estimator::rule::{adaptive, chi_squared, local};
 use crate::memory;
 use crate::photon;
-use crate::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, photons_per_path};
+use crate::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
 use crate::scene::Scene;
-use crate::transport::{EyeMeasure, MergePhoton};
+use crate::transport::MergePhoton;
 use std::fmt::Display;
 use std::mem::size_of;
 
@@ -27,14 +27,14 @@ fn needed(
     per_light_path: f64,
 ) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
-    let eye_paths = 1 + u64::from(settings.levels.two_paths);
-    let (method, measure) = (settings.method, size_of::<EyeMeasure>() as u64);
+    let light_paths = 1.0 + f64::from(u8::from(settings.levels.two_paths));
+    let method = settings.method;
     let gathered = (f64::from(settings.photons) * per_light_path * PHOTON_BYTES as f64) as u64;
-    let (per_path, photons) = match (method.counts_photons(), method.has_bandwidths()) {
+    let (merged, photons) = match (method.counts_photons(), method.has_bandwidths()) {
         _ if method == Method::Pm => (0, settings.photon_memory.min(gathered)),
         (true, _) => (0, gathered),
-        (false, true) => (measure + (per_light_path * MERGED_BYTES as f64) as u64, 0),
-        (false, false) => (measure, 0),
+        (false, true) => ((light_paths * per_light_path * MERGED_BYTES as f64) as u64, 0),
+        (false, false) => (0, 0),
     };
     // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
     let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
@@ -54,8 +54,9 @@ fn needed(
     let own = (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
     let per_pixel = own
         + pictures
-        + (Pixel::bytes(settings.levels.count, groups) + channels * size_of::<f32>()) as u64
-        + eye_paths * per_path;
+        + (Pixel::bytes(settings.levels.count, groups) + bytes_of_measures(settings)) as u64
+        + (channels * size_of::<f32>()) as u64
+        + merged;
     pixels * per_pixel + photons
 }
 

@@ -1,5 +1,5 @@
-//! One iteration of the methods made of whole paths: path tracing, light tracing, bidirectional path tracing,
-//! bidirectional photon mapping, vertex connection and merging.
+//! One iteration of the methods made of pairs of walks: light tracing, bidirectional path tracing, bidirectional photon
+//! mapping, vertex connection and merging.
 //!
 //! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its
 //! pixels. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
@@ -9,12 +9,12 @@
 //! the other levels of the second. They share nothing but the photons, those of both light paths.
 
 use super::clock::cpu_seconds;
-use super::groups::TileGroups;
 use super::guiding::learnt;
 use super::iterate::{Iterate, Work};
+use super::measures::Measures;
 use super::result::Phases;
 use super::settings::Settings;
-use super::techniques::{TechniquePicture, Watch, Watches, collect};
+use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
@@ -28,7 +28,7 @@ use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
     Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
-    Surroundings, path_measure,
+    Strategies, Surroundings,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -55,18 +55,17 @@ pub struct Passes<'a> {
     camera: &'a Camera,
     settings: &'a Settings,
     surroundings: &'a Surroundings,
-    shared: Option<Bidirectional<'a>>,
+    shared: Bidirectional<'a>,
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
-    /// Measures of the iteration, one list per pair.
-    measures: Vec<Vec<EyeMeasure>>,
+    /// Measures of the iteration, by pair.
+    measures: Vec<Measures>,
     /// What the light paths of each tile have left; lists that are kept grow but once.
     left: Vec<Deposits>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
-    /// What is looked at besides the picture, by tile, if anything is.
-    watches: Option<Vec<Watches>>,
+    watched: Watched,
     /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it
     /// covers.
     covered: f32,
@@ -79,6 +78,7 @@ impl<'a> Passes<'a> {
         camera: &'a Camera,
         settings: &'a Settings,
         surroundings: &'a Surroundings,
+        strategies: Strategies,
     ) -> Passes<'a> {
         let levels = settings.levels;
         let mut pairs = vec![Pair { light: Domain::Light, eye: Domain::EyeIndependent, levels: (0, levels.count) }];
@@ -90,21 +90,11 @@ impl<'a> Passes<'a> {
         let (width, height) = camera.size();
         let pixels = (width * height) as f32;
         let eye = settings.eye(scene, camera, surroundings);
-        let shared = settings.method.strategies(camera).map(|strategies| Bidirectional {
-            eye,
-            surroundings,
-            strategies,
-            light_paths: pixels,
-            merged_paths: pixels * pairs.len() as f32,
-            only: None,
-        });
-        let guided = settings.guided && shared.is_some();
-        let guide = guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);
+        let merged_paths = pixels * pairs.len() as f32;
+        let shared = Bidirectional { eye, surroundings, strategies, light_paths: pixels, merged_paths, only: None };
+        let guide = settings.guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);
         let tiles = Tiles::new(camera);
-        let measures = pairs.iter().map(|_| vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS]).collect();
-        let (techniques, groups) = (settings.techniques, settings.light_groups(scene));
-        let watches = || (0..tiles.count()).map(|_| Watches::new(techniques, groups)).collect();
-        let watches = (techniques || groups > 0).then(watches);
+        let measures = pairs.iter().map(|pair| Measures::new(tiles.count(), pair.levels.1)).collect();
         Passes {
             scene,
             camera,
@@ -117,7 +107,7 @@ impl<'a> Passes<'a> {
             measures,
             left: (0..tiles.count()).map(|_| Deposits::default()).collect(),
             photons: None,
-            watches,
+            watched: Watched::new(settings, scene, &tiles),
             covered: 0.0,
         }
     }
@@ -132,13 +122,16 @@ impl<'a> Passes<'a> {
         let pass = LightPass::new(seed, i, pair.light, width * height, max_depth).guided(guide);
         // Others put paths together of one hue alone, whichever it is. There each light path is its pixel's own, and
         // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
-        let merges = self.shared.is_some_and(|shared| shared.strategies.merge);
-        if merges { pass.with(Comb::slow(seed, i)) } else { pass.drawing(Streams::in_sequence(seed, i, pair.light)) }
+        if self.shared.strategies.merge {
+            pass.with(Comb::slow(seed, i))
+        } else {
+            pass.drawing(Streams::in_sequence(seed, i, pair.light))
+        }
     }
 
     /// The photons that pass `i` leaves, where it was not rendered here.
-    fn photons_of(&self, i: u64, shared: &Bidirectional<'_>) -> PhotonMap<MergePhoton> {
-        let tiles = self.tiles;
+    fn photons_of(&self, i: u64) -> PhotonMap<MergePhoton> {
+        let (shared, tiles) = (self.shared, self.tiles);
         let mut parts = Vec::new();
         // In the order of `iterate`, so that even photons in one place are summed alike.
         for pair in &self.pairs {
@@ -159,14 +152,10 @@ impl<'a> Passes<'a> {
 
     /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged.
     fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Work {
-        let Some(shared) = self.shared else {
-            self.paths(i, watches);
-            self.add(i, pixels, watches);
-            return Work { light_paths: 0, photons: 0, rejected: 0 };
-        };
+        let shared = self.shared;
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
-            self.photons = Some((i - 1, self.photons_of(i - 1, &shared)));
+            self.photons = Some((i - 1, self.photons_of(i - 1)));
         }
         let schedule = self.settings.schedule(i);
         let merged = self.photons.is_some();
@@ -194,10 +183,10 @@ impl<'a> Passes<'a> {
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
             let streams = Streams::in_sequence(seed, i, pair.eye);
-            measures.par_chunks_mut(TILE_PIXELS).zip(watches.par_iter_mut()).zip(&mut self.left).enumerate().for_each(
-                |(tile, ((measures, watch), left))| {
+            measures.par_tiles().zip(watches.par_iter_mut()).zip(&mut self.left).enumerate().for_each(
+                |(tile, ((mut measures, watch), left))| {
                     left.clear();
-                    let mut arena = Bump::new();
+                    let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
                     for places in tiles.groups(tile) {
                         let mut starts = shared.eye.starts(&places, streams);
                         for (place, start) in places.iter().flatten().zip(starts.iter_mut().flatten()) {
@@ -210,22 +199,23 @@ impl<'a> Passes<'a> {
                             let levels = levels(bandwidths[index as usize].bandwidths[0], pair);
                             let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
                             watch.begin(place.at, own);
-                            shared.eye_path(&arena, start, &meets, watch, &mut measures[place.at]);
+                            shared.eye_path(&arena, start, &meets, watch, &mut measure);
+                            measures.set(place.at, &measure);
                         }
                     }
                 },
             );
             let splats = SplatsByTile::new(&self.left, &tiles);
-            measures.par_chunks_mut(TILE_PIXELS).zip(watches.par_iter_mut()).enumerate().for_each(
-                |(tile, (measures, watch))| {
-                    for splat in splats.of(tile) {
-                        let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
-                        let (_, slot) = tiles.place(splat.pixel);
-                        watch.splat(slot, own, splat, &levels);
-                        splat.apply(&levels, &mut measures[slot]);
-                    }
-                },
-            );
+            measures.par_tiles().zip(watches.par_iter_mut()).enumerate().for_each(|(tile, (mut measures, watch))| {
+                for splat in splats.of(tile) {
+                    let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
+                    let (_, slot) = tiles.place(splat.pixel);
+                    watch.splat(slot, own, splat, &levels);
+                    let mut measure = measures.get(slot);
+                    splat.apply(&levels, &mut measure);
+                    measures.set(slot, &measure);
+                }
+            });
             rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
             photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
             self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
@@ -238,34 +228,16 @@ impl<'a> Passes<'a> {
         Work { light_paths: walked, photons: merges, rejected }
     }
 
-    /// Path tracing.
-    fn paths<W: Watch>(&mut self, i: u64, watches: &mut [W]) {
-        let (eye, tiles, seed) = (self.eye(), self.tiles, self.settings.seed);
-        let streams = Streams::in_sequence(seed, i, self.pairs[0].eye);
-        let parts = self.measures[0].par_chunks_mut(TILE_PIXELS).zip(watches);
-        parts.enumerate().for_each(|(tile, (measures, watch))| {
-            let mut arena = Bump::new();
-            for places in tiles.groups(tile) {
-                let starts = eye.starts(&places, streams);
-                for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                    arena.reset();
-                    watch.begin(place.at, Some(0));
-                    path_measure(&eye, &arena, start, watch, &mut measures[place.at]);
-                }
-            }
-        });
-    }
-
     /// Adds the measures of iteration `i` to the pixels.
     fn add<W: Watch>(&self, i: u64, pixels: &mut [Pixel], watches: &[W]) {
         let eye = self.eye();
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
             let slot = self.tiles.slot(index as u32);
-            let measure = &self.measures[0][slot];
-            pixel.see(i, || eye.seen(measure));
-            let others = self.measures.get(1).map(|measures| &measures[slot]);
+            let measure = self.measures[0].get(slot);
+            pixel.see(i, || eye.seen(&measure));
+            let others = self.measures.get(1).map(|measures| measures.get(slot));
             let groups = watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
-            pixel.add_with_groups(i, measure, others, groups);
+            pixel.add_with_groups(i, &measure, others.as_ref(), groups);
         });
     }
 }
@@ -341,24 +313,18 @@ impl Iterate for Passes<'_> {
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
         let start = cpu_seconds();
-        let work = match self.watches.take() {
-            Some(mut watches) => {
-                watches.iter_mut().filter_map(|watches| watches.groups.as_mut()).for_each(TileGroups::clear);
-                let work = self.pass(i, pixels, &mut watches);
-                self.watches = Some(watches);
-                work
-            }
+        let mut watched = std::mem::take(&mut self.watched);
+        let work = match watched.begin() {
+            Some(watches) => self.pass(i, pixels, watches),
             None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
         };
+        self.watched = watched;
         // Light and eye paths take turns within a pixel.
         phases.eye += cpu_seconds() - start;
         work
     }
 
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
-        let (width, height) = self.camera.size();
-        let pixels = width as usize * height as usize;
-        let parts: Vec<_> = self.watches.take().into_iter().flatten().filter_map(|watches| watches.pictures).collect();
-        if parts.is_empty() { Vec::new() } else { collect(&self.tiles, pixels, parts, iterations) }
+        self.watched.collect(&self.tiles, iterations)
     }
 }

@@ -5,6 +5,7 @@ use super::counting::Counting;
 use super::iterate::Iterate;
 use super::method::Method;
 use super::metropolis::Metropolis;
+use super::path::Paths;
 use super::pm::Pm;
 use super::settings::{KernelChoice, RadiusRule, Settings};
 use super::sppm::Sppm;
@@ -16,7 +17,7 @@ use crate::estimator::rule::local::LocalStatistics;
 use crate::estimator::rule::thinned::Thinned;
 use crate::photon::{Kernel, kernel};
 use crate::scene::Scene;
-use crate::transport::Surroundings;
+use crate::transport::{Strategies, Surroundings};
 
 /// The passes of a render, nothing done yet.
 pub(super) fn passes<'a>(
@@ -25,14 +26,17 @@ pub(super) fn passes<'a>(
     settings: &'a Settings,
     surroundings: &'a Surroundings,
 ) -> Box<dyn Iterate + 'a> {
+    let pairs = |strategies| Box::new(Passes::new(scene, camera, settings, surroundings, strategies));
     match settings.method {
         Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
             gathering(Sppm::new(scene, camera, settings, surroundings), settings)
         }
         Method::Pm => Box::new(Pm::new(scene, camera, settings, surroundings)),
-        Method::Path | Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm => {
-            Box::new(Passes::new(scene, camera, settings, surroundings))
-        }
+        Method::Path => Box::new(Paths::new(settings.eye(scene, camera, surroundings), settings)),
+        Method::Light => pairs(Strategies::LIGHT),
+        Method::Bdpt => pairs(Strategies::BDPT),
+        Method::Bpm => pairs(Strategies::BPM),
+        Method::Vcm => pairs(Strategies::vcm(camera.connects())),
         Method::Mlt => Box::new(Metropolis::new(scene, camera, settings, surroundings)),
     }
 }

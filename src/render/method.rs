@@ -1,9 +1,7 @@
 //! The methods, and what of a render's shape follows from the one chosen.
 
-use crate::camera::Camera;
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
-use crate::transport::Strategies;
 use serde::{Deserialize, Serialize};
 
 /// Light paths per iteration: the papers' setting.
@@ -73,18 +71,6 @@ impl Method {
             Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => Search::Photons,
             Method::Bpm => Search::Merging,
             Method::Vcm => Search::ConnectionsAndMerging,
-        }
-    }
-
-    /// The strategies of a method whose iteration is a pair of walks for every pixel.
-    pub(super) fn strategies(self, camera: &Camera) -> Option<Strategies> {
-        match self {
-            Method::Path | Method::Pm | Method::Mlt => None,
-            Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => None,
-            Method::Light => Some(Strategies::LIGHT),
-            Method::Bdpt => Some(Strategies::BDPT),
-            Method::Bpm => Some(Strategies::BPM),
-            Method::Vcm => Some(Strategies::vcm(camera.connects())),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::control::{History, StopReason};
 use super::error_estimate::ErrorEstimate;
+use super::measures::bytes_of_measures;
 use super::method::Method;
 use super::rejections::Rejections;
 use super::settings::Settings;
@@ -58,9 +59,10 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Bytes that the sums of a pixel take, those of its levels and light groups among them.
-    pub fn bytes_per_pixel(&self) -> usize {
-        self.pixels.first().map_or(0, Pixel::size)
+    /// Bytes that a pixel takes: its sums, those of its levels and light groups among them, and what an iteration
+    /// keeps of it besides ([`bytes_of_measures`]).
+    pub fn bytes_per_pixel(&self) -> [usize; 2] {
+        [self.pixels.first().map_or(0, Pixel::size), bytes_of_measures(&self.settings)]
     }
 
     /// Whether the maps of [`Method::Pm`], traced once, had no room for the photons of all its light paths.

@@ -5,10 +5,12 @@
 //! finite is left out.
 
 use super::groups::{OfGroup, TileGroups};
+use super::settings::Settings;
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::light::Group;
 use crate::math::Rgb;
 use crate::plan::PathClass;
+use crate::scene::Scene;
 use crate::transport::{MergeLevels, Record, Splat, Technique};
 
 /// From this depth of a walk on, deeper ones share a picture: paths have no longest length.
@@ -98,13 +100,13 @@ impl Watch for () {}
 pub(super) struct Watches {
     slot: usize,
     level: Option<usize>,
-    pub pictures: Option<TilePictures>,
-    pub groups: Option<TileGroups>,
+    pictures: Option<TilePictures>,
+    groups: Option<TileGroups>,
 }
 
 impl Watches {
     /// A picture per technique, and light by so many groups, where they are wanted.
-    pub fn new(techniques: bool, groups: usize) -> Watches {
+    fn new(techniques: bool, groups: usize) -> Watches {
         let groups = (groups > 0).then(|| TileGroups::new(groups));
         Watches { slot: 0, level: None, pictures: techniques.then(TilePictures::new), groups }
     }
@@ -116,6 +118,32 @@ impl Watches {
         if let Some(groups) = &mut self.groups {
             groups.add(self.slot, of, value * weight);
         }
+    }
+}
+
+/// What is looked at besides the picture, by tile, if anything is.
+#[derive(Default)]
+pub(super) struct Watched(Option<Vec<Watches>>);
+
+impl Watched {
+    /// As the settings want.
+    pub fn new(settings: &Settings, scene: &Scene, tiles: &Tiles) -> Watched {
+        let (techniques, groups) = (settings.techniques, settings.light_groups(scene));
+        let watches = || (0..tiles.count()).map(|_| Watches::new(techniques, groups)).collect();
+        Watched((techniques || groups > 0).then(watches))
+    }
+
+    /// Before an iteration: what watches it, tile by tile.
+    pub fn begin(&mut self) -> Option<&mut [Watches]> {
+        let watches = self.0.as_deref_mut()?;
+        watches.iter_mut().filter_map(|watches| watches.groups.as_mut()).for_each(TileGroups::clear);
+        Some(watches)
+    }
+
+    /// The pictures of all techniques that have found light, after so many iterations; they are taken.
+    pub fn collect(&mut self, tiles: &Tiles, iterations: u64) -> Vec<TechniquePicture> {
+        let parts: Vec<_> = self.0.take().into_iter().flatten().filter_map(|watches| watches.pictures).collect();
+        if parts.is_empty() { Vec::new() } else { collect(tiles, parts, iterations) }
     }
 }
 
@@ -153,13 +181,13 @@ impl Watch for Watches {
 type Sums = [[Rgb; 2]; TILE_PIXELS];
 
 /// The pictures of a tile.
-pub(super) struct TilePictures {
+struct TilePictures {
     pictures: Vec<Option<Box<Sums>>>,
 }
 
 impl TilePictures {
     /// All black.
-    pub fn new() -> TilePictures {
+    fn new() -> TilePictures {
         let pictures = std::iter::repeat_with(|| None).take(MAX_TECHNIQUES).collect();
         TilePictures { pictures }
     }
@@ -175,20 +203,15 @@ impl TilePictures {
     }
 }
 
-/// The pictures, of so many `pixels`, of all techniques that have found light: means over `iterations`.
-pub(super) fn collect(
-    tiles: &Tiles,
-    pixels: usize,
-    mut parts: Vec<TilePictures>,
-    iterations: u64,
-) -> Vec<TechniquePicture> {
+/// The pictures of all techniques that have found light: means over `iterations`.
+fn collect(tiles: &Tiles, mut parts: Vec<TilePictures>, iterations: u64) -> Vec<TechniquePicture> {
     let scale = 1.0 / iterations.max(1) as f32;
     let mut pictures = Vec::new();
     for index in 0..MAX_TECHNIQUES {
         if parts.iter().all(|part| part.pictures[index].is_none()) {
             continue;
         }
-        let black = vec![[0.0; 3]; pixels];
+        let black = vec![[0.0; 3]; tiles.pixels_of_all()];
         let mut picture = TechniquePicture { technique: technique(index), weighted: black.clone(), unweighted: black };
         for (tile, part) in parts.iter_mut().enumerate() {
             // Taken and freed, so that the pictures are not in memory twice.

@@ -7,6 +7,19 @@ const TILE: u32 = 16;
 /// Pixels of a tile.
 pub(super) const TILE_PIXELS: usize = (TILE * TILE) as usize;
 
+/// What a tile has of a picture.
+pub(super) struct TileOf<'p, T> {
+    rows: [&'p mut [T]; TILE as usize],
+}
+
+impl<T> TileOf<'_, T> {
+    /// What is at a slot of the tile, of those that are in the picture.
+    #[inline]
+    pub fn at(&mut self, slot: usize) -> &mut T {
+        &mut self.rows[slot / TILE as usize][slot % TILE as usize]
+    }
+}
+
 /// The film's tiles.
 #[derive(Clone, Copy)]
 pub(super) struct Tiles {
@@ -23,6 +36,24 @@ impl Tiles {
 
     pub fn count(&self) -> usize {
         self.across as usize * self.height.div_ceil(TILE) as usize
+    }
+
+    /// Number of pixels of the film.
+    pub fn pixels_of_all(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Cuts a picture, stored row by row, into what each tile has of it.
+    pub fn cut<'p, T>(&self, picture: &'p mut [T]) -> Vec<TileOf<'p, T>> {
+        let none = || TileOf { rows: std::array::from_fn(|_| &mut [][..]) };
+        let mut cut: Vec<_> = std::iter::repeat_with(none).take(self.count()).collect();
+        for (y, row) in picture.chunks_mut(self.width as usize).enumerate() {
+            let tiles = &mut cut[y / TILE as usize * self.across as usize..];
+            for (tile, part) in tiles.iter_mut().zip(row.chunks_mut(TILE as usize)) {
+                tile.rows[y % TILE as usize] = part;
+            }
+        }
+        cut
     }
 
     /// Index of a pixel, row by row.

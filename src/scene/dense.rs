@@ -27,7 +27,8 @@ pub(super) fn thin(
     };
     let mut farthest = vec![0f32; materials.list.len()];
     for (i, instance) in shapes.instances.iter().enumerate() {
-        let Some(medium) = materials.list[instance.material as usize].medium else { continue };
+        let medium = materials.list[instance.material as usize].medium;
+        let Some(medium) = medium.filter(MediumParameters::scatters) else { continue };
         let skipped = skipped(i);
         if thinned(medium, skipped).is_some() {
             warnings.push(said(&format!("object \"{}\": its", instance.name), medium, skipped));
@@ -38,7 +39,7 @@ pub(super) fn thin(
     for (material, skipped) in materials.list.iter_mut().zip(farthest) {
         material.medium = material.medium.map(|medium| thinned(medium, skipped).unwrap_or(medium));
     }
-    if let Some(medium) = space {
+    if let Some(medium) = space.as_mut().filter(|medium| medium.scatters()) {
         let skipped = (0..shapes.instances.len()).map(skipped).fold(0.0, f32::max);
         if let Some(thin) = thinned(*medium, skipped) {
             warnings.push(said("the scene's", *medium, skipped));

@@ -12,9 +12,10 @@ const TRAPPED_IN_MIRRORS: u32 = 1 << 8;
 /// Least probability of going on: keeps the weight of what survives bounded.
 const LEAST_SURVIVAL: f32 = 0.02;
 
-/// Probability of going on where a path of `depth` keeps a share `expected` of its weight; `mirrored` by a delta lobe.
+/// Probability of going on where a path of `depth` keeps a share `expected` of its weight; `mirrored` says whether by
+/// a delta lobe, and is asked late alone.
 #[inline]
-pub(super) fn survival(expected: f32, depth: u32, mirrored: bool) -> f32 {
+pub(super) fn survival(expected: f32, depth: u32, mirrored: impl FnOnce() -> bool) -> f32 {
     // Written so that NaN ends the path.
     let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
     survival.min(late_survival(depth, mirrored))
@@ -28,14 +29,11 @@ pub(super) fn survival(expected: f32, depth: u32, mirrored: bool) -> f32 {
 /// for c = 1/2 it grows as a logarithm only for what comes back out of a half space that absorbs nothing, `f(n) ~
 /// n^-3/2`. A trapped path then has 16 sqrt(n) bounces among the first n on average: with c = 2 from some n on, an end.
 #[inline]
-pub(super) fn late_survival(depth: u32, mirrored: bool) -> f32 {
-    let trapped = if mirrored { TRAPPED_IN_MIRRORS } else { TRAPPED };
-    let c = if depth <= LATE {
+pub(super) fn late_survival(depth: u32, mirrored: impl FnOnce() -> bool) -> f32 {
+    if depth <= LATE {
         return 1.0;
-    } else if depth <= trapped {
-        0.5
-    } else {
-        2.0
-    };
+    }
+    let trapped = if mirrored() { TRAPPED_IN_MIRRORS } else { TRAPPED };
+    let c = if depth <= trapped { 0.5 } else { 2.0 };
     1.0 - c / depth as f32
 }

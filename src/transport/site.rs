@@ -282,6 +282,6 @@ impl ScatterPoint for MediumVertex {
     #[inline]
     fn survival(&self, set: LobeSet) -> f32 {
         let expected = if set.has(LobeSet::BROAD) { self.throughput.max_element() * self.survival_scale } else { 0.0 };
-        survival(expected, self.depth, false)
+        survival(expected, self.depth, || false)
     }
 }

@@ -53,7 +53,7 @@ impl Vertex<'_, '_> {
     #[inline]
     pub fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
         let expected = (self.throughput * self.shading.albedo(set)).max_element() * self.survival_scale / chance;
-        survival(expected, self.depth, self.shading.bsdf.lobes() & set == LobeSet::DELTA)
+        survival(expected, self.depth, || self.shading.bsdf.lobes() & set == LobeSet::DELTA)
     }
 }
 

@@ -312,7 +312,7 @@ impl<'a> Path<'a> {
         let survival = match self.channel {
             None => vertex.survival_chosen(set, chance),
             // It has its roulette on arrival; this one ends what is trapped without loss.
-            Some(_) => late_survival(depth, set == LobeSet::DELTA),
+            Some(_) => late_survival(depth, || set == LobeSet::DELTA),
         };
         if draws.one(Purpose::Roulette) >= survival {
             return end(self.throughput, visitor);

@@ -22,8 +22,8 @@ pub struct Summary {
     /// Photons are merged or gathered within bandwidths, of one level.
     has_one_bandwidth: bool,
     rejections: Rejections,
-    /// Bytes of a pixel's sums, and how many levels these are of.
-    pixel: (usize, usize),
+    /// Bytes of a pixel's sums and of an iteration's measures of it, and how many levels these are of.
+    pixel: ([usize; 2], usize),
     stop: StopReason,
     /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
     full: Option<(u64, u32, u64)>,
@@ -65,9 +65,10 @@ impl Summary {
             say(&format!("estimated relative error before the finish {}{}", percent(error), self.told.note()));
         }
         let peak = peak_memory() as f64 / f64::from(1 << 30);
-        let (bytes, levels) = self.pixel;
+        let ([sums, measures], levels) = self.pixel;
         let levels = if levels > 1 { format!("{levels} levels") } else { "one level".into() };
-        say(&format!("peak memory {peak:.2} GiB; the sums of a pixel, of {levels}, take {bytes} bytes"));
+        let measures = if measures > 0 { format!(", an iteration's measures of it {measures}") } else { String::new() };
+        say(&format!("peak memory {peak:.2} GiB; the sums of a pixel, of {levels}, take {sums} bytes{measures}"));
     }
 
     /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, which levels

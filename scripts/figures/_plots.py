@@ -1,0 +1,39 @@
+"""Plots of stored figures, which .venv-python draws (scripts/python.sh)."""
+
+import json
+import subprocess
+import sys
+
+from record import RESULTS, ROOT
+
+
+def rows(name):
+    """The rows that are stored of a figure."""
+    stored = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
+    return [row for entry in stored if entry["name"] == name for row in entry["values"]["rows"]]
+
+
+def draw(name):
+    """Draws docs/NAME.svg by _NAME_plot.py, where what draws is there."""
+    python = ROOT / ".venv-python" / "bin" / "python"
+    if python.exists():
+        subprocess.run([python, ROOT / "scripts" / "figures" / f"_{name}_plot.py"], check=True)
+    else:
+        print(f"docs/{name}.svg is as it was: scripts/python.sh makes what draws it", file=sys.stderr)
+
+
+def pyplot(name):
+    """What draws a picture, with the same bytes each time."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams |= {"svg.hashsalt": name, "svg.fonttype": "none", "font.size": 9}
+    from matplotlib import pyplot
+
+    return pyplot
+
+
+def save(figure, name):
+    """Writes docs/NAME.svg."""
+    figure.tight_layout()
+    figure.savefig(ROOT / "docs" / f"{name}.svg", metadata={"Date": None})
