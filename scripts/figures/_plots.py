@@ -1,16 +1,14 @@
 """Plots of stored figures, which .venv-python draws (scripts/python.sh)."""
 
-import json
 import subprocess
 import sys
 
-from record import RESULTS, ROOT
+from record import ROOT, entries
 
 
 def rows(name):
     """The rows that are stored of a figure."""
-    stored = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
-    return [row for entry in stored if entry["name"] == name for row in entry["values"]["rows"]]
+    return [row for entry in entries() if entry["name"] == name for row in entry["values"]["rows"]]
 
 
 def draw(name):

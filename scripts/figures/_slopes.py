@@ -1,9 +1,8 @@
 """Prints the last slopes that were stored, with exponents fitted from 128 iterations on by weighted least squares in the logarithms."""
 
-import json
 import math
 
-from record import RESULTS
+from record import entries
 
 
 def fit(series, key):
@@ -20,8 +19,7 @@ def fit(series, key):
 
 
 def main():
-    found = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
-    for entry in [e["values"] for e in found if e["name"] == "slopes"][-5:]:
+    for entry in [e["values"] for e in entries() if e["name"] == "slopes"][-5:]:
         print(entry["rule"], entry["parameters"], f"{entry['seeds']} seeds")
         for s in entry["series"]:
             line = f"{s['iterations']:>8}  bias {s['bias'][0]:.4f} +- {s['bias'][1]:.4f}, given bandwidths {s['bias_given'][0]:.4f} +- {s['bias_given'][1]:.4f}"

@@ -14,7 +14,6 @@ pictures are counted apart.
 """
 
 import os
-import sys
 
 import _accuracy
 import _references

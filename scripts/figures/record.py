@@ -63,6 +63,12 @@ def same(one, other):
     return one["name"] == other["name"] and values[0] == values[1]
 
 
+def entries(file=RESULTS):
+    """All that is stored."""
+    file = Path(file)
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
+
+
 def record(name, values, file=RESULTS):
     """Stores one line and returns the object. `values`: a dict of what JSON can say, without NaN."""
     now = datetime.datetime.now(datetime.timezone.utc)
@@ -78,8 +84,7 @@ def record(name, values, file=RESULTS):
         print(f"record: {name} is not stored: the tree has changes that are not committed", file=sys.stderr)
         return entry
     file = Path(file)
-    stored = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
-    kept = [other for other in stored if not same(other, entry)] + [entry]
+    kept = [other for other in entries(file) if not same(other, entry)] + [entry]
     draft = file.with_suffix(".part")
     draft.write_text("".join(json.dumps(one, allow_nan=False) + "\n" for one in kept), encoding="utf-8")
     draft.replace(file)

@@ -281,10 +281,8 @@ impl<'l> SplatsByTile<'l> {
 
 impl Iterate for Passes<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
-        let (width, height) = self.camera.size();
-        let pixel = self.settings.pixel(self.scene);
         if !self.settings.method.has_bandwidths() {
-            return vec![pixel([0.0; 2]); width as usize * height as usize];
+            return self.settings.pixels(self.scene, self.camera);
         }
         // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
         let initial = match self.settings.initial {
@@ -304,7 +302,7 @@ impl Iterate for Passes<'_> {
             _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
         };
         self.covered = std::f32::consts::PI * pixels * pixels;
-        all.into_iter().map(pixel).collect()
+        all.into_iter().map(self.settings.pixel(self.scene)).collect()
     }
 
     fn guide(&self) -> Option<&Guide> {

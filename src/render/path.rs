@@ -36,8 +36,6 @@ impl<'a> Paths<'a> {
         parts.enumerate().for_each(|(tile, (mut pixels, watch))| {
             let mut arena = Bump::new();
             for places in tiles.groups(tile) {
-                let waiting = places.iter().flatten().map(|place| pixels.at(place.at).touch()).sum::<f64>();
-                std::hint::black_box(waiting);
                 let starts = eye.starts(&places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     arena.reset();
@@ -55,8 +53,7 @@ impl<'a> Paths<'a> {
 
 impl Iterate for Paths<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
-        let (width, height) = self.eye.camera.size();
-        vec![self.settings.pixel(self.eye.scene)([0.0; 2]); width as usize * height as usize]
+        self.settings.pixels(self.eye.scene, self.eye.camera)
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {

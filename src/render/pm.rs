@@ -134,8 +134,7 @@ impl<'a> Pm<'a> {
 
 impl Iterate for Pm<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
-        let (width, height) = self.eye.camera.size();
-        vec![self.settings.pixel(self.eye.scene)([0.0; 2]); width as usize * height as usize]
+        self.settings.pixels(self.eye.scene, self.eye.camera)
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {

@@ -209,6 +209,12 @@ impl Settings {
         move |bandwidths| Pixel::new(levels, exponent, bandwidths).with_groups(groups)
     }
 
+    /// All pixels before the first iteration, of methods without bandwidths of pixels.
+    pub(super) fn pixels(&self, scene: &Scene, camera: &Camera) -> Vec<Pixel> {
+        let (width, height) = camera.size();
+        vec![self.pixel(scene)([0.0; 2]); width as usize * height as usize]
+    }
+
     /// Groups of lights whose light is told apart: by methods that know of each light where it comes from.
     pub(super) fn light_groups(&self, scene: &Scene) -> usize {
         if self.method.has_techniques() { scene.lights.groups().names.len() } else { 0 }
