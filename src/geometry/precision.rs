@@ -20,8 +20,20 @@ pub fn error(corners: [Vec3; 3]) -> f32 {
     error_within(a.max(b).max(c).max_element())
 }
 
+/// Relative error of the distance between a plane and the end of a ray, in units of the ray's length: roundings of its
+/// direction (four) and of Embree's own distance to the triangle (four).
+const RAY_ERROR: f32 = 8.0 * f32::EPSILON;
+
 /// [`Surface::spawn`](super::Surface::spawn) for a point of a triangle with unit normal `ng` that may be off by `error`.
 #[inline]
 pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
     p + ng * error.copysign(direction.dot(ng))
+}
+
+/// The end of a shadow ray of length `distance` towards a point of a triangle with unit normal `ng` that may be off by
+/// `error`: moved off the triangle, to the side that `direction` points to (back along the ray), so that the triangle
+/// does not block the ray that ends on it.
+#[inline]
+pub fn shadow_end(p: Vec3, ng: Vec3, direction: Vec3, error: f32, distance: f32) -> Vec3 {
+    spawn(p, ng, direction, error + RAY_ERROR * distance)
 }

@@ -1,7 +1,7 @@
 //! The point of a surface that a ray has hit, with everything shading needs.
 
 use super::mesh::Corner;
-use super::precision::spawn;
+use super::precision::{shadow_end, spawn};
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -93,5 +93,11 @@ impl Surface {
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Vec3 {
         spawn(self.p, self.ng, direction, self.error)
+    }
+
+    /// Where a shadow ray of length `distance` ends that comes against `direction`.
+    #[inline]
+    pub fn shadow_end(&self, direction: Vec3, distance: f32) -> Vec3 {
+        shadow_end(self.p, self.ng, direction, self.error, distance)
     }
 }

@@ -10,7 +10,7 @@ use super::group::{Group, Groups};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::spread::Spread;
-use crate::geometry::{Shapes, Surface, spawn};
+use crate::geometry::{Shapes, Surface, shadow_end, spawn};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{PI, TAU};
@@ -290,7 +290,7 @@ impl Lights {
                 let radiance = radiance * toward;
                 let pdf_w = probability * distance2 / (area * cos.abs());
                 let arrival_pdf_a = Self::onto(cos.abs(), *two_sided, spread) / distance2;
-                let target = Some(spawn(at, ng, -wi, position_error(corners)));
+                let target = Some(shadow_end(at, ng, -wi, position_error(corners), distance2.sqrt()));
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a, light })
             }
             Emitter::Point { p: at, intensity } => {

@@ -163,7 +163,8 @@ impl<R: Record> EyeWalk<'_, R> {
         let Bidirectional { eye, strategies, .. } = self.shared;
         let to = light.p() - vertex.p();
         let distance2 = to.length_squared();
-        let d = to / distance2.sqrt();
+        let distance = distance2.sqrt();
+        let d = to / distance;
         let (f_eye, pdf_eye) = vertex.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
         let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
         if !self.finds(technique, f_eye) {
@@ -185,7 +186,8 @@ impl<R: Record> EyeWalk<'_, R> {
         // Every pair of vertices has its own decisions at cut-outs.
         let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
         let token = told(eye.scene, bits as u32, false);
-        let way = vertex.shadow_ray_to(eye.scene, d, Some(light.spawn(-d)), token, light.in_medium(), light.touching());
+        let end = Some(light.shadow_end(-d, distance));
+        let way = vertex.shadow_ray_to(eye.scene, d, end, token, light.in_medium(), light.touching());
         if !is_lit(way.left) {
             return;
         }

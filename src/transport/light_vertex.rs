@@ -57,11 +57,11 @@ impl LightVertex<'_> {
         matches!(self.scatterer, Scatterer::Medium(..))
     }
 
-    /// Where a shadow ray that comes against `w` ends.
+    /// Where a shadow ray of length `distance` ends that comes against `w`.
     #[inline]
-    pub fn spawn(&self, w: Vec3) -> Vec3 {
+    pub fn shadow_end(&self, w: Vec3, distance: f32) -> Vec3 {
         match &self.scatterer {
-            Scatterer::Surface(surface, _) => surface.spawn(w),
+            Scatterer::Surface(surface, _) => surface.shadow_end(w, distance),
             Scatterer::Medium(p, _) => *p,
         }
     }

@@ -27,5 +27,6 @@ mod narrow_spots;
 mod nesting;
 mod photon_mapping;
 mod progressive;
+mod shadow_rays;
 mod stability;
 mod stopping;
