@@ -1,6 +1,10 @@
 """What the add-on says: faults with their remedy, warnings, and the diagnosis. Needs bpy."""
 
 import os
+import re
+import shlex
+import sys
+import tempfile
 import unittest
 from unittest import mock
 
@@ -69,6 +73,70 @@ class Tells(Installed):
         self.assertIn('--layers: no layer "Nope" Remedy: there are beauty,', told)
         self.settings.arguments = "--seed 'open"
         self.assertIn("close every quotation mark", self.fault())
+
+    def test_arguments_of_a_file_name_no_files(self):
+        """A .blend may come from anybody: its arguments choose the picture and touch no other file."""
+        additional, fault = part_of_addon("command").additional, part_of_addon("fault").Fault
+        for text in ("--checkpoint /tmp/x", "--checkpoint=x", "-o x", "-ox", "--output x", "--png x", "--preview x",
+                     "--resume x", "--env x", "--allow-outside", "--model x", "--max-depth 8 --debug-techniques x",
+                     "--usd-layer x", "--overwrite", "--", "--che x", "---png x", "--crop -o x", "-"):
+            with self.subTest(text), self.assertRaisesRegex(fault, "a file may come from anybody"):
+                additional(text)
+        for text in ("--max-depth 8", "--effects -dispersion", "--effects=-dispersion", "--env-rotation -30", "--alpha .5",
+                     "--env-strength -.5", "--filter 'gaussian 2'", ""):
+            self.assertEqual(additional(text), shlex.split(text))
+        self.stage()
+        keep = self.dir / "keep.txt"
+        keep.write_text("keep")
+        self.settings.arguments = f"--checkpoint {keep}"
+        self.assertIn("name --checkpoint, and a file may come from anybody Remedy: take it out", self.fault())
+        self.assertEqual(keep.read_text(), "keep")
+
+    def test_arguments_that_stages_may_give_files_may_give(self):
+        text = (support.ROOT / "scripts" / "usd" / "render_settings.py").read_text()
+        listed = re.search(r"\nOPTIONS = \{(.*?)\}", text, re.DOTALL)[1]
+        named = {name.replace("_", "-") for name in re.findall(r'"(\w+)"', listed)}
+        self.assertEqual(named - part_of_addon("command").OPTIONS, set())
+
+    def test_scripts_run_where_the_preferences_allow_them(self):
+        """A driver in a view layer that is not shown never says that it was kept from running."""
+        hidden = bpy.data.collections.new("hidden")
+        self.scene.collection.children.link(hidden)
+        self.layer.name = "B"
+        shown = self.scene.view_layers.new("A")
+        shown.layer_collection.children["hidden"].exclude = True
+        body, ran = bpy.data.objects.new("driven", None), self.dir / "ran"
+        hidden.objects.link(body)
+        driver = body.driver_add("location", 0).driver
+        driver.type, driver.expression = "SCRIPTED", f'open("{ran}", "w").close() or 1.0'
+        self.scene.view_layers["B"].use = False
+        bpy.context.window.view_layer = shown
+        path = str(self.dir / "scene.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        ran.unlink(missing_ok=True)
+        handoff, preferences = part_of_addon("handoff"), bpy.context.preferences
+        filepaths = preferences.filepaths
+        bpy.ops.wm.open_mainfile(filepath=path, use_scripts=False)
+
+        def export():
+            folder = tempfile.mkdtemp(dir=self.dir)
+            job = handoff.Job(bpy.context.scene, "A", 1.0, folder, "")
+            job.copy()
+            job.run(lambda: False)
+            return ran.exists()
+
+        for allowed, word, expected in ((False, None, False), (True, None, True), (True, "-Y", False)):
+            filepaths.use_scripts_auto_execute = allowed
+            with self.subTest(allowed=allowed, word=word), mock.patch.object(sys, "argv", ["blender", word or "-b"]):
+                self.assertEqual(handoff.scripts_allowed(), expected)
+        excluded = preferences.autoexec_paths.new()
+        excluded.path = str(self.dir)
+        self.assertFalse(handoff.scripts_allowed())
+        preferences.autoexec_paths.remove(excluded)
+        filepaths.use_scripts_auto_execute = False
+        self.assertFalse(export())
+        filepaths.use_scripts_auto_execute = True
+        self.assertTrue(export())
 
     def test_pictures_that_cannot_be_read(self):
         self.stage()

@@ -1,9 +1,18 @@
 """The command line of the program for what a scene says."""
 
+import re
 import shlex
 
 from . import properties
 from .fault import Fault
+
+#: Options that a file's Arguments may give: those about the picture, and none that names a file, because a file may come
+#: from anybody.
+OPTIONS = frozenset("""
+    method photons levels eye-paths initial-bandwidth knn alpha cppm-grid cppm-k cppm-beta cppm-significance cppm-plus
+    radius-rule kernel guide indirect max-depth seed frame-seed time iterations target-error filter effects glass
+    env-rotation env-strength no-combine no-finish denoise layers exr-naming compression reproducible light-units strict
+""".split())
 
 
 def method(settings):
@@ -21,10 +30,22 @@ def method(settings):
         words.append("--no-combine")
     elif settings.finish != "auto":
         words += ["--denoise", settings.finish]
+    return words + additional(settings.arguments)
+
+
+def additional(text):
+    """The words of additional arguments."""
     try:
-        return words + shlex.split(settings.arguments)
+        words = shlex.split(text)
     except ValueError as error:
         raise Fault(f"the additional arguments cannot be read: {error}", "close every quotation mark") from error
+    for before, word in zip([""] + words, words):
+        # A value may begin with a dash where it is a number or a list of effects.
+        option = re.match(r"-+[^=]*", word) if before != "--effects" and not re.match(r"-\.?\d", word) else None
+        if option and option[0].removeprefix("--") not in OPTIONS:
+            raise Fault(f"the additional arguments name {option[0]}, and a file may come from anybody",
+                        "take it out: Arguments holds options about the picture, without files and permissions")
+    return words
 
 
 def size(width, height):

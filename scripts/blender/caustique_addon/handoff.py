@@ -5,6 +5,7 @@ thread of its own. So the scene is copied to a file, and a second Blender export
 the user's settings and starts in a second; this one stays responsive, and an export can be stopped.
 """
 
+import fnmatch
 import json
 import os
 import subprocess
@@ -19,6 +20,7 @@ from .fault import Cancelled, Fault
 GLB = "scene.glb"
 _HERE = os.path.dirname(os.path.abspath(__file__))
 _OLDEST = (4, 2, 0)  # the first Blender whose materials and glTF exporter hold what export.py reads
+_AUTOEXEC = {"-y": True, "--enable-autoexec": True, "-Y": False, "--disable-autoexec": False}
 _PAUSE = 0.02  # seconds between two looks at the other Blender
 
 
@@ -36,8 +38,7 @@ class Job:
         self._blend = os.path.join(folder, "scene.blend")
         self._job = {
             "blend": self._blend, "scene": scene.name, "view_layer": view_layer, "frame": frame,
-            # What may run here may run there; where something was kept from running, nothing may.
-            "scripts": not bpy.app.autoexec_fail,
+            "scripts": scripts_allowed(),
             "exporter": os.path.join(_HERE, "exporter"), "glb": os.path.join(folder, GLB),
             "report": os.path.join(folder, "report.json"),
         }
@@ -78,8 +79,10 @@ class Job:
         script = os.path.join(_HERE, "export_job.py")
         program = self._blender or bpy.app.binary_path
         if not program or os.path.basename(program).startswith("python"):  # Blender as a module of Python
-            return [program or sys.executable, script, job]
-        return [program, "-b", "--factory-startup", "-noaudio", "--python", script, "--", job]
+            # Isolated: modules in the current folder may be anybody's.
+            return [program or sys.executable, "-I", script, job]
+        scripts = "--enable-autoexec" if self._job["scripts"] else "--disable-autoexec"
+        return [program, "-b", "--factory-startup", scripts, "-noaudio", "--python", script, "--", job]
 
     def _report(self, log):
         try:
@@ -93,6 +96,27 @@ class Job:
             raise Fault(f"the scene could not be exported: {report['error']}",
                         "try File > Export > glTF 2.0, which shows what it stumbles over")
         return report["warnings"]
+
+
+def scripts_allowed():
+    """Whether Python in the file may run in the second Blender: where the user allows it for files in general, by the
+    preferences or Blender's command line, and has not kept this one from it."""
+    preferences = bpy.context.preferences
+    allowed = preferences.filepaths.use_scripts_auto_execute
+    for word in sys.argv[:sys.argv.index("--") if "--" in sys.argv else None]:
+        if word in _AUTOEXEC:
+            allowed = _AUTOEXEC[word]
+    # Blender sets this only once something was kept from running, which objects that are not shown never are.
+    return allowed and not bpy.app.autoexec_fail and not any(map(_lies_in, preferences.autoexec_paths))
+
+
+def _lies_in(excluded):
+    """Whether the file lies where the preferences forbid its scripts."""
+    if not excluded.path or not bpy.data.filepath:
+        return False
+    if excluded.use_glob:
+        return fnmatch.fnmatch(bpy.data.filepath, excluded.path)
+    return os.path.realpath(bpy.data.filepath).startswith(os.path.join(os.path.realpath(excluded.path), ""))
 
 
 def without_file(line):

@@ -60,8 +60,8 @@ class Settings(bpy.types.PropertyGroup):
     finish: bpy.props.EnumProperty(
         name="Finish", items=FINISHES, default="auto", description="What cleans the picture of noise at the end")
     arguments: bpy.props.StringProperty(
-        name="Arguments", description="More options of the command line, such as --max-depth 8; they come last, so "
-                                      "they hold against the settings above")
+        name="Arguments", description="More options of the command line about the picture, such as --max-depth 8; "
+                                      "they come last, so they hold against the settings above")
 
 
 for _name, (_label, _about) in EFFECTS.items():
