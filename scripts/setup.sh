@@ -16,6 +16,8 @@
 set -euo pipefail
 
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+# A program that is built into another folder finds what is installed here.
+export CAUSTIQUE_HOME=$ROOT
 
 # Everything that Blender's module links to and a minimal system lacks.
 BPY_LIBRARIES=(libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1)

@@ -7,6 +7,8 @@ pub mod error;
 
 pub mod processor;
 
+pub mod installed;
+
 pub mod memory;
 
 pub mod math;

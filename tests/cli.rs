@@ -12,6 +12,8 @@ mod converge;
 mod files;
 #[path = "cli/frames.rs"]
 mod frames;
+#[path = "cli/libraries.rs"]
+mod libraries;
 #[path = "cli/limits.rs"]
 mod limits;
 #[path = "cli/merge.rs"]
@@ -59,7 +61,6 @@ impl Folder {
     fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_caustique"));
         command.current_dir(&self.folder).args(arguments.split_whitespace());
-        // The folder is elsewhere: let the program find ONNX Runtime where it was installed for this one.
         command.env_remove("CAUSTIQUE_EMBREE");
         command
     }

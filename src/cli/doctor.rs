@@ -1,10 +1,12 @@
 //! `caustique doctor`: the libraries that are loaded when the program runs, and the Python that reads USD.
 
 use super::{print, print_json};
+use caustique::combine::Runtime;
 use caustique::error::{Error, Kind, Result};
+use caustique::finish::denoiser;
+use caustique::installed;
 use caustique::scene::usd::Interpreter;
 use caustique_embree as embree;
-use caustique_oidn as oidn;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -23,8 +25,11 @@ struct Finding {
     needed_for: &'static str,
     /// Scenes in glTF do without.
     optional: bool,
-    found: std::result::Result<(String, String), (String, Option<String>)>,
+    found: std::result::Result<Found, (String, Option<String>)>,
 }
+
+/// A library that is there: its version, its file, and where that comes from.
+struct Found(String, String, &'static str);
 
 /// Looks for the libraries and reports; an error if one is missing.
 pub fn run(args: &DoctorArgs) -> Result<()> {
@@ -54,30 +59,37 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
 
 fn embree() -> Finding {
     let found = match embree::Library::load() {
-        Ok(library) => Ok((library.version().to_string(), show(library.path()))),
+        Ok(library) => {
+            let origin = installed::origin(embree::LIBRARY_VARIABLE, ".deps/embree", library.path());
+            Ok(Found(library.version().to_string(), show(library.path()), origin))
+        }
         Err(error) => Err((error.to_string(), error.hint())),
     };
     Finding { name: "Embree", key: "embree", needed_for: "render", optional: false, found }
 }
 
 fn onnxruntime() -> Finding {
-    let found = match caustique::combine::Runtime::find() {
-        Ok(runtime) => Ok((runtime.version().unwrap_or("1.17 or later").to_string(), show(runtime.path()))),
+    let found = match Runtime::find() {
+        Ok(runtime) => {
+            let version = runtime.version().unwrap_or("1.17 or later").to_string();
+            Ok(Found(version, show(runtime.path()), runtime.origin()))
+        }
         Err(error) => Err((error.to_string(), error.hint)),
     };
     Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", optional: false, found }
 }
 
 fn oidn() -> Finding {
-    let found = match oidn::Library::load() {
-        Ok(library) => Ok((library.version().to_string(), show(library.path()))),
+    let found = match denoiser::library() {
+        Ok(library) => Ok(Found(library.version().to_string(), show(library.path()), denoiser::origin(&library))),
         Err(error) => Err((error.to_string(), error.hint())),
     };
     Finding { name: "Open Image Denoise", key: "oidn", needed_for: "denoise", optional: false, found }
 }
 
 fn usd() -> Finding {
-    let found = Interpreter::find().and_then(|python| Ok((python.version()?, show(python.path()))));
+    let found =
+        Interpreter::find().and_then(|python| Ok(Found(python.version()?, show(python.path()), python.origin())));
     let found = found.map_err(|error| (error.to_string(), error.hint));
     Finding { name: "USD", key: "usd", needed_for: "read .usd files", optional: true, found }
 }
@@ -89,14 +101,16 @@ fn show(path: &Path) -> String {
 impl Finding {
     fn json(&self) -> Value {
         match &self.found {
-            Ok((version, path)) => json!({"found": true, "version": version, "path": path}),
+            Ok(Found(version, path, origin)) => {
+                json!({"found": true, "version": version, "path": path, "from": origin})
+            }
             Err((cause, hint)) => json!({"found": false, "cause": cause, "hint": hint}),
         }
     }
 
     fn text(&self) -> String {
         match &self.found {
-            Ok((version, path)) => format!("{:<18} {version:<14} {path}\n", self.name),
+            Ok(Found(version, path, origin)) => format!("{:<18} {version:<14} {path} (from {origin})\n", self.name),
             Err((cause, hint)) => {
                 let hint = hint.as_ref().map(|h| format!("{:<18} {h}\n", "")).unwrap_or_default();
                 format!("{:<18} not usable, needed to {}: {cause}\n{hint}", self.name, self.needed_for)

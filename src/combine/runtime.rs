@@ -1,8 +1,8 @@
 //! Finding and loading ONNX Runtime, once per process.
 //!
 //! Candidates in order: the file that the environment variable `CAUSTIQUE_ONNXRUNTIME` names, and then no other; the
-//! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/` of the current
-//! directory or of a folder above the executable (where `scripts/setup.sh` puts it).
+//! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/`, where
+//! `scripts/setup.sh` puts it (see [`installed`]).
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
@@ -11,6 +11,7 @@ use std::sync::Mutex;
 use ort::environment::Environment;
 
 use crate::error::{Error, Kind, Result};
+use crate::installed;
 
 /// Environment variable that names the library's file.
 pub const VARIABLE: &str = "CAUSTIQUE_ONNXRUNTIME";
@@ -22,7 +23,7 @@ const NAME: &str = "libonnxruntime.so";
 /// is the oldest that `ort` takes here.
 const MINOR_VERSIONS: std::ops::RangeInclusive<u32> = 17..=49;
 
-/// Where `scripts/setup.sh` installs, below the project's folder.
+/// Where `scripts/setup.sh` installs, in the project's folder.
 const FOLDER: &str = ".deps/onnxruntime";
 
 const HINT: &str = "on Debian 13: apt-get install libonnxruntime1.21; on Debian 12: run scripts/setup.sh; \
@@ -48,13 +49,18 @@ impl Runtime {
         if let Some(runtime) = &*loaded {
             return Ok(runtime.clone());
         }
-        let runtime = load(&candidates(std::env::var_os(VARIABLE).map(PathBuf::from))?)?;
+        let runtime = load(&candidates(installed::set(VARIABLE))?)?;
         Ok(loaded.insert(runtime).clone())
     }
 
     /// File that the library was loaded from.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Where it comes from.
+    pub fn origin(&self) -> &'static str {
+        installed::origin(VARIABLE, FOLDER, &self.path)
     }
 
     /// Version as the file's name tells it, such as `1.21.1`; `None` when it does not (it is 1.17 or later).
@@ -70,7 +76,7 @@ impl Runtime {
 
 /// What to try, in order. A name without a folder is the system loader's to find.
 fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
-    if let Some(path) = named.filter(|path| !path.as_os_str().is_empty()) {
+    if let Some(path) = named {
         // Absolute, because `ort` would look beside the executable first.
         let absolute = std::path::absolute(&path).map_err(|cause| Error::io(&path, &cause))?;
         if !absolute.is_file() {
@@ -82,10 +88,8 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     let versioned = MINOR_VERSIONS.rev().map(|minor| format!("{NAME}.1.{minor}"));
     let mut all: Vec<PathBuf> =
         [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned).map(PathBuf::from).collect();
-    let executable = std::env::current_exe().ok();
-    let above = executable.iter().flat_map(|path| path.ancestors().skip(1)).map(Path::to_path_buf);
-    for folder in std::env::current_dir().ok().into_iter().chain(above) {
-        libraries(&folder.join(FOLDER), 3, &mut all);
+    for folder in installed::places(FOLDER) {
+        libraries(&folder, 3, &mut all);
     }
     Ok(all)
 }

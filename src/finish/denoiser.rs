@@ -5,6 +5,7 @@ use super::Estimate;
 use super::bound::spread;
 use super::statistical;
 use crate::error::{Error, Kind, Result};
+use crate::installed;
 use caustique_oidn as oidn;
 
 pub use oidn::Quality;
@@ -96,12 +97,28 @@ impl Denoiser {
     }
 }
 
+/// Where `scripts/setup.sh` puts Open Image Denoise, in the project's folder.
+const FOLDER: &str = ".deps/oidn";
+
+/// Open Image Denoise, as the system or `scripts/setup.sh` has installed it (see [`installed`]).
+///
+/// # Errors
+/// That of [`oidn::Library::load`].
+pub fn library() -> std::result::Result<oidn::Library, oidn::Error> {
+    oidn::Library::load(&installed::places(FOLDER))
+}
+
+/// Where that library comes from.
+pub fn origin(library: &oidn::Library) -> &'static str {
+    installed::origin(oidn::LIBRARY_VARIABLE, FOLDER, library.path())
+}
+
 fn oidn() -> Result<Denoiser> {
     let refuse = |error: oidn::Error| {
         let refusal = Error::new(Kind::Library, "Open Image Denoise", &error);
         error.hint().into_iter().fold(refusal, Error::hint)
     };
-    let library = oidn::Library::load().map_err(refuse)?;
+    let library = library().map_err(refuse)?;
     let device = oidn::Device::new(&library, rayon::current_num_threads()).map_err(refuse)?;
     let filter = device.filter().map_err(refuse)?;
     Ok(Denoiser::Oidn { filter, version: library.version().to_string() })

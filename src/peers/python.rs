@@ -2,14 +2,19 @@
 
 use super::Renderer;
 use crate::error::{Error, Kind, Result};
-use std::path::{Path, PathBuf};
+use crate::installed;
+use std::path::PathBuf;
 use std::process::Command;
 
 /// What to do where there is none.
 const HINT: &str = "run 'scripts/compare/setup.sh peers'";
 
+/// Environment variable that tells the drivers where more modules lie.
+const PACKAGES: &str = "CAUSTIQUE_PEERS_PACKAGES";
+
 /// Fails unless all modules that it is given can be found; imports none, which takes seconds.
-const PROBE: &str = "import importlib.util, sys\n\
+const PROBE: &str = "import importlib.util, os, sys\n\
+                     sys.path += filter(None, [os.environ.get('CAUSTIQUE_PEERS_PACKAGES')])\n\
                      missing = [name for name in sys.argv[1:] if importlib.util.find_spec(name) is None]\n\
                      sys.exit('no module ' + ', '.join(missing) if missing else 0)";
 
@@ -23,7 +28,7 @@ pub(super) struct Interpreter {
 
 impl Interpreter {
     /// The Python that a renderer's variable names, and then no other; else that of the environment which
-    /// `scripts/compare/setup.sh peers` makes, in the current directory or a folder above the executable.
+    /// `scripts/compare/setup.sh peers` makes (see [`installed`]).
     ///
     /// # Errors
     /// [`Kind::Library`]: there is none, it does not run, or it lacks the renderer.
@@ -33,14 +38,14 @@ impl Interpreter {
             Renderer::Luxcore => ("CAUSTIQUE_PEERS_PYTHON", ".venv-peers", "pyluxcore"),
             Renderer::Cycles => ("CAUSTIQUE_PEERS_BPY_PYTHON", ".venv-bpy", "bpy"),
         };
-        let packages = above(Path::new(".venv-peers/bpy")).filter(|_| renderer == Renderer::Cycles);
-        let path = match std::env::var_os(variable).filter(|path| !path.is_empty()).map(PathBuf::from) {
+        let packages = installed::find(".venv-peers/bpy").filter(|_| renderer == Renderer::Cycles);
+        let path = match installed::set(variable) {
             Some(path) if path.is_file() => path,
             Some(path) => {
                 let error = Error::new(Kind::Library, format!("{variable}={}", path.display()), "no such file");
                 return Err(error.hint(format!("name a Python that has {module}, or unset it and {HINT}")));
             }
-            None => above(&Path::new(environment).join("bin/python")).ok_or_else(|| {
+            None => installed::find(&format!("{environment}/bin/python")).ok_or_else(|| {
                 Error::new(Kind::Library, format!("--with: {environment}"), "there is no such environment")
                     .hint(format!("{HINT}, or set {variable} to a Python that has {module}"))
             })?,
@@ -50,12 +55,12 @@ impl Interpreter {
         Ok(found)
     }
 
-    /// A command that runs this Python.
+    /// A command that runs this Python, isolated (`-I`), because modules in the current folder may be anybody's.
     pub(super) fn command(&self) -> Command {
         let mut command = Command::new(&self.path);
-        command.arg("-B");
+        command.args(["-I", "-B"]);
         if let Some(packages) = &self.packages {
-            command.env("PYTHONPATH", packages);
+            command.env(PACKAGES, packages);
         }
         command
     }
@@ -70,12 +75,4 @@ impl Interpreter {
         let told = String::from_utf8_lossy(&output.stderr);
         Err(error(told.lines().last().unwrap_or("it does not run").trim().to_owned()))
     }
-}
-
-/// A file or folder below the current directory or a folder above the executable.
-fn above(relative: &Path) -> Option<PathBuf> {
-    let executable = std::env::current_exe().ok();
-    let above = executable.iter().flat_map(|path| path.ancestors().skip(1)).map(Path::to_path_buf);
-    let mut folders = std::env::current_dir().ok().into_iter().chain(above);
-    folders.find_map(|folder| Some(folder.join(relative)).filter(|path| path.exists()))
 }

@@ -8,15 +8,15 @@ use std::process::{Command, Stdio};
 /// A comparison with other renderers; the finishes of ours are of no interest.
 const SMALL: &str = "converge scene.glb --width 48 --height 36 --methods path --no-finish --reference reference.exr --progress none -o out";
 
-/// A folder with a reference, and the script in place of a Python: it is called `-B -c PROBE MODULES` or `-B DRIVER SCENE
-/// OUT --mode=.. ..`, and finds all modules.
+/// A folder with a reference, and the script in place of a Python: it is called `-I -B -c PROBE MODULES` or `-I -B DRIVER
+/// SCENE OUT --mode=.. ..`, and finds all modules.
 fn folder(script: &str) -> Folder {
     let folder = Folder::new();
     let size = "--width 48 --height 36 --no-combine --layers beauty";
     folder.run(&format!("render scene.glb -o reference.exr --method bdpt --iterations 64 --seed 9 {size}"));
     folder.run(&format!("render scene.glb -o same.exr --method bdpt --iterations 16 --seed 8 {size}"));
     folder.run(&format!("render scene.glb -o other.exr --method bdpt --iterations 16 --env 0.2,0.2,0.2 {size}"));
-    let script = format!("#!/bin/sh\n[ \"$2\" = -c ] && exit 0\n{script}\n");
+    let script = format!("#!/bin/sh\n[ \"$3\" = -c ] && exit 0\n{script}\n");
     std::fs::write(folder.path("python"), script).expect("it can be written");
     Command::new("chmod").arg("+x").arg(folder.path("python")).status().expect("chmod runs");
     folder
@@ -35,7 +35,7 @@ fn report(folder: &Folder) -> Value {
 
 const ANSWERS: &str = r#"
 case "$*" in
-*--mode=path\ *) cp same.exr "$4" ;;
+*--mode=path\ *) cp same.exr "$5" ;;
 *--mode=path_cache\ *) echo 'PEER {"cannot": ["spots", "fog"]}'; exit 0 ;;
 *) echo 'it is broken' >&2; exit 3 ;;
 esac

@@ -8,7 +8,7 @@
 //! use caustique_oidn::{Device, Input, Library};
 //!
 //! # fn main() -> Result<(), caustique_oidn::Error> {
-//! let library = Library::load()?;
+//! let library = Library::load(&[])?;
 //! let device = Device::new(&library, 2)?;
 //! let (width, height) = (64, 48);
 //! let (noisy, albedo) = (vec![[0.5; 3]; width * height], vec![[0.8; 3]; width * height]);

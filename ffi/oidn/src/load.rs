@@ -19,10 +19,7 @@ const NAMES: &[&str] = &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"];
 /// What all names of the library's file begin with. Those of its modules go on differently.
 const STEM: &str = "libOpenImageDenoise.so";
 
-/// Where `scripts/setup.sh` installs, below the project's folder.
-const FOLDER: &str = ".deps/oidn";
-
-/// Folders below [`FOLDER`] that are looked into.
+/// Levels of folders that are looked into below a folder that [`Library::load`] is given.
 const DEPTH: usize = 3;
 
 /// Open Image Denoise's version number.
@@ -61,14 +58,15 @@ impl Library {
     /// The library: found by the first call that finds it, the same for all later ones.
     ///
     /// Candidates in order: the file that [`LIBRARY_VARIABLE`] names, and then no other; the system's loader under
-    /// the library's usual names; any `libOpenImageDenoise.so*` below `.deps/oidn/` of the current directory or of a
-    /// folder above the executable (where `scripts/setup.sh` puts it).
+    /// the library's usual names; any `libOpenImageDenoise.so*` below one of `folders`.
+    ///
+    /// Loading runs the file's initialisers: give it no folder that is not trusted.
     ///
     /// # Errors
     ///
     /// [`Error::NotFound`] with what was tried; [`Error::NoSuchFile`] when the variable names none;
     /// [`Error::Unusable`], as for [`Library::load_from`], when it names one that does not serve.
-    pub fn load() -> Result<Library, Error> {
+    pub fn load(folders: &[PathBuf]) -> Result<Library, Error> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(library) = &*loaded {
             return Ok(library.clone());
@@ -76,7 +74,7 @@ impl Library {
         let named = std::env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
         let library = match named {
             Some(path) => Library::named(&path),
-            None => Library::first_of(&candidates()),
+            None => Library::first_of(&candidates(folders)),
         }?;
         Ok(loaded.insert(library).clone())
     }
@@ -158,12 +156,10 @@ impl fmt::Debug for Library {
 }
 
 /// What to try when no file is named, in order. A name without a folder is the system loader's to find.
-fn candidates() -> Vec<PathBuf> {
+fn candidates(folders: &[PathBuf]) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
-    let executable = std::env::current_exe().ok();
-    let above = executable.iter().flat_map(|path| path.ancestors().skip(1)).map(Path::to_path_buf);
-    for folder in std::env::current_dir().ok().into_iter().chain(above) {
-        libraries(&folder.join(FOLDER), DEPTH, &mut all);
+    for folder in folders {
+        libraries(folder, DEPTH, &mut all);
     }
     all
 }

@@ -1,15 +1,22 @@
 //! The binding against whichever Open Image Denoise `CAUSTIQUE_OIDN` names, or the one that is found.
 
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use caustique_oidn::{Device, Error, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
 
 const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::High];
 
+/// Where `scripts/setup.sh` puts the library.
+fn folders() -> [PathBuf; 1] {
+    [Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.deps/oidn")]
+}
+
 /// The library under test, opened once.
 fn library() -> &'static Library {
     static LIBRARY: OnceLock<Library> = OnceLock::new();
-    LIBRARY.get_or_init(|| Library::load().unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint())))
+    LIBRARY
+        .get_or_init(|| Library::load(&folders()).unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint())))
 }
 
 fn device(threads: usize) -> Device {
@@ -57,7 +64,7 @@ fn library_says_what_it_is_and_is_the_same_the_second_time() {
     let path = library.path();
     assert!(path.is_absolute() && path.is_file() && !path.is_symlink(), "{library:?}");
     assert!(path.file_name().unwrap().to_string_lossy().starts_with("libOpenImageDenoise.so"), "{library:?}");
-    let again = Library::load().unwrap();
+    let again = Library::load(&folders()).unwrap();
     assert_eq!((again.path(), again.version()), (path, library.version()));
 }
 

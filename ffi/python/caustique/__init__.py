@@ -94,9 +94,11 @@ def libraries(
 
     Arguments name files to take instead of what is found; the first use decides, so name them before it. They set the
     variables CAUSTIQUE_EMBREE, CAUSTIQUE_OIDN and CAUSTIQUE_ONNXRUNTIME of this process's environment. Without them
-    the system's loader is asked, then the folder .deps of the current folder is looked into.
+    the system's loader is asked, then the folder .deps is looked into: of the folder that CAUSTIQUE_HOME names, else
+    of those above this package. The current folder is not searched.
 
-    Returns a dict for each of 'embree', 'oidn' and 'onnxruntime': 'found' and 'version', 'path' or 'cause', 'hint'.
+    Returns a dict for each of 'embree', 'oidn' and 'onnxruntime': 'found', and 'version', 'path' and 'from' (the
+    variable, 'scripts/setup.sh' or 'system') or 'cause' and 'hint'.
     """
     named = {"embree": embree, "oidn": oidn, "onnxruntime": onnxruntime}
     for name, path in named.items():

@@ -1,12 +1,14 @@
 //! The libraries that are loaded when they are needed.
 
 use caustique::combine::Runtime;
+use caustique::finish::denoiser;
+use caustique::installed;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 
-/// Version and file of a library, or why it is not found and how to get it.
-type Finding = Result<(String, String), (String, Option<String>)>;
+/// Version and file of a library and where that comes from, or why it is not found and how to get it.
+type Finding = Result<(String, String, &'static str), (String, Option<String>)>;
 
 /// find_libraries() -> dict: Embree, Open Image Denoise and ONNX Runtime as they are found.
 #[pyfunction]
@@ -14,15 +16,21 @@ pub fn find_libraries(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let show = |path: &Path| path.display().to_string();
     let found = py.detach(|| {
         let embree: Finding = match caustique_embree::Library::load() {
-            Ok(library) => Ok((library.version().to_string(), show(library.path()))),
+            Ok(library) => {
+                let origin = installed::origin(caustique_embree::LIBRARY_VARIABLE, ".deps/embree", library.path());
+                Ok((library.version().to_string(), show(library.path()), origin))
+            }
             Err(error) => Err((error.to_string(), error.hint())),
         };
-        let oidn: Finding = match caustique_oidn::Library::load() {
-            Ok(library) => Ok((library.version().to_string(), show(library.path()))),
+        let oidn: Finding = match denoiser::library() {
+            Ok(library) => Ok((library.version().to_string(), show(library.path()), denoiser::origin(&library))),
             Err(error) => Err((error.to_string(), error.hint())),
         };
         let onnxruntime: Finding = match Runtime::find() {
-            Ok(runtime) => Ok((runtime.version().unwrap_or("1.17 or later").to_string(), show(runtime.path()))),
+            Ok(runtime) => {
+                let version = runtime.version().unwrap_or("1.17 or later").to_string();
+                Ok((version, show(runtime.path()), runtime.origin()))
+            }
             Err(error) => Err((error.to_string(), error.hint)),
         };
         [("embree", embree), ("oidn", oidn), ("onnxruntime", onnxruntime)]
@@ -32,9 +40,10 @@ pub fn find_libraries(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         let one = PyDict::new(py);
         one.set_item("found", finding.is_ok())?;
         match finding {
-            Ok((version, path)) => {
+            Ok((version, path, origin)) => {
                 one.set_item("version", version)?;
                 one.set_item("path", path)?;
+                one.set_item("from", origin)?;
             }
             Err((cause, hint)) => {
                 one.set_item("cause", cause)?;

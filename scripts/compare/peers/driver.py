@@ -18,12 +18,13 @@ sampling, no denoiser, linear colours.
 
 import argparse
 import json
+import os
 import sys
 import time
 from pathlib import Path
 
-# Last, because a file there has the name of Mitsuba's module.
-sys.path.append(str(Path(__file__).resolve().parents[1]))
+# Last, because a file there has the name of Mitsuba's module. The program names packages for a Python that lacks some.
+sys.path += [str(Path(__file__).resolve().parents[1]), *filter(None, [os.environ.get("CAUSTIQUE_PEERS_PACKAGES")])]
 
 #: The longest path, in segments, where a renderer needs a limit; caustique has none.
 DEPTH = 32

@@ -12,11 +12,13 @@ LuxCore's ways that this file minds, each measured against a closed form or agai
 """
 
 import os
+import sys
 import tempfile
 import time
 
 import numpy as np
 
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))  # which Python, run with -I, leaves out
 # LuxCore brings an allocator of its own: what loads after it has two.
 import driver
 import pictures

@@ -4,9 +4,13 @@ Its rough surfaces get what they lack of ours (lobes.py), so that materials mean
 there is an LLVM that it takes, thrice as fast as the scalar one.
 """
 
+import os
+import sys
+
 import mitsuba as mi
 import numpy as np
 
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))  # which Python, run with -I, leaves out
 import driver
 import pictures
 

@@ -223,7 +223,7 @@ fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let embree = caustique_embree::Library::load().ok().map(|library| library.version().to_string());
     let finished = entries.iter().any(|entry| entry.finish.is_some());
-    let denoiser = if finished { caustique_oidn::Library::load().ok() } else { None };
+    let denoiser = if finished { caustique::finish::denoiser::library().ok() } else { None };
     let known = [
         ("processor", model.map(|(_, name)| name.trim().to_string())),
         ("threads", Some(threads.to_string())),

@@ -1,13 +1,14 @@
 //! Finding a Python that has `usd-core`.
 
 use crate::error::{Error, Kind, Result};
+use crate::installed;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Environment variable that names the Python.
 pub const VARIABLE: &str = "CAUSTIQUE_USD_PYTHON";
 
-/// Where `scripts/setup.sh` installs, below the project's folder.
+/// Where `scripts/setup.sh` installs, in the project's folder.
 const ENVIRONMENT: &str = ".venv-usd/bin/python";
 
 /// What to do where there is none.
@@ -26,24 +27,20 @@ pub struct Interpreter {
 }
 
 impl Interpreter {
-    /// The Python that `CAUSTIQUE_USD_PYTHON` names, and then no other; `.venv-usd` of the current directory or of a
-    /// folder above the executable (where `scripts/setup.sh usd` puts it); `python3`.
+    /// The Python that `CAUSTIQUE_USD_PYTHON` names, and then no other; that of `.venv-usd` where `scripts/setup.sh usd`
+    /// has installed it (see [`installed`]); `python3`.
     ///
     /// # Errors
     /// [`Kind::Library`] where the variable names no file.
     pub fn find() -> Result<Interpreter> {
-        if let Some(path) = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from) {
+        if let Some(path) = installed::set(VARIABLE) {
             return if path.is_file() {
                 Ok(Interpreter { path })
             } else {
                 Err(Error::new(Kind::Library, format!("{VARIABLE}={}", path.display()), "no such file").hint(HINT))
             };
         }
-        let executable = std::env::current_exe().ok();
-        let above = executable.iter().flat_map(|path| path.ancestors().skip(1)).map(Path::to_path_buf);
-        let mut folders = std::env::current_dir().ok().into_iter().chain(above);
-        let found = folders.find_map(|folder| Some(folder.join(ENVIRONMENT)).filter(|path| path.is_file()));
-        Ok(Interpreter { path: found.unwrap_or_else(|| "python3".into()) })
+        Ok(Interpreter { path: installed::find(ENVIRONMENT).unwrap_or_else(|| "python3".into()) })
     }
 
     /// The file, or the name that the system looks up.
@@ -51,9 +48,16 @@ impl Interpreter {
         &self.path
     }
 
-    /// A command that runs this Python.
+    /// Where it comes from.
+    pub fn origin(&self) -> &'static str {
+        installed::origin(VARIABLE, ENVIRONMENT, &self.path)
+    }
+
+    /// A command that runs this Python, isolated (`-I`), because modules in the current folder may be anybody's.
     pub(super) fn command(&self) -> Command {
-        Command::new(&self.path)
+        let mut command = Command::new(&self.path);
+        command.arg("-I");
+        command
     }
 
     /// The version of USD, once all that the converter needs is there.
