@@ -3,7 +3,6 @@
 import math
 
 import bpy
-from mathutils import Matrix
 
 from shading import constant, nodes_of, output_of, source
 
@@ -93,8 +92,7 @@ def hang(flat, warn):
 
 def _area_mesh(thing, flat):
     """A glowing mesh that is seen from its front alone, where an area lamp shines from."""
-    light = thing.data
-    place, turn, scale = thing.matrix_world.decompose()
+    light, scale = thing.data, thing.matrix_world.to_scale()
     size_x, size_y = _size(light)
     if light.shape in {"DISK", "ELLIPSE"}:
         turns = [-2 * math.pi * i / _DISC_SIDES for i in range(_DISC_SIDES)]
@@ -120,9 +118,8 @@ def _area_mesh(thing, flat):
     emission.inputs["Strength"].default_value = strength
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     mesh.materials.append(material)
-    # A mirroring scale would turn the front to the back.
-    flat.add(name, mesh, Matrix.LocRotScale(place, turn, [abs(s) for s in scale]), flat.hidden[thing.name],
-             flat.groups[thing.name])
+    # A front stays the front where the place mirrors, as the lamp shines along its own -Z there.
+    flat.add(name, mesh, thing.matrix_world.copy(), flat.hidden[thing.name], flat.groups[thing.name])
 
 
 def _warn_of(thing, where, warn):

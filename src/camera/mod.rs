@@ -21,7 +21,7 @@ pub enum Projection {
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     position: Vec3,
-    /// Local to world, orthonormal.
+    /// Local to world, orthonormal, with a mirroring where the camera's node mirrors.
     rotation: Mat3,
     projection: Projection,
     lens_radius: f32,

@@ -175,10 +175,11 @@ impl Scene {
     }
 }
 
-/// Orthonormal axes of a node's transform.
+/// Orthonormal axes of a node's transform; left-handed where that mirrors, so that +X stays to the right.
 fn rotation(to_world: &DAffine3) -> Mat3 {
     let back = to_world.matrix3.z_axis.normalize_or(DVec3::Z);
     let up = to_world.matrix3.y_axis;
     let right = up.cross(back).normalize_or(DVec3::X);
-    DMat3::from_cols(right, back.cross(right), back).as_mat3()
+    let hand = if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+    DMat3::from_cols(hand * right, back.cross(right), back).as_mat3()
 }

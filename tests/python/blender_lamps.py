@@ -51,6 +51,35 @@ class Lamps(beside.Beside):
         environment = document["scenes"][0]["extras"]["caustique"]["environment"]
         self.assertEqual(environment["light_group"], "Sky light")
 
+    def test_mirrored_lamps_and_cameras(self):
+        """By a parent, by their own scale, by the instance of a collection: lamps shine and cameras look as in Cycles."""
+        self.floor(4)
+        rig = shared.place("rig", None)
+        rig.scale = (-1, 1, 1)
+        tilted = (0.3, 0.2, 0.5)
+        for row, kind in enumerate(("AREA", "SPOT")):
+            for column, scale in enumerate(((1, 1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))):
+                body = lamp(kind, (2 * column - 3, 1.5 * row, 1), 30, **({"shape": "RECTANGLE", "size": 0.4, "size_y": 0.2} if kind == "AREA" else
+                                             {"spot_size": 1.0, "shadow_soft_size": 0.1, "use_soft_falloff": False}))
+                # What its own scale turns upwards is turned down again.
+                body.scale, body.rotation_euler = scale, (0.3 + (math.pi if scale[2] < 0 else 0), 0.2, 0.5)
+        parented = lamp("AREA", (1.0, -1.5, 1.5), 40, size=0.5)
+        parented.parent, parented.rotation_euler = rig, tilted
+        inside = bpy.data.collections.new("inside")
+        instanced = lamp("AREA", (2.5, -1.5, 1.5), 60, size=0.5)
+        instanced.rotation_euler = tilted
+        self.scene.collection.objects.unlink(instanced)
+        inside.objects.link(instanced)
+        copy = shared.place("copy", None)
+        copy.instance_type, copy.instance_collection, copy.scale = "COLLECTION", inside, (-1, 1, 1)
+        camera = eye((1, -6, 5), (0, 0, 0), lens=30)
+        plain = self.caustique(64, "--method", "path")
+        self.alike(plain, self.cycles(128), parts=4, tolerance=0.03)
+        camera.parent = rig
+        mirrored = self.caustique(64, "--method", "path")
+        self.alike(mirrored, self.cycles(128), parts=4, tolerance=0.03)
+        self.assertGreater(abs(mirrored - plain).mean(), 0.1 * plain.mean())
+
     def test_area_lamps_spread(self):
         self.floor()
         eye((0, -2.5, 2.5), (0, 0, 0), lens=35)
