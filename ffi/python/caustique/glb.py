@@ -11,6 +11,8 @@ import numpy as np
 from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, looking
 
 FLOAT, UINT = 5126, 5125
+#: 32 bits, whose largest number glTF keeps for itself.
+MOST_INDEX = 2**32 - 2
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 
 
@@ -95,6 +97,8 @@ class Writer:
         if kind == UINT:
             if not np.issubdtype(array.dtype, np.integer) or (array.size and int(array.min()) < 0):
                 raise ValueError(f"{place}: indices are whole numbers from 0 up")
+            if array.size and int(array.max()) > MOST_INDEX:
+                raise ValueError(f"{place}: index {array.max()} is past {MOST_INDEX}, the last that a scene can have")
             flat = np.ascontiguousarray(array, "<u4").reshape(-1)
             return self.add("accessors", {
                 "bufferView": self.view(flat.tobytes()), "componentType": UINT, "count": len(flat), "type": "SCALAR",

@@ -22,17 +22,53 @@ create_exception!(
 /// A fault as the exception that tells of it.
 pub fn raised(fault: Fault) -> PyErr {
     Python::attach(|py| {
+        let (hint, cause) = (fault.hint.as_deref().map(in_python), in_python(&fault.cause));
         // Python has no command line; the cause names the option.
-        let shown = if fault.place == "command line" { fault.cause.clone() } else { fault.to_string() };
-        let hint = fault.hint.as_ref().map(|hint| format!("\nhint: {hint}")).unwrap_or_default();
-        let error = Error::new_err(format!("{shown}{hint}"));
+        let place = if fault.place == "command line" { String::new() } else { in_python(&fault.place) };
+        let shown = Fault::new(fault.kind, &place, cause);
+        let advice = hint.as_ref().map(|hint| format!("\nhint: {hint}")).unwrap_or_default();
+        let error = Error::new_err(format!("{shown}{advice}"));
         let value = error.value(py);
         let told = value
-            .setattr("hint", &fault.hint)
-            .and_then(|()| value.setattr("place", &fault.place))
+            .setattr("hint", hint)
+            .and_then(|()| value.setattr("place", place))
             .and_then(|()| value.setattr("kind", name(fault.kind)));
         told.err().unwrap_or(error)
     })
+}
+
+/// Options of the command line whose arguments have other names in Python.
+const RENAMED: [(&str, &str); 7] = [
+    ("no-combine", "finish=False"),
+    ("no-finish", "finish=False"),
+    ("frames", "frame"),
+    ("env", "environment"),
+    ("env-rotation", "environment_rotation"),
+    ("env-strength", "environment_strength"),
+    ("png", "save"),
+];
+
+/// A message of the library with arguments in place of the command line's options: `max_depth` for `--max-depth`.
+pub fn in_python(text: &str) -> String {
+    let is_name = |c: char| c.is_ascii_lowercase() || c == '-';
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find("--") {
+        let (before, option) = (&rest[..at], &rest[at + 2..]);
+        let name = option.split(|c| !is_name(c)).next().unwrap_or("").trim_end_matches('-');
+        out.push_str(before);
+        // Names of files and nodes may hold dashes.
+        let stands_alone = !before.ends_with(|c: char| c.is_alphanumeric() || "-_/.".contains(c));
+        if stands_alone && name.starts_with(|c: char| c.is_ascii_lowercase()) {
+            let renamed = RENAMED.iter().find(|(from, _)| *from == name).map(|(_, to)| (*to).to_owned());
+            out.push_str(&renamed.unwrap_or_else(|| name.replace('-', "_")));
+            rest = &option[name.len()..];
+        } else {
+            out.push_str("--");
+            rest = option;
+        }
+    }
+    out + rest
 }
 
 /// An error of a call's arguments.
@@ -49,5 +85,24 @@ fn name(kind: Kind) -> &'static str {
         Kind::Library => "library",
         Kind::Model => "model",
         Kind::Interrupted => "interrupted",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_python;
+
+    #[test]
+    fn options_become_arguments() {
+        for (text, expected) in [
+            ("give fewer --photons, or --no-combine", "give fewer photons, or finish=False"),
+            ("--max-depth: 0 (--env-rotation decides)", "max_depth: 0 (environment_rotation decides)"),
+            ("use a smaller --width and --height.", "use a smaller width and height."),
+            ("render with '--compression none'", "render with 'compression none'"),
+            ("a--b.glb: /x/--seed, a -- b, --", "a--b.glb: /x/--seed, a -- b, --"),
+            ("", ""),
+        ] {
+            assert_eq!(in_python(text), expected);
+        }
     }
 }

@@ -8,11 +8,12 @@ use caustique::film::{Layer, LayerSet, Plane, Sample};
 use caustique::image::exr::{self, Attributes, Compression};
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
+use caustique::memory;
 use caustique::pipeline::Delivery;
 use caustique::pipeline::shard::Tail;
 use numpy::ndarray::{Array3, ArrayView2, Axis};
 use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyMemoryError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -97,6 +98,7 @@ impl Image {
     /// The picture itself: (H, W, 3) float32, scene-linear radiance. A copy.
     #[getter]
     fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        check_memory(self.set.pixels().saturating_mul(6))?;
         let pixels = self.set.beauty().map_err(raised)?;
         let values: Vec<f32> = pixels.into_iter().flatten().collect();
         Ok(shaped(Array3::from_shape_vec((self.set.height, self.set.width, 3), values))?.into_pyarray(py).into_any())
@@ -125,6 +127,7 @@ impl Image {
                 [plane] => view(this, plane),
                 planes => {
                     let size = (set.height, set.width, planes.len());
+                    check_memory(set.pixels().saturating_mul(planes.len()))?;
                     let mut stacked = Array3::zeros(size);
                     for (mut to, plane) in stacked.axis_iter_mut(Axis(2)).zip(planes) {
                         to.assign(&shaped(ArrayView2::from_shape((set.height, set.width), &plane.values))?);
@@ -211,8 +214,23 @@ fn view<'py>(this: &Bound<'py, Image>, plane: &Plane) -> PyResult<Bound<'py, PyA
     Ok(array.into_any())
 }
 
+/// Checks that there is memory for so many single precision numbers, which Rust would end the process without.
+///
+/// # Errors
+/// MemoryError.
+fn check_memory(count: usize) -> PyResult<()> {
+    let bytes = (count as u64).saturating_mul(4);
+    let checked = if bytes < memory::SMALL { Ok(()) } else { memory::check(bytes, "the arrays") };
+    checked.map_err(|error| PyMemoryError::new_err(error.to_string()))
+}
+
+/// Copies of an array that are there at a time: in single precision, in order of rows, by planes, as triples of pixels.
+const COPIES: usize = 4;
+
 /// A layer of a numpy array, and its height and width.
-fn layer(name: &str, array: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Layer)> {
+fn layer(name: &str, given: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Layer)> {
+    let array = given.py().import("numpy")?.call_method1("asarray", (given,))?;
+    check_memory(array.getattr("size")?.extract::<usize>()?.saturating_mul(COPIES))?;
     let array: PyArrayLikeDyn<'_, f32, AllowTypeChange> = array.extract()?;
     let array = array.as_array();
     let shape = array.shape().to_vec();

@@ -19,6 +19,7 @@ use caustique::render::{Rendered, Settings};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::{Scene as Built, gltf};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -55,7 +56,7 @@ impl Scene {
     )]
     fn new(py: Python<'_>, source: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
         let mut keywords = Keywords::of(py, "Scene", options);
-        let bytes = source.cast::<PyBytes>().ok().map(|bytes| bytes.as_bytes().to_vec());
+        let bytes = source.cast::<PyBytes>().ok().map(|bytes| PyBackedBytes::from(bytes.clone()));
         let path = match &bytes {
             Some(_) => PathBuf::from("scene.glb"),
             None => source.extract::<PathBuf>()?,

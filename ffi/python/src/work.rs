@@ -4,11 +4,12 @@
 //! which Python shows to its main thread alone, and calls back where the work asks for it, so that a callback runs in
 //! the thread that its author expects.
 
-use crate::error::{SceneWarning, raised};
+use crate::error::{SceneWarning, in_python, raised, usage};
 use caustique::error::{Error, Kind, Result};
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
 use std::ffi::CString;
+use std::num::NonZero;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
@@ -54,7 +55,7 @@ impl Caller<'_> {
 pub fn warn(py: Python<'_>, texts: &[String]) -> PyResult<()> {
     let category = py.get_type::<SceneWarning>();
     texts.iter().try_for_each(|text| {
-        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let text = CString::new(in_python(text).replace('\0', " ")).unwrap_or_default();
         PyErr::warn(py, &category, &text, 1)
     })
 }
@@ -77,12 +78,25 @@ impl<T> Done<T> {
     }
 }
 
+/// Threads that can be asked for on any machine; on large ones `THREADS_PER_CORE` for each core.
+const THREADS: usize = 64;
+const THREADS_PER_CORE: usize = 4;
+
 /// Does a job with so many threads; 0 takes all cores.
+///
+/// # Errors
+/// There are far fewer cores, or the system refuses.
 pub fn work<T: Send>(
     py: Python<'_>,
     threads: usize,
     job: impl FnOnce(&Caller<'_>) -> Result<T> + Send,
 ) -> PyResult<Done<T>> {
+    let cores = thread::available_parallelism().map_or(1, NonZero::get);
+    let most = THREADS.max(THREADS_PER_CORE * cores);
+    if threads > most {
+        let hint = format!("at most {most}, because there are {cores} cores; 0 takes all of them");
+        return Err(usage(format!("threads={threads} is out of range"), hint));
+    }
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()

@@ -293,7 +293,7 @@ class Divided(unittest.TestCase):
         state = self.folder / "state"
         self.scene.render(checkpoint=state, checkpoint_every=0.001, **self.ASKED | {"iterations": 2})
         self.assert_same(self.scene.render(resume=state, **self.ASKED))
-        with self.assertRaisesRegex(cq.Error, "another --seed"):
+        with self.assertRaisesRegex(cq.Error, "another seed"):
             self.scene.render(resume=state, **self.ASKED | {"seed": 4})
 
     def test_what_no_other_process_could_read(self):
@@ -355,12 +355,43 @@ class Faults(unittest.TestCase):
             ({"vertices": vertices[:, :2]}, r"mesh \"mesh\", vertices: an array of shape \(N, 3\)"),
             ({"triangles": triangles - 1}, "from 0 up"),
             ({"triangles": triangles * 1.0}, "whole numbers"),
+            ({"triangles": triangles + 2**32}, f"index {2**32 + 3} is past"),
             ({"transform": np.eye(3)}, r"\(4, 4\)"),
         ]:
             with self.subTest(text), self.assertRaisesRegex(ValueError, text):
                 cq.Scene.from_meshes([cq.Mesh(**{"vertices": vertices, "triangles": triangles} | arrays)])
         with self.assertRaises(cq.Error):
             cq.Scene.from_meshes([cq.Mesh(vertices=vertices * np.nan, triangles=triangles)])
+
+    def test_messages_name_arguments_not_options(self):
+        scene = ground([])
+        with tempfile.TemporaryDirectory() as folder:
+            for options in ({"width": 10**5}, {"crop": (0, 0, 99, 99)}, {"layers": "Nosy"}, {"method": "sppm", "knn": 0},
+                            {"resume": f"{folder}/no"}, {"shard": (0, 2), "method": "cppm"}):
+                with self.subTest(**options), self.assertRaises(cq.Error) as caught:
+                    cq.Scene(TORUS).render(**{"height": 8, "width": 8, "method": "path"} | options)
+                for text in (str(caught.exception), caught.exception.hint or "", caught.exception.place):
+                    self.assertNotRegex(text, r"(^|[ '(])--[a-z]")
+        with self.assertWarns(cq.SceneWarning) as caught:
+            pane = cq.Mesh(vertices=square()[0], triangles=square()[1], material=cq.Material(transmission=1.0))
+            scene = cq.Scene.from_meshes([pane])
+        self.assertNotIn(" --", " ".join(str(one.message) for one in caught.warnings))
+
+    def test_threads_have_a_bound(self):
+        scene = ground([])
+        for call in (lambda: scene.render(threads=65535), lambda: cq.Scene(TORUS, threads=10**9),
+                     lambda: scene.plan(threads=4096), lambda: cq.combine(scene.render(width=2), threads=65535)):
+            with self.assertRaisesRegex(cq.Error, "threads=.* is out of range\nhint: at most"):
+                call()
+
+    def test_arrays_beyond_memory_are_a_memory_error(self):
+        """Arrays that take none of it themselves."""
+        vast = np.broadcast_to(np.float32(1), (2**20, 2**20, 3))
+        for call in (lambda: cq.Image.from_arrays({"": vast}), lambda: cq.compare(vast, vast),
+                     lambda: cq.Scene(TORUS, environment=vast),
+                     lambda: cq.pack([cq.Mesh(vertices=np.broadcast_to(1.0, (2**40, 3)), triangles=square()[1])])):
+            with self.assertRaises(MemoryError):
+                call()
 
     def test_what_is_approximated_is_a_warning(self):
         vertices, triangles = square()
