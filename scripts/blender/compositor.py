@@ -1,6 +1,6 @@
 """Make a .blend whose compositor puts a rendered picture together from its parts, with a control for its caustics.
 
-    python3 scripts/blender/compositor.py PICTURE.exr OUT.blend             with bpy from PyPI
+    .venv-bpy/bin/python scripts/blender/compositor.py PICTURE.exr OUT.blend
     blender -b --python scripts/blender/compositor.py -- PICTURE.exr OUT.blend
     import compositor; compositor.build("PICTURE.exr")                      a scene in the file that is open
 
@@ -14,7 +14,11 @@ import os
 import struct
 import sys
 
-import bpy
+try:
+    import bpy
+except ModuleNotFoundError as error:
+    sys.exit(f"error: {error}\nhint: run this in Blender (blender -b --python compositor.py -- PICTURE.exr OUT.blend), or in "
+             "a Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
 
 PARTS = ("CombinedDirect", "CombinedIndirect", "CombinedEmission", "CombinedVolume")
 CAUSTIC = "CombinedCaustic"

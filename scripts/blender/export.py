@@ -1,6 +1,6 @@
 """Turn a .blend into a .glb that caustique renders as Cycles would see it.
 
-    python3 scripts/blender/export.py IN.blend OUT.glb              with bpy from PyPI (4.5 on Python 3.11, 5.2 on 3.13)
+    .venv-bpy/bin/python scripts/blender/export.py IN.blend OUT.glb
     blender -b IN.blend --python scripts/blender/export.py -- OUT.glb
     ... OUT.####.glb --frames 1-24                                  a file for each frame
     import export; export.write("OUT.glb")                          the scene that is open in bpy
@@ -27,7 +27,11 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-import bpy  # noqa: E402, first: it brings numpy
+try:
+    import bpy  # noqa: E402, first: it brings numpy
+except ModuleNotFoundError as error:
+    sys.exit(f"error: {error}\nhint: run this in Blender (blender -b IN.blend --python export.py -- OUT.glb), or in a Python "
+             "that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
 
 import numpy  # noqa: E402
 

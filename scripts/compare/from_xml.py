@@ -34,13 +34,33 @@ INDICES = {
 }
 
 
+#: What Mitsuba, numpy and this file raise of an element whose values are others than its type has.
+FAULTS = (AttributeError, KeyError, OSError, RuntimeError, TypeError, ValueError)
+
+
 def convert(path, output):
     """Reads the XML at `path` and writes a .glb, with the environment beside it."""
     reader = Reader(path, output)
-    reader.read(ET.parse(path).getroot())
-    output.write_bytes(reader.pack())
+    reader.read(parse(path))
+    data = reader.pack()
+    if reader.sky is not None:
+        mi.Bitmap(reader.sky).write(str(sky_file(output)))
+    output.write_bytes(data)
     for loss in reader.losses:
         print(f"{path}: {loss}", file=sys.stderr)
+
+
+def parse(path):
+    """The root of an XML file."""
+    try:
+        return ET.parse(path).getroot()
+    except (ET.ParseError, UnicodeError, ValueError) as error:
+        raise Unsupported(f"{path.name}: it is no XML: {error}") from error
+
+
+def sky_file(output):
+    """The path of the environment's image beside a .glb."""
+    return output.with_suffix(".environment.exr")
 
 
 class Reader:
@@ -49,7 +69,7 @@ class Reader:
     def __init__(self, path, output):
         self.folder, self.output = path.parent, output
         self.meshes, self.lights, self.cameras, self.losses = [], [], [], []
-        self.named, self.defaults, self.said = {}, {}, {}
+        self.named, self.defaults, self.said, self.sky = {}, {}, {}, None
 
     def lose(self, text):
         """Names what is left out or approximated, once."""
@@ -58,25 +78,56 @@ class Reader:
 
     def read(self, root):
         """All elements of the scene."""
-        for element in root:
-            if element.tag == "default":
-                self.defaults[element.get("name")] = element.get("value")
-            elif element.get("id"):
+        elements = list(self.included(root, ()))
+        for element in elements:
+            if element.get("id"):
                 self.named[element.get("id")] = element
-        for element in root.iter():
-            for key, value in element.attrib.items():
-                for name in sorted(self.defaults, key=len, reverse=True):
-                    value = value.replace(f"${name}", self.defaults[name])
-                element.set(key, value)
         readers = {"shape": self.shape, "emitter": self.emitter, "sensor": self.sensor}
-        for element in root:
+        for element in elements:
             if element.tag in readers:
-                readers[element.tag](element)
-            elif element.tag not in ("default", "integrator", "bsdf", "texture"):
+                try:
+                    readers[element.tag](element)
+                except FAULTS as error:
+                    name = f'{element.tag} "{element.get("id") or element.get("name") or element.get("type")}"'
+                    raise Unsupported(f"{name} cannot be read: {' '.join(str(error).split())}") from error
+            elif element.tag not in ("integrator", "bsdf", "texture"):
                 self.lose(f"a {element.tag} ({element.get('type')}) is left out")
+
+    def included(self, root, within):
+        """The elements of a file and of those that it includes, with `default` values in place of their names."""
+        elements = [root] if root.tag != "scene" else [element for element in root if element.tag != "default"]
+        for default in root.findall("default"):
+            self.defaults.setdefault(default.get("name"), self.filled(default.get("value", "")))
+        for element in elements:
+            for part in element.iter():
+                for key, value in part.attrib.items():
+                    part.set(key, self.filled(value))
+                if part.tag == "include" and part is not element:
+                    raise Unsupported(f"an include within a {element.tag}: only those of whole elements are read")
+            if element.tag != "include":
+                yield element
+                continue
+            path = self.folder / element.get("filename", "")
+            if path in within:
+                raise Unsupported(f'include "{path.name}": the file includes itself')
+            if not path.is_file():
+                raise Unsupported(f'include "{element.get("filename")}": there is no such file')
+            yield from self.included(parse(path), (*within, path))
+
+    def filled(self, value):
+        """A value with those of `default` elements in place of their names."""
+        for name in sorted(self.defaults, key=len, reverse=True):
+            value = value.replace(f"${name}", self.defaults[name])
+        return value
 
     def pack(self):
         """The bytes of the file."""
+        lit = self.lights or "environment" in self.said or any(any(mesh.material.emission) for mesh in self.meshes)
+        for what, there, kinds in (("light", lit, "area, point, spot, directional, constant and envmap"),
+                                   ("camera", self.cameras, "perspective and thinlens")):
+            if not there:
+                lost = f" ({'; '.join(self.losses)})" if self.losses else ""
+                raise Unsupported(f"the scene has no {what}: read are {kinds}{lost}")
         extras = {**self.said, "losses": self.losses}
         return glb.pack(self.meshes, lights=self.lights, cameras=self.cameras, extras=extras)
 
@@ -105,8 +156,12 @@ class Reader:
     def index(self, element, name, usual):
         """An index of refraction, by number or name."""
         found = self.child(element, name)
-        text = usual if found is None else found.get("value")
-        return INDICES[text] if text in INDICES else float(text)
+        text = usual if found is None else found.get("value", "")
+        try:
+            return INDICES[text] if text in INDICES else float(text)
+        except ValueError:
+            known = ", ".join(INDICES)
+            raise Unsupported(f'{element.get("type")}: {name}="{text}" is neither a number nor of {known}') from None
 
     def colour(self, element, name, usual, place):
         """A colour; of a texture 1, with the texture: (colour, texture or None)."""
@@ -124,14 +179,21 @@ class Reader:
         except ValueError:
             raise Unsupported(f"{place}: {name} is a spectrum, which this does not read: {text[:40]}") from None
 
+    def file(self, element):
+        """The path of the file that an element names."""
+        found = self.child(element, "filename")
+        name = "" if found is None else found.get("value", "")
+        if not (self.folder / name).is_file():
+            raise Unsupported(f'{element.tag} ({element.get("type")}): filename="{name}": there is no such file')
+        return self.folder / name
+
     def texture(self, element, place):
         """A bitmap's bytes, (H, W, 3) in sRGB."""
         if element.get("type") != "bitmap":
             self.lose(f"{place}: a texture of type {element.get('type')} is taken as its mean, a half")
             return None
-        name = self.child(element, "filename").get("value")
         raw = self.child(element, "raw")
-        bitmap = mi.Bitmap(str(self.folder / name))
+        bitmap = mi.Bitmap(str(self.file(element)))
         if raw is not None and raw.get("value") == "true":
             bitmap.set_srgb_gamma(False)
         if self.child(element, "to_uv") is not None:
@@ -213,9 +275,8 @@ class Reader:
     def mesh(self, element, kind):
         """A shape that is a mesh to Mitsuba, in its own space."""
         described = {"type": kind}
-        filename = self.child(element, "filename")
-        if filename is not None:
-            described["filename"] = str(self.folder / filename.get("value"))
+        if kind in ("obj", "ply"):
+            described["filename"] = str(self.file(element))
         flat = self.child(element, "face_normals")
         flat = kind in ("cube", "rectangle") or flat is not None and flat.get("value") == "true"
         shape = mi.load_dict(described)
@@ -336,7 +397,7 @@ class Reader:
 
     def environment(self, element, matrix):
         """The image on our grid: Mitsuba's u is atan2(x, -z) / 2 pi, and its rows begin and end at the poles."""
-        source = mi.Bitmap(str(self.folder / self.child(element, "filename").get("value")))
+        source = mi.Bitmap(str(self.file(element)))
         texels = np.array(source.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
         height, width = texels.shape[:2]
         u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
@@ -351,9 +412,8 @@ class Reader:
         at = lambda i, j: texels[i, j % width]  # noqa: E731
         picture = (at(top, left) * (1 - s) + at(top, left + 1) * s) * (1 - t)
         picture += (at(below, left) * (1 - s) + at(below, left + 1) * s) * t
-        file = self.output.with_suffix(".environment.exr")
-        mi.Bitmap(picture.astype(np.float32)).write(str(file))
-        self.said["environment"] = {"file": file.name, "strength": self.number(element, "scale", 1.0)}
+        self.sky = picture.astype(np.float32)
+        self.said["environment"] = {"file": sky_file(self.output).name, "strength": self.number(element, "scale", 1.0)}
 
     def sensor(self, element):
         """A camera, and the size of its film."""
@@ -364,6 +424,8 @@ class Reader:
         film = self.child(element, "film", tag="film")
         width, height = (int(self.number(film, side, usual)) if film is not None else usual
                          for side, usual in (("width", 768), ("height", 576)))
+        if min(width, height) < 1:
+            raise Unsupported(f"film: {width} x {height} pixels")
         self.said["resolution"] = [width, height]
         axis = self.child(element, "fov_axis")
         axis = "x" if axis is None else axis.get("value")

@@ -55,6 +55,15 @@ class Counts(unittest.TestCase):
         self.assertEqual(counts("Ran 0 tests in 0.0s\n\nNO TESTS RAN\n"), (0, 0, 0))
 
 
+class Blender(unittest.TestCase):
+    def test_without_bpy_the_remedy_is_told(self):
+        for name in ("compositor", "export"):
+            path = support.ROOT / "scripts" / "blender" / f"{name}.py"
+            done = subprocess.run([sys.executable, path, "a", "b"], capture_output=True, text=True, check=False)
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertRegex(done.stderr, r"^error: No module named 'bpy'\nhint: run this in Blender .*\n$")
+
+
 class Record(support.Scratch):
     def record(self, *args):
         return subprocess.run(

@@ -1,0 +1,113 @@
+"""Scenes of Mitsuba that are wrong or are only read in part: an error or a loss that is named, and no file that misses it."""
+
+import contextlib
+import io
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import mitsuba as mi
+
+mi.set_variant("scalar_rgb")
+ROOT = Path(__file__).resolve().parents[3]
+# Behind all else: a file in there has the name of Mitsuba's module.
+sys.path.append(str(ROOT / "scripts" / "compare"))
+import from_xml  # noqa: E402
+import gltf  # noqa: E402
+import to_xml  # noqa: E402
+
+CAMERA = '<sensor type="perspective"><float name="fov" value="45"/></sensor>'
+LIGHT = '<emitter type="point"><rgb name="intensity" value="1"/></emitter>'
+FLOOR = '<shape type="rectangle" id="floor"/>'
+
+
+class Reads(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.output = self.folder / "scene.glb"
+
+    def write(self, inside, name="scene.xml", version="3.0.0"):
+        path = self.folder / name
+        path.write_text(f'<scene version="{version}">{inside}</scene>')
+        return path
+
+    def document(self, xml):
+        with contextlib.redirect_stderr(io.StringIO()):
+            from_xml.convert(xml, self.output)
+        return gltf.chunks(self.output.read_bytes())[0]
+
+    def refusal(self, xml):
+        with self.assertRaises(gltf.Unsupported) as caught, contextlib.redirect_stderr(io.StringIO()):
+            from_xml.convert(xml, self.output)
+        self.assertEqual([path.suffix for path in self.folder.iterdir() if path.suffix != ".xml"], [])
+        return str(caught.exception)
+
+    def test_faults_name_the_element(self):
+        """No value of an element ends in a traceback."""
+        for wrong, told in [
+            ('<shape type="obj"/>', 'shape (obj): filename="": there is no such file'),
+            ('<shape type="ply"><string name="filename" value="no.ply"/></shape>', 'filename="no.ply": there is no'),
+            ('<emitter type="envmap"><string name="filename" value="no.exr"/></emitter>', "there is no such file"),
+            ('<emitter type="envmap"><string name="filename" value="scene.xml"/></emitter>', 'emitter "envmap" cannot be'),
+            ('<shape type="obj" id="body"><string name="filename" value="scene.xml"/></shape>', 'shape "body" cannot be'),
+            ('<shape type="sphere"><float name="radius" value="wide"/></shape>', "radius is no number"),
+            ('<shape type="sphere"><point name="center" x="a"/></shape>', 'shape "sphere" cannot be read'),
+            ('<shape type="cube"><transform name="to_world"><rotate y="1"/></transform></shape>', 'shape "cube" cannot'),
+            ('<shape type="cube"><transform name="to_world"><matrix value="1 2 3"/></transform></shape>', "cannot be read"),
+            ('<shape type="cube"><transform name="to_world"><scale value="x"/></transform></shape>', "cannot be read"),
+            ('<shape type="cube"><bsdf type="dielectric"><string name="int_ior" value="jelly"/></bsdf></shape>',
+             'dielectric: int_ior="jelly" is neither a number nor of vacuum'),
+            ('<shape type="cube"><bsdf type="conductor"><string name="material" value="Xx"/></bsdf></shape>', "cannot be"),
+            ('<shape type="cube"><ref id="nothing"/></shape>', 'nothing has the id "nothing"'),
+            ('<emitter type="point"><rgb name="intensity" value="1 2"/></emitter>', "intensity is a spectrum"),
+            ('<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="0"/></film></sensor>', "0 x 576"),
+        ]:
+            with self.subTest(wrong):
+                self.assertIn(told, self.refusal(self.write(CAMERA + LIGHT + FLOOR + wrong)))
+
+    def test_files_that_are_no_xml(self):
+        path = self.folder / "scene.xml"
+        for data in (b"", b"<scene>", b"\xff\xfe\x00", b"glTF" + bytes(20)):
+            path.write_bytes(data)
+            self.assertIn("scene.xml: it is no XML", self.refusal(path))
+
+    def test_included_files_are_read(self):
+        """Elements, materials that references name, and the values of `default`, which the outer file decides."""
+        self.write('<default name="power" value="7"/><default name="wide" value="9"/>'
+                   '<emitter type="point"><rgb name="intensity" value="$power"/></emitter>'
+                   '<bsdf type="diffuse" id="red"><rgb name="reflectance" value="1 0 0"/></bsdf>', "light.xml")
+        (self.folder / "floor.xml").write_text('<shape type="rectangle"><ref id="red"/></shape>')
+        outer = '<default name="power" value="3"/><default name="part" value="floor"/>'
+        found = self.document(self.write(outer + CAMERA + '<include filename="light.xml"/><include filename="$part.xml"/>'))
+        self.assertEqual(found["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"], 3)
+        self.assertEqual(found["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"], [1, 0, 0, 1])
+
+    def test_includes_that_cannot_be_read(self):
+        for include, told in [
+            ('<include filename="no.xml"/>', 'include "no.xml": there is no such file'), ("<include/>", "no such file"),
+            ('<include filename="scene.xml"/>', "the file includes itself"),
+            ('<shape type="cube"><include filename="scene.xml"/></shape>', "an include within a shape"),
+        ]:
+            with self.subTest(include):
+                self.assertIn(told, self.refusal(self.write(CAMERA + LIGHT + FLOOR + include)))
+
+    def test_a_scene_without_light_or_camera_is_refused(self):
+        self.assertIn("the scene has no light: read are area,", self.refusal(self.write(CAMERA + FLOOR)))
+        projector = '<emitter type="projector"/>'
+        self.assertIn("an emitter of type projector is left out", self.refusal(self.write(CAMERA + FLOOR + projector)))
+        self.assertIn("the scene has no camera: read are", self.refusal(self.write(LIGHT + FLOOR)))
+        glow = '<shape type="disk"><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>'
+        self.document(self.write(CAMERA + glow))
+
+    def test_the_documented_command_is_not_refused(self):
+        text = (ROOT / "docs" / "researchers.md").read_text()
+        scene = text.split("mitsuba.py export ")[1].split()[0]
+        to_xml.write(ROOT / scene, self.folder / "out.xml", gltf.refuse)
+        self.assertTrue((self.folder / "out.xml").stat().st_size)
+
+
+if __name__ == "__main__":
+    unittest.main()
