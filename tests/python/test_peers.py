@@ -97,6 +97,15 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
                     moved = np.square(np.roll(picture, 1, 0) - truth)[2:].mean()
                     self.assertGreater(moved, 2 * np.square(picture - truth)[2:].mean())
 
+        def test_a_caustic_cache_that_takes_all_of_the_budget_is_followed_by_a_pass(self):
+            scene = support.ROOT / "scenes" / "blocks.glb"
+            means = []
+            for mode, budget in (("path_cache", 0.01), ("path", 2.0)):
+                said = drive("luxcore", scene, self.dir / "picture.exr", mode, budget)
+                self.assertGreaterEqual(said["passes"], 1)
+                means.append(pictures.read(self.dir / "picture.exr").mean())
+            self.assertAlmostEqual(means[0] / means[1], 1, delta=0.3)
+
         def test_what_a_renderer_cannot_say_is_its_answer(self):
             target = self.dir / "picture.exr"
             for name, scene, why in [

@@ -186,10 +186,12 @@ def main():
         watch = driver.Stopwatch(options)
         session = lux.RenderSession(lux.RenderConfig(properties(settings(scene, options)), built))
         session.Start()
-        while watch.left() > 0:
+        # Building the caustic cache is rendering, too, and may take all of the budget: one pass follows it at least.
+        samples = 0.0
+        while watch.left() > 0 or samples < 1:
             time.sleep(0.01)
-        session.UpdateStats()
-        samples = session.GetStats().Get("stats.renderengine.pass").GetFloat()
+            session.UpdateStats()
+            samples = session.GetStats().Get("stats.renderengine.pass").GetFloat()
         session.Stop()
         driver.done(watch, samples, lux.Version(), approximations(scene))
         picture = np.zeros(options.width * options.height * 3, np.float32)
