@@ -11,7 +11,7 @@ SCENE=${CAUSTIQUE_DEMO_SCENE:-scenes/pool.glb}
 setup render
 cd "$ROOT"
 
-cargo build --release --bin caustique
+cargo build --locked --release --bin caustique
 PROGRAM=${CARGO_TARGET_DIR:-target}/release/caustique
 
 # A minute or so on two cores; the time limit holds slower machines to two. Of an option given twice the last holds.

@@ -36,7 +36,7 @@ fi
 
 setup python
 cd "$ROOT"
-cargo build --release
+cargo build --locked --release
 CAUSTIQUE_BIN=$(realpath "${CARGO_TARGET_DIR:-target}/release/caustique")
 export CAUSTIQUE_BIN
 

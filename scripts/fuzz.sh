@@ -18,13 +18,13 @@ cache=${XDG_CACHE_HOME:-$HOME/.cache}/caustique-fuzz
 read -ra readers <<<"${READERS:-glb scene gltf png jpeg exr exr_environment hdr checkpoint shard model usd_options usd_fault}"
 
 rustup toolchain list | grep -q ^nightly || rustup toolchain install nightly --profile minimal
-cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz
+cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz
 # A file there is the session's priority: threads of a fuzzer are to wait for everything else.
 { echo 19 >/proc/self/autogroup; } 2>/dev/null || true
 renice -n 19 $$ >/dev/null
 
 say "building the program and the fuzz targets"
-cargo build --release
+cargo build --locked --release
 cargo +nightly fuzz build
 target=x86_64-unknown-linux-gnu
 TMPDIR=$(mktemp -d)

@@ -17,7 +17,7 @@ set -euo pipefail
 
 setup python
 if [ -z "${CAUSTIQUE_BIN:-}" ]; then
-    (cd "$ROOT" && cargo build --release --quiet)
+    (cd "$ROOT" && cargo build --locked --release --quiet)
     CAUSTIQUE_BIN=$(realpath -m "${CARGO_TARGET_DIR:-$ROOT/target}/release/caustique")
 fi
 for option in "$@"; do

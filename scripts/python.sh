@@ -16,7 +16,7 @@ cd "$ROOT"
 wheels=$(realpath -m "${CARGO_TARGET_DIR:-target}/wheels")
 rm -rf "$wheels"
 # In the main build's profile and folder, so that what `cargo build --workspace` has compiled is not compiled again.
-.venv-python/bin/maturin build --quiet --release --manifest-path ffi/python/Cargo.toml --compatibility linux \
+.venv-python/bin/maturin build --quiet --release --locked --manifest-path ffi/python/Cargo.toml --compatibility linux \
     --interpreter .venv-python/bin/python --out "$wheels"
 # install VENV OPTIONS... : the wheel into an environment
 install() { "$1/bin/python" -m pip install -q --disable-pip-version-check "${@:2}" "$wheels"/*.whl; }

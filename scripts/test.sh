@@ -77,14 +77,14 @@ if cargo fmt --version >/dev/null 2>&1; then
 else
     without 'cargo fmt' 'rustfmt is not installed: rustup component add rustfmt'
 fi
-part 'cargo build' cargo build --release --workspace
+part 'cargo build' cargo build --locked --release --workspace
 if cargo clippy --version >/dev/null 2>&1; then
-    CLIPPY_CONF_DIR="$ROOT/scripts" part 'cargo clippy' cargo clippy --release --workspace --all-targets -- -D warnings
+    CLIPPY_CONF_DIR="$ROOT/scripts" part 'cargo clippy' cargo clippy --locked --release --workspace --all-targets -- -D warnings
 else
     without 'cargo clippy' 'clippy is not installed: rustup component add clippy'
 fi
-RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --release --workspace --no-deps
-tests 'cargo test' cargo test --release --workspace --no-fail-fast
+RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --locked --release --workspace --no-deps
+tests 'cargo test' cargo test --locked --release --workspace --no-fail-fast
 tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
 # HARD_CASES narrows them, for machines whose time is short: HARD_CASES='--methods vcm'.
 # shellcheck disable=SC2086

@@ -2,6 +2,6 @@
 # Rays against bare Embree, the photon map, EXR writing: ratios in one run.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-out=$(cargo bench --quiet --bench spine 2>/dev/null)
+out=$(cargo bench --locked --quiet --bench spine 2>/dev/null)
 printf '%s\n' "$out" | sed '$d'
 printf '%s\n' "$out" | tail -n 1 | python3 scripts/figures/_store.py spine

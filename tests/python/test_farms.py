@@ -145,7 +145,8 @@ class Slurm(support.Scratch):
 
 
 class OpenJobDescription(support.Scratch):
-    def test_the_template_runs_and_its_progress_is_understood(self):
+    def start(self, **given):
+        """The job of a small picture with these parameters, and a session that takes down its progress in `seen`."""
         from openjd.model import create_job, decode_job_template, document_string_to_object, DocumentType
         from openjd.model import preprocess_job_parameters
         from openjd.sessions import Session
@@ -153,26 +154,41 @@ class OpenJobDescription(support.Scratch):
         text = (FARM / "template.yaml").read_text(encoding="utf-8")
         document = document_string_to_object(document=text, document_type=DocumentType.YAML)
         template = decode_job_template(template=document)
-        out = self.dir / "it's a.exr"
-        given = {"Scene": str(support.scene("blocks")), "Output": str(out), "Shards": "2", "Options": "--iterations 8 --width 24"}
-        given |= {"Caustique": str(support.binary())}
+        self.out, self.seen = self.dir / "it's a.exr", []
+        given = {"Scene": str(support.scene("blocks")), "Output": str(self.out), "Caustique": str(support.binary()), **given}
         values = preprocess_job_parameters(
             job_template=template, job_parameter_values=given, job_template_dir=FARM, current_working_dir=self.dir
         )
-        job = create_job(job_template=template, job_parameter_values=values)
-        seen = []
-        with Session(
-            session_id="test", job_parameter_values=values, callback=lambda _, status: seen.append((status.progress, status.status_message))
-        ) as session:
-            for step, tasks in zip(job.steps, ((1, 2), (None,))):
-                for shard in tasks:
-                    self.run_task(session, step, shard)
-        self.assertTrue(out.exists())
-        self.assertEqual(sorted({progress for progress, _ in seen if progress is not None}), [25, 50, 75, 100])
-        self.assertTrue(any("iteration 2 of 4" in (message or "") for _, message in seen))
+        session = self.enterContext(Session(
+            session_id="test", job_parameter_values=values,
+            callback=lambda _, status: self.seen.append((status.progress, status.status_message))
+        ))
+        return create_job(job_template=template, job_parameter_values=values), session
 
-    def run_task(self, session, step, shard):
-        """Runs a task to its end, which has to be a good one."""
+    def test_the_template_runs_and_its_progress_is_understood(self):
+        job, session = self.start(Shards="2", Options="--iterations 8 --width 24")
+        for step, tasks in zip(job.steps, ((1, 2), (None,))):
+            for shard in tasks:
+                self.run_task(session, step, shard)
+        self.assertTrue(self.out.exists())
+        self.assertEqual(sorted({progress for progress, _ in self.seen if progress is not None}), [25, 50, 75, 100])
+        self.assertTrue(any("iteration 2 of 4" in (message or "") for _, message in self.seen))
+
+    def test_options_are_words_and_nothing_is_evaluated(self):
+        png = self.dir / "a \"b\" $HOME `id` *.png"
+        text = f"--iterations 2 --width 8 --png '{png}' --method path"
+        job, session = self.start(Options=text)
+        self.run_task(session, job.steps[0], 1)
+        self.assertTrue(png.exists())
+        trap = self.dir / "trap"
+        for wrong in (f"$(touch {trap})", f"`touch {trap}`", f"; touch {trap}", f"&& touch {trap}", f"a); touch {trap}; (b",
+                      "'never closed"):
+            job, session = self.start(Options=f"--iterations 2 --width 8 {wrong}", Output=str(self.dir / "other.exr"))
+            self.run_task(session, job.steps[0], 1, "FAILED")
+            self.assertFalse(trap.exists(), wrong)
+
+    def run_task(self, session, step, shard, end="SUCCESS"):
+        """Runs a task to its end, which has to be a good one unless another is named."""
         from openjd.model import ParameterValue, ParameterValueType
         from openjd.sessions import ActionState, SessionState
 
@@ -181,7 +197,7 @@ class OpenJobDescription(support.Scratch):
         session.run_task(step_script=step.script, task_parameter_values=of)
         while session.state == SessionState.RUNNING:
             time.sleep(0.01)
-        self.assertEqual(session.action_status.state, ActionState.SUCCESS)
+        self.assertEqual(session.action_status.state, ActionState[end])
 
 
 class Scale(unittest.TestCase):
