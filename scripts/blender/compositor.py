@@ -17,8 +17,8 @@ import sys
 try:
     import bpy
 except ModuleNotFoundError as error:
-    sys.exit(f"error: {error}\nhint: run this in Blender (blender -b --python compositor.py -- PICTURE.exr OUT.blend), or in "
-             "a Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
+    sys.exit(f"error: {error}\nhint: run this in Blender (blender -b --python compositor.py -- PICTURE.exr OUT.blend), or "
+             "in a Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
 
 PARTS = ("CombinedDirect", "CombinedIndirect", "CombinedEmission", "CombinedVolume")
 CAUSTIC = "CombinedCaustic"

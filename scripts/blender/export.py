@@ -30,8 +30,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 try:
     import bpy  # noqa: E402, first: it brings numpy
 except ModuleNotFoundError as error:
-    sys.exit(f"error: {error}\nhint: run this in Blender (blender -b IN.blend --python export.py -- OUT.glb), or in a Python "
-             "that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
+    sys.exit(f"error: {error}\nhint: run this in Blender (blender -b IN.blend --python export.py -- OUT.glb), or in a "
+             "Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
 
 import numpy  # noqa: E402
 
@@ -44,6 +44,9 @@ import shading  # noqa: E402
 import sky  # noqa: E402
 import surfaces  # noqa: E402
 import world  # noqa: E402
+
+# Scales that differ by less count as even.
+_EVEN = 1.001
 
 
 def write(path, scene=None, bake_size=bake.SIZE):
@@ -86,6 +89,7 @@ def write(path, scene=None, bake_size=bake.SIZE):
     document, buffer = glb.read(path)
     _finish_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
+    _warn_of_stretched_normals(document, warn)
     _finish_lamps(document)
     _active_camera_first(document, scene)
     said["losses"] = warnings
@@ -200,6 +204,17 @@ def _finish_lamps(document):
         light = bpy.data.lights.get(entry.get("name", ""))
         if light is not None:
             entry.update(lighting.punctual(light))
+
+
+def _warn_of_stretched_normals(document, warn):
+    """Names objects whose normal maps Cycles stretches with them: it reads a map in the object's own space."""
+    mapped = {i for i, material in enumerate(document.get("materials", [])) if "normalTexture" in material}
+    for node in document.get("nodes", []):
+        scale = [abs(s) for s in node.get("scale", (1, 1, 1))]
+        parts = document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ()
+        if max(scale) > _EVEN * min(scale) and any(part.get("material") in mapped for part in parts):
+            warn(f'object "{node["name"]}"', "its scale is uneven, with which Cycles stretches normal maps: here they "
+                 "keep their slopes; apply the scale (Object > Apply > Scale) to see the same in both")
 
 
 def _active_camera_first(document, scene):

@@ -112,6 +112,27 @@ class Export(unittest.TestCase):
         self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.25, 5)
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.9, 0.8, 0.7, 1), rtol=1e-5)
 
+    def test_normal_maps_on_uneven_scales_are_named(self):
+        """Cycles reads a normal map in the object's own space, and stretches it with the object."""
+        for mapped, scale, named in ((True, (1, 1, 0.2), True), (True, (-2, 2, 2), False), (False, (3, 1, 1), False)):
+            with self.subTest(mapped=mapped, scale=scale):
+                bpy.ops.wm.read_factory_settings(use_empty=True)
+                material = node_material("tile", "ShaderNodeBsdfPrincipled")
+                if mapped:
+                    image = bpy.data.images.new("bumps", 4, 4)
+                    image.generated_color, image.colorspace_settings.name = (0.75, 0.6, 0.9, 1), "Non-Color"
+                    image.pack()
+                    tree = material.node_tree
+                    picture, bend = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
+                    picture.image = image
+                    tree.links.new(picture.outputs["Color"], bend.inputs["Color"])
+                    tree.links.new(bend.outputs["Normal"], tree.nodes["Principled BSDF"].inputs["Normal"])
+                body = cube(material)
+                body.data.uv_layers.new()
+                body.scale = scale
+                _, warnings = self.write()
+                self.assertEqual(any('object "cube": its scale is uneven' in w for w in warnings), named, warnings)
+
     def test_principled_glass_tints_once(self):
         entry, _ = self.material(node_material("g", "ShaderNodeBsdfPrincipled", Base_Color=(0.81, 0.64, 0.25, 1), Transmission_Weight=1.0))
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.9, 0.8, 0.5, 1), rtol=1e-5)

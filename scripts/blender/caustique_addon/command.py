@@ -6,8 +6,8 @@ import shlex
 from . import properties
 from .fault import Fault
 
-#: Options that a file's Arguments may give: those about the picture, and none that names a file, because a file may come
-#: from anybody.
+#: Options that a file's Arguments may give: those about the picture, and none that names a file, because a .blend may
+#: come from anybody.
 OPTIONS = frozenset("""
     method photons levels eye-paths initial-bandwidth knn alpha cppm-grid cppm-k cppm-beta cppm-significance cppm-plus
     radius-rule kernel guide indirect max-depth seed frame-seed time iterations target-error filter effects glass
