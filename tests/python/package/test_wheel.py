@@ -25,6 +25,12 @@ class Alone(unittest.TestCase):
         names = {package["name"] for package in json.loads(told.stdout)}
         self.assertEqual(names - {"pip", "setuptools"}, {"caustique", "numpy"})
 
+    def test_it_holds_its_licences(self):
+        code = "import importlib.metadata as m; print(*(f.read_text() for f in m.files('caustique') if 'LICENSE' in f.name))"
+        told = subprocess.run([PYTHON, "-I", "-c", code], capture_output=True, text=True, check=True).stdout
+        for name in ("LICENSE-MIT", "LICENSE-APACHE"):
+            self.assertIn((ROOT / name).read_text(), told)
+
     def test_it_renders_far_from_its_sources(self):
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run([PYTHON, "-I", "-c", RENDER], cwd=folder, capture_output=True, text=True, check=False)
