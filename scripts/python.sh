@@ -19,11 +19,11 @@ rm -rf "$wheels"
 .venv-python/bin/maturin build --quiet --release --locked --manifest-path ffi/python/Cargo.toml --compatibility linux \
     --interpreter .venv-python/bin/python --out "$wheels"
 # install VENV OPTIONS... : the wheel into an environment
-install() { "$1/bin/python" -m pip install -q --disable-pip-version-check "${@:2}" "$wheels"/*.whl; }
+install() { "$1/bin/python" -I -m pip install -q --disable-pip-version-check "${@:2}" "$wheels"/*.whl; }
 
 install .venv-python --force-reinstall --no-deps
 # With what the wheel asks for, and nothing else. It is kept, for a fresh one takes 20 seconds; the wheel in it is not.
-[ -x .venv-wheel/bin/python ] || "$PYTHON" -m venv .venv-wheel
+[ -x .venv-wheel/bin/python ] || "$PYTHON" -I -m venv .venv-wheel
 install .venv-wheel
 install .venv-wheel --force-reinstall --no-deps
 printf '%s\n' "$wheels"/*.whl

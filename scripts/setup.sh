@@ -15,6 +15,7 @@
 
 set -euo pipefail
 
+# Every Python runs isolated (-I), because modules in the current folder may be anybody's.
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # A program that is built into another folder finds what is installed here.
 export CAUSTIQUE_HOME=$ROOT
@@ -112,7 +113,7 @@ need_linker() {
 }
 
 # loads LIBRARY: whether the dynamic loader takes it, by the same call that the program makes
-loads() { "$PYTHON" -c 'import ctypes, sys; ctypes.CDLL(sys.argv[1])' "$1" 2>/dev/null; }
+loads() { "$PYTHON" -I -c 'import ctypes, sys; ctypes.CDLL(sys.argv[1])' "$1" 2>/dev/null; }
 
 find_embree() {
     local library
@@ -142,10 +143,10 @@ need_embree() {
 
 # A pip that needs no packages of the system beyond python3-venv.
 need_venv_module() {
-    "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null && return
+    "$PYTHON" -I -c 'import ensurepip, venv' 2>/dev/null && return
     [ -z "${CAUSTIQUE_PYTHON:-}" ] || fail "$PYTHON has no venv module" "install it, or unset CAUSTIQUE_PYTHON"
     apt_install python3-venv
-    "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null ||
+    "$PYTHON" -I -c 'import ensurepip, venv' 2>/dev/null ||
         fail "$(command -v "$PYTHON") has no venv module" "set CAUSTIQUE_PYTHON=/usr/bin/python3"
 }
 
@@ -155,8 +156,8 @@ find_library() { "$PYTHON" "$ROOT/scripts/setup_library.py" "$1"; }
 # fetch_library NAME TEMPORARY. The libraries inside the wheels do not depend on the Python; naming one takes a wheel
 # whatever the Python here.
 fetch_library() {
-    "$PYTHON" -m venv "$2/venv" &&
-        "$2/venv/bin/python" -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
+    "$PYTHON" -I -m venv "$2/venv" &&
+        "$2/venv/bin/python" -I -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
             --require-hashes --python-version 3.11 -d "$2" -r "$ROOT/scripts/requirements-$1.txt" >&2 &&
         "$PYTHON" "$ROOT/scripts/setup_library.py" "$1" unpack "$2"/*.whl >/dev/null
 }
@@ -207,17 +208,17 @@ need_oidn() {
     fi
 }
 
-# need_venv DIRECTORY PYTHON REQUIREMENTS: a virtual environment with exactly these requirements
+# need_venv DIRECTORY PYTHON REQUIREMENTS: a virtual environment with exactly these requirements (scripts/lock.sh)
 need_venv() {
     local directory=$ROOT/$1 python=$2 requirements=$ROOT/scripts/$3 stamp
     stamp="$("$python" --version) $(sha256sum <"$requirements")"
-    if [ "$(cat "$directory/.complete" 2>/dev/null)" = "$stamp" ] && "$directory/bin/python" -c '' 2>/dev/null; then
+    if [ "$(cat "$directory/.complete" 2>/dev/null)" = "$stamp" ] && "$directory/bin/python" -I -c '' 2>/dev/null; then
         return
     fi
     say "making $1 from $3"
-    "$python" -m venv --clear "$directory" ||
+    "$python" -I -m venv --clear "$directory" ||
         fail "$python could not make the virtual environment $1" "check that the disk has room"
-    "$directory/bin/python" -m pip install -q --disable-pip-version-check -r "$requirements" >&2 ||
+    "$directory/bin/python" -I -m pip install -q --disable-pip-version-check --require-hashes -r "$requirements" >&2 ||
         fail "pip could not install what scripts/$3 lists" "check the network and the disk, then run this script again"
     printf '%s\n' "$stamp" >"$directory/.complete"
 }
@@ -226,7 +227,7 @@ need_venv() {
 find_bpy_python() {
     local python
     for python in "$PYTHON" python3.13 python3.11; do
-        if "$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)))' 2>/dev/null; then
+        if "$python" -I -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)))' 2>/dev/null; then
             BPY_PYTHON=$python
             return
         fi

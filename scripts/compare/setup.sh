@@ -43,14 +43,14 @@ need_llvm() {
 # Blender's module does not come with OpenEXR; its environment stays as scripts/setup.sh makes it.
 need_exr_for_bpy() {
     local directory=$ROOT/.venv-peers/bpy requirement stamp
-    requirement=$(sed -n '/^OpenEXR==/p' "$ROOT/scripts/requirements-peers.txt")
+    requirement=$(awk '/^[^ #]/ { wanted = /^openexr==/ } wanted' "$ROOT/scripts/requirements-peers.txt")
     stamp="$("$ROOT/.venv-bpy/bin/python" --version) $requirement"
     [ "$(cat "$directory/.complete" 2>/dev/null)" != "$stamp" ] || return 0
-    say "installing $requirement beside Blender's module"
+    say "installing OpenEXR beside Blender's module"
     rm -rf "$directory"
-    "$ROOT/.venv-bpy/bin/python" -m pip install -q --disable-pip-version-check --no-deps --target "$directory" \
-        "$requirement" >&2 ||
-        fail "pip could not install $requirement" "check the network and the disk, then run this script again"
+    "$ROOT/.venv-bpy/bin/python" -I -m pip install -q --disable-pip-version-check --no-deps --target "$directory" \
+        --require-hashes -r <(printf '%s\n' "$requirement") >&2 ||
+        fail "pip could not install OpenEXR" "check the network and the disk, then run this script again"
     printf '%s\n' "$stamp" >"$directory/.complete"
 }
 

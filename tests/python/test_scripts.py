@@ -64,6 +64,24 @@ class Blender(unittest.TestCase):
             self.assertRegex(done.stderr, r"^error: No module named 'bpy'\nhint: run this in Blender .*\n$")
 
 
+class Requirements(unittest.TestCase):
+    def test_all_are_pinned_by_hash(self):
+        """What a file asks for, and what that needs, is in the file that is installed (scripts/lock.sh)."""
+        folder = support.ROOT / "scripts"
+        installed = sorted([*folder.glob("requirements-*.txt"), folder / "train" / "requirements.txt"])
+        self.assertGreater(len(installed), 8)
+        for path in installed:
+            lines = path.read_text().replace("\\\n", "").splitlines()
+            pinned = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+            for line in pinned:
+                self.assertRegex(line, r"^[\w.-]+(\[\w]+\])?==\S+( ; .*?)? +--hash=sha256:[0-9a-f]{64}", path.name)
+            asked = path.with_suffix(".in")
+            for line in asked.read_text().splitlines() if asked.exists() else ():
+                pin = re.match(r"([\w.-]+==[\w.]+)", line)
+                if pin:
+                    self.assertTrue(any(one.lower().startswith(pin[1].lower()) for one in pinned), f"{path.name}: {line}")
+
+
 class Record(support.Scratch):
     def record(self, *args):
         return subprocess.run(
