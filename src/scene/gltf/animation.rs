@@ -10,7 +10,7 @@ use super::document::{Document, get, named};
 use super::extras::{self, SceneExtras};
 use super::pointer::{self, Nowhere};
 use super::{Frame, fault};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashMap;
@@ -43,12 +43,14 @@ struct Track {
     curve: Curve,
 }
 
-/// Puts a frame, or the beginning of its animations, into a document.
+/// Puts a frame, or the beginning of its animations, into a document. A picture that asks for no frame does without
+/// the animations that have a fault.
 ///
 /// # Errors
-/// Keys that cannot be, or what moves does not exist.
+/// A frame is asked for, and keys cannot be, or what moves does not exist.
 pub(super) fn pose(document: &mut Document, frame: Option<Frame>, warnings: &mut Vec<String>) -> Result<()> {
-    let tracks = tracks(document, warnings)?;
+    let faults = Faults { fatal: frame.is_some() };
+    let tracks = tracks(document, faults, warnings)?;
     let Some(start) = tracks.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
         if frame.is_some_and(|frame| !frame.of_sequence) {
             warnings.push("nothing in the scene is animated: its frames are all the same".into());
@@ -68,7 +70,7 @@ pub(super) fn pose(document: &mut Document, frame: Option<Frame>, warnings: &mut
             Ok(()) => {}
             Err(Nowhere::Missing) => {
                 let cause = format!("it moves {pointer}, which does not exist");
-                return Err(fault(place, cause).hint("the file is damaged: export it again"));
+                faults.meet(fault(place, cause).hint("the file is damaged: export it again"), warnings)?;
             }
             Err(Nowhere::Unread) => {
                 warnings.push(format!("{place}: it moves {pointer}, which is not read: it stays as it is"));
@@ -76,6 +78,23 @@ pub(super) fn pose(document: &mut Document, frame: Option<Frame>, warnings: &mut
         }
     }
     document.read_again()
+}
+
+/// What becomes of the faults of animations.
+#[derive(Clone, Copy)]
+struct Faults {
+    /// They are errors; otherwise warnings.
+    fatal: bool,
+}
+
+impl Faults {
+    fn meet(self, error: Error, warnings: &mut Vec<String>) -> Result<()> {
+        if self.fatal {
+            return Err(error);
+        }
+        warnings.push(format!("{error}; what it moves stays as it is (--frames would refuse the file)"));
+        Ok(())
+    }
 }
 
 /// Frames a second.
@@ -97,23 +116,38 @@ fn rate(document: &Document, frame: Frame, warnings: &mut Vec<String>) -> Result
 }
 
 /// All that moves, each once.
-fn tracks(document: &Document, warnings: &mut Vec<String>) -> Result<Vec<Track>> {
+fn tracks(document: &Document, faults: Faults, warnings: &mut Vec<String>) -> Result<Vec<Track>> {
     let list = document.raw["animations"].as_array().map_or(&[][..], Vec::as_slice);
     // By what it moves: the animation.
     let mut movers: HashMap<String, String> = HashMap::new();
     let mut tracks = Vec::new();
     for (i, raw) in list.iter().enumerate() {
-        let animation = Animation::deserialize(raw).map_err(|e| malformed(format!("animation {i}"), &e))?;
+        let animation = match Animation::deserialize(raw) {
+            Ok(animation) => animation,
+            Err(e) => {
+                faults.meet(malformed(format!("animation {i}"), &e), warnings)?;
+                continue;
+            }
+        };
         let name = named("animation", animation.name.as_deref(), i);
         for (k, channel) in animation.channels.iter().enumerate() {
             let place = format!("{name}, channel {k}");
-            let Some(pointer) = target(document, &channel.target).map_err(|e| e.within(&place))? else {
-                warnings.push(format!("{place}: it names nothing that moves, and is ignored"));
-                continue;
+            let pointer = match target(document, &channel.target) {
+                Ok(Some(pointer)) => pointer,
+                Ok(None) => {
+                    warnings.push(format!("{place}: it names nothing that moves, and is ignored"));
+                    continue;
+                }
+                Err(e) => {
+                    faults.meet(e.within(&place), warnings)?;
+                    continue;
+                }
             };
             match movers.get(&pointer) {
                 Some(first) if *first == name => {
-                    return Err(fault(place, format!("it moves {pointer}, as another of its channels does")));
+                    let error = fault(&place, format!("it moves {pointer}, as another of its channels does"));
+                    faults.meet(error, warnings)?;
+                    continue;
                 }
                 Some(first) => {
                     let both = format!("{first} and {name} move the same: {first} is played there");
@@ -122,8 +156,10 @@ fn tracks(document: &Document, warnings: &mut Vec<String>) -> Result<Vec<Track>>
                 }
                 None => movers.insert(pointer.clone(), name.clone()),
             };
-            let curve = curve(document, &animation.samplers, channel.sampler, &pointer);
-            tracks.push(Track { curve: curve.map_err(|e| e.within(&place))?, pointer, place });
+            match curve(document, &animation.samplers, channel.sampler, &pointer) {
+                Ok(curve) => tracks.push(Track { curve, pointer, place }),
+                Err(e) => faults.meet(e.within(&place), warnings)?,
+            }
         }
     }
     Ok(tracks)

@@ -42,8 +42,26 @@ pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
     if json.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
         return Err(fault("", "this is not a glTF file").hint("give a .glb or .gltf file"));
     }
-    let value = serde_json::from_slice(json).map_err(|e| fault("JSON", e).hint(DAMAGED))?;
+    let mut value = serde_json::from_slice(json).map_err(|e| fault("JSON", e).hint(DAMAGED))?;
+    unify_integers(&mut value);
     Ok((value, binary))
+}
+
+/// Makes whole numbers integers, however they are written: 4, 4.0 and 4e0 are the same (specification, section 2.7).
+fn unify_integers(value: &mut Value) {
+    match value {
+        Value::Array(list) => list.iter_mut().for_each(unify_integers),
+        Value::Object(object) => object.values_mut().for_each(unify_integers),
+        Value::Number(number) if number.is_f64() => {
+            // Above 2^53 a double does not tell one integer from the next; and -0.0 has a sign to keep.
+            let whole =
+                |x: &f64| x.fract() == 0.0 && x.abs() <= (1u64 << 53) as f64 && x.to_bits() != (-0.0f64).to_bits();
+            if let Some(x) = number.as_f64().filter(whole) {
+                *value = (x as i64).into();
+            }
+        }
+        _ => {}
+    }
 }
 
 /// A little-endian word.
@@ -125,6 +143,14 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
         warnings.push(format!("extension \"{name}\" is not supported: what it says is ignored"));
     }
     Ok(())
+}
+
+/// The fault of a part of the document whose data only a compression that is not read holds; `None` for other parts.
+pub(super) fn compressed(part: &Value) -> Option<Error> {
+    let names = part["extensions"].as_object()?.keys();
+    let name = names.into_iter().find(|name| name.ends_with("_compression"))?;
+    let cause = format!("all its data is compressed by extension \"{name}\", which is not supported");
+    Some(fault("", cause).hint(remedy(name)))
 }
 
 fn remedy(extension: &str) -> &'static str {

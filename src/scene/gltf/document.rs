@@ -34,10 +34,16 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Blender's exporter wrote it, perhaps with more from ours: lamps are in lumens, and the world is left out.
+    /// Blender's exporter wrote it, perhaps with more from ours: the world is left out.
     pub(super) fn is_by_blender(&self) -> bool {
-        let generator = self.raw["asset"]["generator"].as_str();
-        generator.is_some_and(|generator| generator.starts_with("Khronos glTF Blender I/O"))
+        self.blender_version().is_some()
+    }
+
+    /// First two numbers of the version of Blender's exporter, if it wrote the file; the newest if it does not say one.
+    pub(super) fn blender_version(&self) -> Option<[u32; 2]> {
+        let version = self.raw["asset"]["generator"].as_str()?.strip_prefix("Khronos glTF Blender I/O")?;
+        let mut numbers = version.trim_start().trim_start_matches('v').split('.').map(|n| n.parse().ok());
+        Some([numbers.next().flatten().unwrap_or(u32::MAX), numbers.next().flatten().unwrap_or(0)])
     }
 
     /// Parses a file and loads its buffers; other files are looked for in `folder`.
@@ -93,6 +99,9 @@ impl<'a> Document<'a> {
             };
             let (promised, there) = (buffer.byte_length.0, bytes.len());
             if promised > there as u64 {
+                if let Some(error) = container::compressed(&self.raw["buffers"][i]) {
+                    return Err(error.within(place));
+                }
                 return Err(fault(place, format!("{promised} bytes are promised, {there} are there"))
                     .hint("the file is damaged or incomplete: copy or export it again"));
             }
@@ -195,10 +204,30 @@ fn parts<T: DeserializeOwned>(raw: &Value, list: &str) -> Result<Vec<T>> {
     items.iter().enumerate().map(part).collect()
 }
 
+/// Keys whose numbers are 64-bit integers, or floats.
+const WIDE: [&str; 16] = [
+    "count",
+    "byteLength",
+    "byteOffset",
+    "min",
+    "max",
+    "matrix",
+    "rotation",
+    "scale",
+    "translation",
+    "weights",
+    "yfov",
+    "aspectRatio",
+    "znear",
+    "zfar",
+    "xmag",
+    "ymag",
+];
+
 /// A part without its extensions and extras, which the crate cannot parse in every place where they may stand; and
 /// without numbers that the crate would cut down to 32 bits.
 fn core(value: &Value, place: &str) -> Result<Value> {
-    let wide = |key: &str| matches!(key, "count" | "byteLength" | "byteOffset" | "min" | "max");
+    let wide = |key: &str| WIDE.contains(&key);
     Ok(match value {
         Value::Object(object) => {
             let mut kept = Map::new();

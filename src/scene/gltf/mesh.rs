@@ -2,10 +2,11 @@
 
 use super::deform::Deformation;
 use super::document::{Document, get, named};
-use super::{counted, fault, shading_frame};
+use super::{container, counted, fault, shading_frame};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3, Vec4};
+use gltf::json;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -29,7 +30,14 @@ pub(super) fn read(
     let place = format!("{name}, primitive {primitive}");
     let plain = parent.name.clone().filter(|n| !n.is_empty()).unwrap_or(name);
     let source = get(&parent.primitives, primitive, "primitive")?;
+    let raw = &document.part("meshes", index)["primitives"][primitive];
     let reader = Reader { document, source, place: &place };
+    // Without a buffer view its positions would all be zero.
+    let has_data = |a: &json::Accessor| a.buffer_view.is_some() || a.sparse.is_some();
+    let positions = reader.accessor(&Semantic::Positions).and_then(|index| document.accessors.get(index));
+    if let Some(error) = positions.filter(|a| !has_data(a)).and_then(|_| container::compressed(raw)) {
+        return Err(error.within(place));
+    }
     let mode = match source.mode {
         Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
         Checked::Valid(mode) => {
@@ -58,7 +66,6 @@ pub(super) fn read(
     let mut mesh = Mesh { name: plain, triangles: triangles(mode, &order), positions, ..Mesh::default() };
     drop(order);
     reader.attributes(&mut mesh, warnings)?;
-    let raw = &document.part("meshes", index)["primitives"][primitive];
     deformation.apply(document, source, raw, &mut mesh, &place, warnings)?;
     reader.check_positions(&mesh.positions)?;
     Ok(Some(mesh))
