@@ -6,6 +6,7 @@ use super::flip;
 use crate::error::{Error, Kind, Result};
 use crate::film::LayerSet;
 use crate::math::Rgb;
+use crate::memory;
 use crate::stat::{WORST, floor};
 
 /// The error of a picture A against a reference B of the same size, over all pixels that are finite in both.
@@ -168,8 +169,17 @@ pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Compari
         let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
         return Err(Error::new(Kind::Image, "", cause).hint("render both with the same --width and --height"));
     }
+    let bytes = (a.width as u64).saturating_mul(a.height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
+    if bytes >= memory::SMALL {
+        let needed = memory::check(bytes, format_args!("comparing {} x {} pixels", a.width, a.height));
+        needed.map_err(|e| e.hint("compare smaller pictures, or with more memory"))?;
+    }
     compare_values(&a.beauty()?, &b.beauty()?, (a.width, a.height), floor)
 }
+
+/// Bytes of a pixel while two pictures are compared, besides those of the files: two pictures, twice as vectors and at an
+/// exposure, and what the eye makes of them.
+const COMPARED_PIXEL_BYTES: u64 = 200;
 
 /// Compares `a` with the reference `b`, `width * height` scene-linear pixels each, see [`compare`].
 pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<Comparison> {

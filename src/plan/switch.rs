@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::material::{Alpha, Material, Materials};
 use crate::math::{Rgb, Vec4};
 use crate::scene::{Description, Scene};
-use crate::texture::{Texels, Texture, TextureRef};
+use crate::texture::{Integers, Texels, Texture, TextureRef};
 use std::sync::Arc;
 
 /// What called for effects that were left out.
@@ -101,14 +101,22 @@ fn flatten_all(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture>
 
 /// White with the texture's alpha.
 fn mask_of(texture: &Texture) -> Texture {
+    fn white<T: Copy>(data: &[T], channels: u8, most: T) -> Vec<T> {
+        // Grey and alpha, or RGBA; without alpha all is white.
+        let alpha = |texel: &[T]| if channels.is_multiple_of(2) { texel[texel.len() - 1] } else { most };
+        data.chunks_exact(usize::from(channels.max(1))).flat_map(|texel| [most, alpha(texel)]).collect()
+    }
     let texels = match &texture.texels {
-        Texels::Bytes { data, srgb } => {
-            let white = data.chunks_exact(4).flat_map(|texel| [255, 255, 255, texel[3]]).collect();
-            Texels::Bytes { data: white, srgb: *srgb }
+        Texels::Integers { data, channels, encoding } => {
+            let data = match &**data {
+                Integers::Bytes(data) => Integers::Bytes(white(data, *channels, u8::MAX)),
+                Integers::Words(data) => Integers::Words(white(data, *channels, u16::MAX)),
+            };
+            Texels::Integers { data: Arc::new(data), channels: 2, encoding: *encoding }
         }
         Texels::Floats(data) => Texels::Floats(data.iter().map(|texel| [1.0, 1.0, 1.0, texel[3]]).collect()),
     };
-    Texture { texels, ..texture.clone() }
+    Texture { name: texture.name.clone(), texels, ..*texture }
 }
 
 /// Multiplies the factors of a material by the means of their textures, which it then lacks; `keep_alpha`: the alpha

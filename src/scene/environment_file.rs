@@ -12,6 +12,8 @@ use std::path::Path;
 
 /// Most texels that an environment may have: 16384 x 8192, 1.5 GiB.
 const MOST_TEXELS: u64 = 1 << 27;
+/// Bytes of a texel, and of the distribution that samples it.
+const TEXEL_BYTES: u64 = 32;
 /// What a texel that is infinite is read as: the largest half float, beyond which files overflow.
 const BRIGHTEST: f32 = 65_504.0;
 
@@ -64,8 +66,7 @@ fn clamp(texels: &mut [[f32; 3]]) -> usize {
 
 fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
     match width.checked_mul(height) {
-        // As they are decoded and as they are kept.
-        Some(texels @ 1..=MOST_TEXELS) => memory::check(24 * texels, "its texels").map_err(|e| e.cause),
+        Some(texels @ 1..=MOST_TEXELS) => memory::check(TEXEL_BYTES * texels, "its texels").map_err(|e| e.cause),
         _ => Err(format!("{width} x {height} texels are none or too many")),
     }
 }
@@ -103,6 +104,7 @@ fn read_hdr(path: &Path) -> std::result::Result<Pixels, String> {
     let decoder = image::codecs::hdr::HdrDecoder::new(file).map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions();
     check_size(u64::from(width), u64::from(height))?;
-    let image = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?.into_rgb32f();
-    Ok((width, height, image.pixels().map(|p| p.0).collect()))
+    let mut texels = vec![[0.0f32; 3]; width as usize * height as usize];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut texels)).map_err(|e| e.to_string())?;
+    Ok((width, height, texels))
 }

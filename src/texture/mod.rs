@@ -1,6 +1,7 @@
 //! Image textures as glTF defines them.
 
 use crate::math::{DVec4, Vec2, Vec4};
+use std::sync::{Arc, LazyLock};
 
 /// How a coordinate outside `[0, 1)` is folded back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -14,18 +15,40 @@ pub enum Wrap {
     Clamp,
 }
 
-/// Texels of an image, decoded to 8 bits (sRGB or linear) or to floats.
+/// Texels of an image, top row first.
 #[derive(Clone, Debug)]
 pub enum Texels {
-    /// RGBA, 8 bits per channel; `srgb`: colour channels are sRGB-encoded.
-    Bytes {
-        /// `width * height * 4` bytes, top row first.
-        data: Vec<u8>,
-        /// Whether colour channels are sRGB-encoded.
-        srgb: bool,
+    /// Integers as their file has them, which textures of one image share.
+    Integers {
+        /// `width * height * channels` of them.
+        data: Arc<Integers>,
+        /// 1: grey, 2: grey and alpha, 3: RGB, 4: RGBA.
+        channels: u8,
+        /// What they stand for.
+        encoding: Encoding,
     },
     /// Linear RGBA floats.
     Floats(Vec<[f32; 4]>),
+}
+
+/// Channels of texels.
+#[derive(Clone, Debug)]
+pub enum Integers {
+    /// 8 bits a channel.
+    Bytes(Vec<u8>),
+    /// 16 bits a channel.
+    Words(Vec<u16>),
+}
+
+/// What integers of texels stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Numbers from 0 to 1.
+    Linear,
+    /// Colours encoded by sRGB; alpha is linear.
+    Srgb,
+    /// Glossiness in the alpha channel, 8 bits of it: G becomes the roughness, R 0, B and A 1.
+    Glossiness,
 }
 
 /// An image with its wrap and filter modes.
@@ -66,15 +89,82 @@ impl TextureRef {
     }
 }
 
-/// sRGB byte to linear, all 256 of them.
-fn srgb_table() -> &'static [f32; 256] {
-    static TABLE: std::sync::LazyLock<[f32; 256]> = std::sync::LazyLock::new(|| {
-        std::array::from_fn(|i| {
-            let c = i as f64 / 255.0;
-            (if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }) as f32
-        })
-    });
-    &TABLE
+/// Linear values of the 256 bytes of sRGB (IEC 61966-2-1).
+static SRGB_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let c = i as f64 / 255.0;
+        (if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }) as f32
+    })
+});
+
+/// Linear values of the 65,536 words of sRGB, in images of colours and of greys.
+static SRGB_WORDS: LazyLock<[Box<[f32]>; 2]> = LazyLock::new(|| {
+    let linear = |i: u16, grey: bool| {
+        let c = unit_word(i, grey);
+        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    };
+    [false, true].map(|grey| (0..=u16::MAX).map(|i| linear(i, grey)).collect())
+});
+
+/// A word from 0 to 1; greys are rounded twice, as the `image` crate converts them.
+#[inline]
+fn unit_word(word: u16, grey: bool) -> f32 {
+    if grey { f32::from(word) * (1.0 / 65535.0) } else { f32::from(word) / 65535.0 }
+}
+
+/// A texel's channels as RGBA.
+#[inline]
+fn rgba<T: Copy>(texel: &[T], opaque: T) -> [T; 4] {
+    match *texel {
+        [l] => [l, l, l, opaque],
+        [l, a] => [l, l, l, a],
+        [r, g, b] => [r, g, b, opaque],
+        [r, g, b, a, ..] => [r, g, b, a],
+        [] => [opaque; 4],
+    }
+}
+
+impl Integers {
+    /// Linear RGBA of the texel at an index.
+    #[inline]
+    fn decode(&self, index: usize, channels: u8, encoding: Encoding) -> Vec4 {
+        let range = index * usize::from(channels)..(index + 1) * usize::from(channels);
+        match (self, encoding) {
+            (Integers::Bytes(data), Encoding::Srgb) => {
+                let ([r, g, b, a], table) = (rgba(&data[range], 255), &*SRGB_BYTES);
+                Vec4::new(table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0)
+            }
+            (Integers::Bytes(data), Encoding::Linear) => Vec4::from(rgba(&data[range], 255).map(f32::from)) / 255.0,
+            (Integers::Bytes(data), Encoding::Glossiness) => roughness(rgba(&data[range], 255)[3]),
+            (Integers::Words(data), Encoding::Srgb) => {
+                let grey = channels < 3;
+                let ([r, g, b, a], table) = (rgba(&data[range], u16::MAX), &SRGB_WORDS[usize::from(grey)]);
+                Vec4::new(table[r as usize], table[g as usize], table[b as usize], unit_word(a, grey))
+            }
+            (Integers::Words(data), Encoding::Linear) => {
+                Vec4::from(rgba(&data[range], u16::MAX).map(|x| unit_word(x, channels < 3)))
+            }
+            (Integers::Words(data), Encoding::Glossiness) => {
+                let gloss = (u32::from(rgba(&data[range], u16::MAX)[3]) + 128) / 257;
+                roughness(gloss as u8)
+            }
+        }
+    }
+}
+
+fn roughness(gloss: u8) -> Vec4 {
+    Vec4::new(0.0, f32::from(255 - gloss) / 255.0, 1.0, 1.0)
+}
+
+impl Texels {
+    /// Linear RGBA of the texel at an index.
+    #[inline]
+    pub fn at(&self, index: usize) -> Vec4 {
+        match self {
+            Texels::Floats(data) => Vec4::from_array(data[index]),
+            Texels::Integers { data, channels, encoding } => data.decode(index, *channels, *encoding),
+        }
+    }
 }
 
 impl Wrap {
@@ -96,19 +186,7 @@ impl Texture {
     fn texel(&self, x: i64, y: i64) -> Vec4 {
         let x = self.wrap[0].fold(x, i64::from(self.width));
         let y = self.wrap[1].fold(y, i64::from(self.height));
-        let i = y * self.width as usize + x;
-        match &self.texels {
-            Texels::Floats(data) => Vec4::from_array(data[i]),
-            Texels::Bytes { data, srgb } => {
-                let t = &data[4 * i..4 * i + 4];
-                if *srgb {
-                    let table = srgb_table();
-                    Vec4::new(table[t[0] as usize], table[t[1] as usize], table[t[2] as usize], f32::from(t[3]) / 255.0)
-                } else {
-                    Vec4::new(f32::from(t[0]), f32::from(t[1]), f32::from(t[2]), f32::from(t[3])) / 255.0
-                }
-            }
-        }
+        self.texels.at(y * self.width as usize + x)
     }
 
     /// Mean of all texels, linear RGBA.

@@ -37,7 +37,7 @@ fn no_limit_of_memory_aborts() {
 fn what_a_scene_names_many_times_is_counted() {
     let folder = Folder::new();
     std::fs::write(folder.path("big.bin"), vec![0; 1 << 20]).expect("it can be written");
-    image::RgbImage::new(1024, 1024).save(folder.path("big.png")).expect("it can be written");
+    image::RgbaImage::new(1024, 1024).save(folder.path("big.png")).expect("it can be written");
     let asset = json!({"version": "2.0"});
     let buffers = json!({"asset": asset, "buffers": vec![json!({"uri": "big.bin", "byteLength": 1}); 4000]});
     let each = |part: &dyn Fn(usize) -> Value| (0..400).map(part).collect::<Vec<Value>>();

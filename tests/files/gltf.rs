@@ -7,11 +7,13 @@ mod bad_input;
 pub mod everything;
 mod fuzz;
 mod geometry;
+pub mod images;
 mod lights;
 mod materials;
 mod outside;
 mod scenes;
 mod seen;
+mod valid;
 
 use caustique::error::Error;
 use caustique::scene::Description;

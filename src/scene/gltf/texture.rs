@@ -1,18 +1,18 @@
-//! Images and textures: decoded once, kept once per use (colour or data) and sampler.
+//! Images and textures: images are decoded and kept once, as deep as their file has them.
 
 use super::document::{Document, get, named};
 use super::fault;
 use crate::error::{Error, Kind, Result};
-use crate::texture::{Texels, Texture, TextureRef, Wrap};
+use crate::texture::{Encoding, Integers, Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use serde::Deserialize;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fmt::Display;
 use std::io::Cursor;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Largest width or height of a texture.
 const MOST_TEXELS: u32 = 32_768;
@@ -80,7 +80,16 @@ pub(super) struct Textures {
     pub(super) list: Vec<Texture>,
     /// By image, sampler and use.
     known: HashMap<(usize, Option<usize>, Use), u32>,
-    images: HashMap<usize, Rc<DynamicImage>>,
+    images: HashMap<usize, Decoded>,
+}
+
+/// A decoded image.
+#[derive(Clone)]
+struct Decoded {
+    width: u32,
+    height: u32,
+    channels: u8,
+    data: Arc<Integers>,
 }
 
 impl Textures {
@@ -108,11 +117,11 @@ impl Textures {
             warnings.push(format!("{place}: texture coordinates {set} are not read, 0 take their place"));
             set = 0;
         }
-        let texture = self.load(document, info.index, usage).map_err(|e| e.within(place))?;
+        let texture = self.load(document, info.index, usage, warnings).map_err(|e| e.within(place))?;
         Ok(TextureRef { texture, set: set as u8, transform: matrix })
     }
 
-    fn load(&mut self, document: &Document, index: u32, usage: Use) -> Result<u32> {
+    fn load(&mut self, document: &Document, index: u32, usage: Use, warnings: &mut Vec<String>) -> Result<u32> {
         let texture = get(&document.textures, index as usize, "texture")?;
         let raw = document.part("textures", index as usize);
         if raw.get("source").is_none() {
@@ -128,10 +137,12 @@ impl Textures {
         if let Some(&known) = self.known.get(&key) {
             return Ok(known);
         }
-        let image = self.image(document, source)?;
-        // Four bytes or four floats a texel, for each sampler and use of it.
-        let count = u64::from(image.width()) * u64::from(image.height());
-        room(document, count * if is_deep(&image) { 16 } else { 4 }, "the textures of an image")?;
+        let Decoded { width, height, channels, data } = self.image(document, source, warnings)?;
+        let encoding = match usage {
+            Use::Color => Encoding::Srgb,
+            Use::Data => Encoding::Linear,
+            Use::Glossiness => Encoding::Glossiness,
+        };
         let sampler = match texture.sampler {
             Some(sampler) => get(&document.samplers, sampler.value(), "sampler")?.clone(),
             None => Sampler::default(),
@@ -140,9 +151,9 @@ impl Textures {
         let name = texture.name.as_ref().or(described.name.as_ref());
         let made = Texture {
             name: name.filter(|n| !n.is_empty()).cloned().unwrap_or_else(|| format!("texture {index}")),
-            width: image.width(),
-            height: image.height(),
-            texels: texels(&image, usage),
+            width,
+            height,
+            texels: Texels::Integers { data, channels, encoding },
             wrap: [wrap(&sampler.wrap_s), wrap(&sampler.wrap_t)],
             linear: linear(&sampler),
         };
@@ -152,24 +163,26 @@ impl Textures {
         Ok(known)
     }
 
-    fn image(&mut self, document: &Document, index: usize) -> Result<Rc<DynamicImage>> {
+    fn image(&mut self, document: &Document, index: usize, warnings: &mut Vec<String>) -> Result<Decoded> {
         if let Some(image) = self.images.get(&index) {
-            return Ok(Rc::clone(image));
+            return Ok(image.clone());
         }
         let image = get(&document.images, index, "image")?;
         let place = named("image", image.name.as_deref(), index);
-        let decoded = match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => document.bytes_of(uri).and_then(|bytes| decode(document, &bytes)),
-            (None, Some(view)) => document.view(view.value()).and_then(|bytes| decode(document, bytes)),
+        let bytes = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => document.bytes_of(uri).map(Cow::Owned),
+            (None, Some(view)) => document.view(view.value()).map(Cow::Borrowed),
             (None, None) => Err(fault("", "it has neither a URI nor a buffer view").hint("export the scene again")),
         };
-        let decoded = Rc::new(decoded.map_err(|e| e.within(place))?);
-        self.images.insert(index, Rc::clone(&decoded));
+        let decoded = bytes.and_then(|bytes| decode(document, &bytes, &place, warnings));
+        let decoded = decoded.map_err(|e| e.within(place))?;
+        self.images.insert(index, decoded.clone());
         Ok(decoded)
     }
 }
 
-fn decode(document: &Document, bytes: &[u8]) -> Result<DynamicImage> {
+/// Decodes an image; one that is cut off has the texels that are there, and a warning.
+fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<String>) -> Result<Decoded> {
     const HINT: &str = "save the image again as PNG or JPEG";
     let broken = |cause: String| Error::new(Kind::Image, "", cause).hint(HINT);
     let format = image::guess_format(bytes);
@@ -182,7 +195,7 @@ fn decode(document: &Document, bytes: &[u8]) -> Result<DynamicImage> {
     limits.max_alloc = Some(MOST_BYTES);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
-    check_room(document, bytes, format)?;
+    let cut = check_room(document, bytes, format)?;
     // A decoder's own fault must not end the program.
     let decoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.decode()));
     let decoded = decoded.map_err(|_| broken("it cannot be decoded: the decoder failed".into()))?;
@@ -190,60 +203,79 @@ fn decode(document: &Document, bytes: &[u8]) -> Result<DynamicImage> {
     if image.width() == 0 || image.height() == 0 {
         return Err(broken("it has no texels".into()));
     }
-    Ok(image)
+    if cut {
+        warnings
+            .push(format!("{place}: the file of the image is cut off: what is missing of it is grey (copy it again)"));
+    }
+    let (width, height, channels) = (image.width(), image.height(), image.color().channel_count());
+    let data = match image {
+        DynamicImage::ImageLuma8(image) => Integers::Bytes(image.into_raw()),
+        DynamicImage::ImageLumaA8(image) => Integers::Bytes(image.into_raw()),
+        DynamicImage::ImageRgb8(image) => Integers::Bytes(image.into_raw()),
+        DynamicImage::ImageRgba8(image) => Integers::Bytes(image.into_raw()),
+        DynamicImage::ImageLuma16(image) => Integers::Words(image.into_raw()),
+        DynamicImage::ImageLumaA16(image) => Integers::Words(image.into_raw()),
+        DynamicImage::ImageRgb16(image) => Integers::Words(image.into_raw()),
+        DynamicImage::ImageRgba16(image) => Integers::Words(image.into_raw()),
+        _ => return Err(broken("its texels are neither of 8 nor of 16 bits".into())),
+    };
+    Ok(Decoded { width, height, channels, data: Arc::new(data) })
 }
 
-/// Checks that the image fits as it is decoded and as it is kept: a few bytes can stand for a gigabyte of one colour.
-fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<()> {
+/// Checks that the image fits as it is decoded: a few bytes can stand for a gigabyte of one colour. Returns whether its
+/// file is cut off, which the decoder of JPEG does not tell.
+fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<bool> {
     // What is wrong with it, or larger than any image is taken, the decoder tells.
-    let Ok(decoder) = ImageReader::with_format(Cursor::new(bytes), format).into_decoder() else { return Ok(()) };
+    let Ok(decoder) = ImageReader::with_format(Cursor::new(bytes), format).into_decoder() else { return Ok(false) };
     let (width, height) = decoder.dimensions();
-    let deep = decoder.color_type().bytes_per_pixel() > decoder.color_type().channel_count();
-    // Four bytes, or four floats twice on the way, beside what is decoded.
-    let texels = u64::from(width) * u64::from(height);
-    let needed = decoder.total_bytes().saturating_add(texels * if deep { 32 } else { 4 });
     if width > MOST_TEXELS || height > MOST_TEXELS {
-        Ok(())
-    } else {
-        room(document, needed, format_args!("{width} x {height} texels"))
+        return Ok(false);
     }
-}
-
-/// Asks for memory of texels.
-fn room(document: &Document, bytes: u64, what: impl Display) -> Result<()> {
-    document.take(bytes, what).map_err(|e| e.hint("save the image smaller, or render with more memory"))
-}
-
-/// Whether an image has more than eight bits a channel.
-fn is_deep(image: &DynamicImage) -> bool {
-    !matches!(
-        image,
-        DynamicImage::ImageLuma8(_)
-            | DynamicImage::ImageLumaA8(_)
-            | DynamicImage::ImageRgb8(_)
-            | DynamicImage::ImageRgba8(_)
-    )
-}
-
-/// Texels as the renderer keeps them: 8 bits stay 8 bits, more become floats.
-fn texels(image: &DynamicImage, usage: Use) -> Texels {
-    if is_deep(image) && usage != Use::Glossiness {
-        let mut data: Vec<[f32; 4]> = image.to_rgba32f().pixels().map(|p| p.0).collect();
-        if usage == Use::Color {
-            data.iter_mut().for_each(|t| t[..3].iter_mut().for_each(|x| *x = srgb_to_linear(*x)));
+    let mut needed = decoder.total_bytes();
+    let jpeg = (format == ImageFormat::Jpeg).then(|| Jpeg::survey(bytes));
+    if let Some(jpeg) = &jpeg {
+        // Each block of 8 x 8 texels has a bit at least; half of a file may be lost.
+        let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
+        if (bytes.len() as u64).saturating_mul(16) < blocks {
+            let cause = format!("it is cut off: {} bytes do not hold {width} x {height} texels", bytes.len());
+            return Err(Error::new(Kind::Image, "", cause).hint("copy or save the image again"));
         }
-        return Texels::Floats(data);
+        if jpeg.progressive {
+            // 16 bits a coefficient, of all blocks at a time.
+            needed = needed.saturating_mul(3);
+        }
     }
-    let mut data = image.to_rgba8().into_raw();
-    if usage == Use::Glossiness {
-        data.chunks_exact_mut(4).for_each(|t| t.copy_from_slice(&[0, 255 - t[3], 255, 255]));
-    }
-    Texels::Bytes { data, srgb: usage == Use::Color }
+    document
+        .take(needed, format_args!("{width} x {height} texels"))
+        .map_err(|e| e.hint("save the image smaller, or render with more memory"))?;
+    Ok(jpeg.is_some_and(|jpeg| !jpeg.ends))
 }
 
-/// IEC 61966-2-1.
-fn srgb_to_linear(x: f32) -> f32 {
-    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+/// What the markers of a JPEG say (ITU T.81, annex B).
+struct Jpeg {
+    progressive: bool,
+    /// Its last marker is there.
+    ends: bool,
+}
+
+impl Jpeg {
+    fn survey(bytes: &[u8]) -> Jpeg {
+        let mut jpeg = Jpeg { progressive: false, ends: false };
+        let mut at = 2;
+        // Zero follows a byte of data that looks like a marker; restarts (D0 to D7) have no length.
+        let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0x01 | 0xd0..=0xd7 | 0xff);
+        while let Some(found) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_marker)) {
+            at += found;
+            match bytes[at + 1] {
+                0xd9 => return Jpeg { ends: true, ..jpeg },
+                0xc2 | 0xc6 | 0xca | 0xce => jpeg.progressive = true,
+                _ => {}
+            }
+            let Some(&[high, low]) = bytes.get(at + 2..at + 4) else { break };
+            at += 2 + usize::from(u16::from_be_bytes([high, low]));
+        }
+        jpeg
+    }
 }
 
 fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
