@@ -1,12 +1,15 @@
 //! KHR_lights_punctual and cameras.
 
+use super::clipping::Clip;
 use super::document::{Document, get, named};
 use super::extras::{self, CameraExtras, LightExtras, Units};
 use super::{LightUnits, fault};
 use crate::error::Result;
+use crate::geometry::Mesh;
 use crate::light::SpotEdge;
-use crate::math::{DAffine3, Rgb};
-use crate::scene::description::{CameraDescription, GuessedUnits, Projection, PunctualKind, PunctualLight};
+use crate::math::{DAffine3, DVec3, Rgb};
+use crate::scene::Description;
+use crate::scene::description::{CameraDescription, GuessedUnits, Placed, Projection, PunctualKind, PunctualLight};
 use gltf::json::camera::Type;
 use gltf::json::validation::Checked;
 use serde::Deserialize;
@@ -15,6 +18,13 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Luminous efficacy (lm/W) with which Blender's exporter turns watts into lumens.
 const EFFICACY: f32 = 683.0;
+/// The version of Blender's exporter that began to.
+const FIRST_PHOTOMETRIC: [u32; 2] = [3, 6];
+/// Less light than this is too dark to see (W/m2): a picture of Blender's defaults shows about 1.
+const FAINTEST: f64 = 0.02;
+/// Lights and vertices that are looked at to judge how bright a scene is.
+const MAX_JUDGED_LIGHTS: usize = 64;
+const MAX_JUDGED_POINTS: usize = 4096;
 
 /// A light of KHR_lights_punctual.
 #[derive(Deserialize)]
@@ -54,28 +64,96 @@ fn one() -> f32 {
     1.0
 }
 
+/// What divides intensities to make them radiometric.
+#[derive(Clone, Copy)]
+pub(super) struct Divisors {
+    /// Of suns, to W/m2.
+    sun: f32,
+    /// Of points and spots, to W/sr.
+    lamp: f32,
+}
+
+impl Divisors {
+    const RADIOMETRIC: Divisors = Divisors { sun: 1.0, lamp: 1.0 };
+    const PHOTOMETRIC: Divisors = Divisors { sun: EFFICACY, lamp: EFFICACY };
+    /// Blender's own numbers: the power of a point or spot light in all directions.
+    const WATTS: Divisors = Divisors { sun: 1.0, lamp: 4.0 * PI };
+}
+
 /// What divides intensities to make them radiometric; and whether that is a guess.
-pub(super) fn divisor(
+pub(super) fn divisors(
     document: &Document,
     units: LightUnits,
     said: Option<Units>,
     warnings: &mut Vec<String>,
-) -> (f32, Option<GuessedUnits>) {
+) -> (Divisors, Option<GuessedUnits>) {
     match (units, said) {
-        (LightUnits::Radiometric, _) | (LightUnits::Auto, Some(Units::Radiometric)) => (1.0, None),
-        (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => (EFFICACY, None),
+        (LightUnits::Radiometric, _) | (LightUnits::Auto, Some(Units::Radiometric)) => (Divisors::RADIOMETRIC, None),
+        (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => (Divisors::PHOTOMETRIC, None),
         (LightUnits::Auto, None) => {
             let generator = document.raw["asset"]["generator"].as_str();
-            let photometric = document.is_by_blender();
             let from = generator.map_or("the file's generator".into(), |g| format!("generator \"{g}\""));
-            if !photometric {
-                warnings.push(format!(
-                    "{from} does not tell the unit of lamps: they are taken in W/sr and W/m2 (--light-units decides)"
-                ));
-            }
-            (if photometric { EFFICACY } else { 1.0 }, Some(GuessedUnits { photometric, from }))
+            let (divisors, taken) = match document.blender_version() {
+                Some(version) if version >= FIRST_PHOTOMETRIC => (Divisors::PHOTOMETRIC, None),
+                Some(_) => (Divisors::WATTS, Some("writes lamps in Blender's watts, without 683 lumens for each")),
+                None => {
+                    (Divisors::RADIOMETRIC, Some("does not tell the unit of lamps: they are taken in W/sr and W/m2"))
+                }
+            };
+            warnings.extend(taken.map(|taken| format!("{from} {taken} (--light-units decides)")));
+            (divisors, Some(GuessedUnits { photometric: taken.is_none(), from }))
         }
     }
+}
+
+/// Takes the lights of a whole scene for watts after all where they would light nothing as lumens: Blender's exporter
+/// leaves the factor out in its lighting mode "Unitless", and no file says its mode.
+pub(super) fn reconsider_units(out: &mut Description) {
+    let Some(guessed) = out.guessed_units.as_mut().filter(|guessed| guessed.photometric) else { return };
+    let glows = out.materials.iter().any(|material| material.emission.max_element() > 0.0);
+    if glows || out.environment.as_ref().is_some_and(|environment| environment.strength > 0.0) {
+        // What else shines has a brightness to compare with: the plan tells.
+        return;
+    }
+    let points = sample_vertices(&out.meshes, &out.instances);
+    let total: f64 = out.lights.iter().take(MAX_JUDGED_LIGHTS).map(|light| typical_irradiance(light, &points)).sum();
+    if !(FAINTEST / f64::from(EFFICACY)..FAINTEST).contains(&total) {
+        return;
+    }
+    guessed.photometric = false;
+    out.lights.iter_mut().for_each(|light| light.intensity *= EFFICACY);
+    out.warnings.push(format!(
+        "its lamps would give {total:.1e} W/m2 if their numbers were lumens, going by {}, which is too dark to see: they are \
+         taken in W/sr and W/m2, as Blender's lighting mode 'Unitless' writes them (--light-units decides)",
+        guessed.from
+    ));
+}
+
+/// What a light gives at the median distance of the points (W/m2); infinite without points, which tell nothing.
+fn typical_irradiance(light: &PunctualLight, points: &[DVec3]) -> f64 {
+    let intensity = f64::from(light.intensity.max_element());
+    let mut distances: Vec<f64> = points.iter().map(|p| p.distance_squared(light.to_world.translation)).collect();
+    match (light.kind, distances.is_empty()) {
+        (_, true) => f64::INFINITY,
+        (PunctualKind::Sun { .. }, _) => intensity,
+        _ => {
+            let middle = distances.len() / 2;
+            intensity / *distances.select_nth_unstable_by(middle, f64::total_cmp).1
+        }
+    }
+}
+
+/// Some vertices of a scene, in the world, spread evenly over its objects.
+fn sample_vertices(meshes: &[Mesh], instances: &[Placed]) -> Vec<DVec3> {
+    let each = (MAX_JUDGED_POINTS / instances.len().max(1)).max(1);
+    let step = instances.len().div_ceil(MAX_JUDGED_POINTS).max(1);
+    let mut points = Vec::new();
+    for placed in instances.iter().step_by(step) {
+        let positions = &meshes[placed.mesh as usize].positions;
+        let some = positions.iter().step_by(positions.len().div_ceil(each).max(1));
+        points.extend(some.map(|p| placed.to_world.transform_point3(p.as_dvec3())));
+    }
+    points
 }
 
 /// The light that stands on a node.
@@ -84,7 +162,7 @@ pub(super) fn light(
     index: usize,
     node: (&str, &Value),
     to_world: DAffine3,
-    divisor: f32,
+    divisors: Divisors,
     warnings: &mut Vec<String>,
 ) -> Result<PunctualLight> {
     let list = document.raw["extensions"]["KHR_lights_punctual"]["lights"].as_array();
@@ -93,6 +171,7 @@ pub(super) fn light(
     let light = Light::deserialize(raw).map_err(|e| super::container::malformed(&place, &e))?;
     let name =
         Some(node.0.to_owned()).filter(|n| !n.is_empty()).or(light.name).unwrap_or_else(|| format!("light {index}"));
+    let divisor = if light.kind == "directional" { divisors.sun } else { divisors.lamp };
     let mut intensity = Rgb::from_array(light.color) * light.intensity / divisor;
     if !intensity.is_finite() {
         return Err(fault(place, "its colour or intensity is not finite"));
@@ -164,11 +243,11 @@ pub(super) fn camera(
     node: (&str, &Value),
     to_world: DAffine3,
     warnings: &mut Vec<String>,
-) -> Result<CameraDescription> {
+) -> Result<(CameraDescription, Clip)> {
     let camera = get(&document.cameras, index, "camera")?;
     let raw = document.part("cameras", index);
     let place = named("camera", camera.name.as_deref().or(Some(node.0)), index);
-    let projection = match (&camera.type_, &camera.perspective, &camera.orthographic) {
+    let (projection, near, far) = match (&camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(Type::Perspective), Some(p), _) => {
             if !(p.yfov > 0.0 && p.yfov < PI) {
                 return Err(fault(place, format!("its yfov is {}; it must lie between 0 and pi", p.yfov)));
@@ -177,14 +256,14 @@ pub(super) fn camera(
             if aspect != p.aspect_ratio {
                 warnings.push(format!("{place}: its aspect ratio is not positive and is ignored"));
             }
-            Projection::Perspective { yfov: p.yfov, aspect }
+            (Projection::Perspective { yfov: p.yfov, aspect }, p.znear, p.zfar)
         }
         (Checked::Valid(Type::Orthographic), _, Some(o)) => {
             let positive = |x: f32| x.is_finite() && x.abs() > 0.0;
             if !(positive(o.xmag) && positive(o.ymag)) {
                 return Err(fault(place, "xmag and ymag must be finite and not zero"));
             }
-            Projection::Orthographic { xmag: o.xmag.abs(), ymag: o.ymag.abs() }
+            (Projection::Orthographic { xmag: o.xmag.abs(), ymag: o.ymag.abs() }, o.znear, Some(o.zfar))
         }
         _ => return Err(fault(place, "it is neither perspective nor orthographic")),
     };
@@ -208,5 +287,6 @@ pub(super) fn camera(
     }
     let name = if node.0.is_empty() { camera.name.clone().unwrap_or_else(|| place.clone()) } else { node.0.into() };
     let focus_distance = focus_distance.unwrap_or(1.0);
-    Ok(CameraDescription { name, to_world, projection, aperture_radius, focus_distance, shift })
+    let clip = Clip { near, far: far.unwrap_or(f32::INFINITY) };
+    Ok((CameraDescription { name, to_world, projection, aperture_radius, focus_distance, shift }, clip))
 }

@@ -10,6 +10,7 @@
 
 mod accessor;
 mod animation;
+mod clipping;
 mod container;
 mod curve;
 mod deform;

@@ -1,5 +1,6 @@
 //! The node hierarchy: transforms composed in f64, and what stands on the nodes.
 
+use super::clipping::{self, Clip};
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
@@ -41,22 +42,25 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         meshes: HashMap::new(),
         worlds: Worlds::new(&document),
         bounds: Vec::new(),
-        divisor: None,
+        clips: Vec::new(),
+        divisors: None,
         options: *options,
         scene: SceneExtras::default(),
         out: Description { source: path.to_owned(), warnings, ..Description::default() },
     };
     reader.scene()?;
-    let Reader { library, mut out, .. } = reader;
+    let Reader { library, mut out, clips, bounds, .. } = reader;
     if library.occluded > 0 {
         let n = library.occluded;
         let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
         out.warnings.push(format!("{n} {plural}, ignored: occlusion is simulated"));
     }
-    let mut said = HashSet::new();
-    out.warnings.retain(|warning| said.insert(warning.clone()));
     out.materials = library.list;
     out.textures = library.textures.list;
+    lights::reconsider_units(&mut out);
+    clipping::check(&mut out, &clips, &bounds);
+    let mut said = HashSet::new();
+    out.warnings.retain(|warning| said.insert(warning.clone()));
     Ok(out)
 }
 
@@ -98,8 +102,10 @@ struct Reader<'r> {
     worlds: Worlds<'r, 'r>,
     /// Local bounds of the meshes read.
     bounds: Vec<(DVec3, DVec3)>,
+    /// Clip planes of the cameras.
+    clips: Vec<Clip>,
     /// What divides intensities, once it is known.
-    divisor: Option<f32>,
+    divisors: Option<lights::Divisors>,
     options: ReadOptions,
     scene: SceneExtras,
     out: Description,
@@ -243,7 +249,9 @@ impl Reader<'_> {
         if let Some(camera) = node.camera {
             let warnings = &mut self.out.warnings;
             let camera = lights::camera(document, camera.value(), (&name, raw), to_world, warnings);
-            self.out.cameras.push(camera.map_err(|e| e.within(place))?);
+            let (camera, clip) = camera.map_err(|e| e.within(place))?;
+            self.out.cameras.push(camera);
+            self.clips.push(clip);
         }
         if !shown {
             return Ok(());
@@ -251,13 +259,13 @@ impl Reader<'_> {
         if let Some(reference) = extension::<LightReference>(raw, "KHR_lights_punctual", place)? {
             let (units, said) = (self.options.light_units, self.scene.light_units);
             let out = &mut self.out;
-            let divisor = *self.divisor.get_or_insert_with(|| {
-                let (divisor, guessed) = lights::divisor(document, units, said, &mut out.warnings);
+            let divisors = *self.divisors.get_or_insert_with(|| {
+                let (divisors, guessed) = lights::divisors(document, units, said, &mut out.warnings);
                 out.guessed_units = guessed;
-                divisor
+                divisors
             });
             let warnings = &mut out.warnings;
-            let light = lights::light(document, reference.light as usize, (&name, raw), to_world, divisor, warnings);
+            let light = lights::light(document, reference.light as usize, (&name, raw), to_world, divisors, warnings);
             self.out.lights.push(light.map_err(|e| e.within(place))?);
         }
         if let Some(mesh) = node.mesh {

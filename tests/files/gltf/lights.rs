@@ -97,6 +97,99 @@ fn units_of_lights() {
     assert_eq!(intensity(&file, LightUnits::Radiometric), 683.0);
 }
 
+/// Exporters before 3.6 wrote Blender's watts: whatever the version, the lamps of one Blender file give the same light.
+#[test]
+fn lamps_of_old_and_new_exporters_are_alike() {
+    let file = |version: &str, sun: f64, lamp: f64| {
+        let lights = json!([{"type": "directional", "intensity": sun}, {"type": "point", "intensity": lamp},
+            {"type": "spot", "intensity": lamp}]);
+        let mut file = lamps(lights, &[0, 1, 2].map(|i| json!({"extensions": on(i)})));
+        file.json["asset"]["generator"] = json!(format!("Khronos glTF Blender I/O {version}"));
+        read(&file)
+    };
+    let (sun, watts) = (3.0, 1000.0);
+    for version in ["v1.8.19", "v3.3.27", "v3.5.30", "v3.6.5", "v4.3.47", "v5.0.1"] {
+        let old = version < "v3.6";
+        let candela = 683.0 * watts / (4.0 * std::f64::consts::PI);
+        let scene = if old { file(version, sun, watts) } else { file(version, 683.0 * sun, candela) };
+        let given: Vec<f64> = scene.lights.iter().map(|light| f64::from(light.intensity.x)).collect();
+        for (given, expected) in given.iter().zip([sun, candela / 683.0, candela / 683.0]) {
+            assert!((given / expected - 1.0).abs() < 1e-6, "{version}: {given} for {expected}");
+        }
+        let told = format!(
+            "generator \"Khronos glTF Blender I/O {version}\" writes lamps in Blender's watts, without 683 lumens for each \
+             (--light-units decides)"
+        );
+        assert_eq!(scene.warnings, if old { vec![told] } else { vec![] });
+        assert_eq!(scene.guessed_units.map(|guess| guess.photometric), Some(!old));
+    }
+}
+
+/// Blender's lighting mode "Unitless" leaves the factor out, and no file says its mode: where lamps are all the light and
+/// too dark to see as lumens, they are watts.
+#[test]
+fn lamps_too_dark_for_lumens_are_watts() {
+    // Median distance of the cube's corners from the lamp: about 5 m.
+    let read = |light: Value, glows: bool| {
+        let mut file = lamps(json!([light]), &[json!({"extensions": on(0), "translation": [0, 5, 0]})]);
+        let material = json!({"emissiveFactor": if glows { [1, 1, 1] } else { [0, 0, 0] }});
+        let material = file.push("materials", material);
+        let mesh = file.cube("cube", Some(material));
+        file.node(json!({"mesh": mesh}));
+        read(&file)
+    };
+    let lamp = |kind: &str, intensity: f64| json!({"type": kind, "intensity": intensity});
+    for (kind, watts) in [("point", 1000.0 / (4.0 * std::f64::consts::PI)), ("directional", 3.0)] {
+        let (unitless, standard) = (read(lamp(kind, watts), false), read(lamp(kind, 683.0 * watts), false));
+        let intensity = |scene: &Description| f64::from(scene.lights[0].intensity.x);
+        assert!((intensity(&unitless) / intensity(&standard) - 1.0).abs() < 1e-6);
+        assert_eq!(standard.warnings, [""; 0]);
+        let [told] = &unitless.warnings[..] else { panic!("{:?}", unitless.warnings) };
+        assert!(told.starts_with("its lamps would give ") && told.contains("'Unitless'"), "{told}");
+        assert_eq!(unitless.guessed_units.map(|guess| guess.photometric), Some(false));
+        // What glows tells how bright the scene is meant to be.
+        let glowing = read(lamp(kind, watts), true);
+        assert!((intensity(&glowing) * 683.0 / watts - 1.0).abs() < 1e-6);
+    }
+    assert_eq!(read(lamp("point", 0.0), false).warnings, [""; 0]);
+}
+
+/// Clip planes are ignored, which is told where they would change the picture.
+#[test]
+fn clip_planes() {
+    let told = |camera: Value, at: [f64; 3]| {
+        let mut file = Glb::new();
+        file.push("cameras", camera);
+        file.node(json!({"name": "Eye", "camera": 0, "translation": at}));
+        let mesh = file.cube("cube", None);
+        file.node(json!({"mesh": mesh}));
+        read(&file).warnings
+    };
+    let perspective = |znear: f64, zfar: f64| json!({"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1, "znear": znear, "zfar": zfar}});
+    let orthographic = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.5, "zfar": 3}});
+    // The cube's near face is at a depth of 4, its far one at 6.
+    let ahead = [0.0, 0.0, 5.0];
+    let near = "camera \"Eye\": what is nearer than its znear of 4.5 m is shown all the same: clip planes are ignored \
+                (hide or remove it)";
+    let far = |zfar: &str| {
+        format!(
+            "camera \"Eye\": what is farther than its zfar of {zfar} m is shown all the same: clip planes are ignored (hide or \
+                 remove it)"
+        )
+    };
+    assert_eq!(told(perspective(0.1, 100.0), ahead), [""; 0]);
+    assert_eq!(told(perspective(4.5, 100.0), ahead), [near]);
+    assert_eq!(told(perspective(0.1, 5.5), ahead), [far("5.5")]);
+    assert_eq!(told(perspective(4.5, 5.5), ahead), [near.to_string(), far("5.5")]);
+    // Beside the picture, and behind the camera.
+    assert_eq!(told(perspective(4.5, 5.5), [9.0, 0.0, 5.0]), [""; 0]);
+    assert_eq!(told(perspective(4.5, 5.5), [0.0, 0.0, -5.0]), [""; 0]);
+    assert_eq!(told(orthographic.clone(), ahead), [far("3")]);
+    assert_eq!(told(orthographic, [2.5, 0.0, 5.0]), [""; 0]);
+    // A cube that is seen from its inside.
+    assert_eq!(told(perspective(0.5, 1.5), [0.0; 3]), [""; 0]);
+}
+
 #[test]
 fn cameras_in_the_order_of_the_scene() {
     let mut file = Glb::new();

@@ -3,6 +3,7 @@
 use super::{Said, message};
 use crate::gltf::everything::everything;
 use crate::gltf::glb::{CUBE, Glb};
+use crate::gltf::images::{jpegs, wearing};
 use caustique::scene::gltf::{Frame, ReadOptions, read, read_bytes};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -86,6 +87,10 @@ pub fn said() -> String {
     for (what, changes) in little() {
         said.case(&format!("{what}: {changes}"), &changed(&pool(), &changes));
     }
+    let [whole, small] = jpegs();
+    for (what, image) in [("half a JPEG", &whole[..whole.len() / 2]), ("a JPEG of too few bits", &small)] {
+        said.case(what, &told(&wearing(image, "image/jpeg").bytes(), &ReadOptions::default()));
+    }
     for (what, indices) in windings() {
         let mut file = Glb::new();
         let glass = file.push(
@@ -146,6 +151,11 @@ fn parts() -> Cases {
         ("no version", json!({"/asset": {}})),
         ("version 1", json!({"/asset/version": "1.0"})),
         ("extensions required", json!({"/extensionsRequired": ["EXT_one", "EXT_other"]})),
+        (
+            "Draco alone",
+            json!({"/accessors/0": {"componentType": 5126, "type": "VEC3", "count": 8},
+                "/meshes/0/primitives/0/extensions": {"KHR_draco_mesh_compression": {}}}),
+        ),
         ("Draco required", json!({"/extensionsRequired": ["KHR_draco_mesh_compression"]})),
         ("meshopt required", json!({"/extensionsRequired": ["EXT_meshopt_compression"]})),
         ("extensions used", json!({"/extensionsUsed": ["EXT_one"]})),
@@ -187,7 +197,9 @@ fn shapes(everything: &Glb) -> Cases {
         ("no animation", json!({"/animations/0": 7})),
         ("rotations of one number", json!({"/animations/0/channels/1/sampler": 0})),
         ("a matrix that moves", json!({"/nodes/0": {"mesh": 1, "matrix": identity}})),
+        ("a matrix that moves, in a frame", json!({"/nodes/0": {"mesh": 1, "matrix": identity}, "frame": 12})),
         ("no key", json!({"/accessors/11/count": 0})),
+        ("no key, in a frame", json!({"/accessors/11/count": 0, "frame": 12})),
         ("a key before the start", json!({"#11.0": -1})),
         ("keys that fall", json!({"#11.0": 2})),
         ("values left over", json!({"/accessors/12/count": 1})),
@@ -272,6 +284,8 @@ fn lamps() -> Cases {
     vec![
         ("no generator", json!({"/asset": {"version": "2.0"}})),
         ("a generator", json!({"/asset/generator": "chisel"})),
+        ("an old exporter", json!({"/asset/generator": "Khronos glTF Blender I/O v3.3.27"})),
+        ("too dark for lumens", json!({format!("{lamp}/intensity"): 1, "/animations": [], "/scenes/0/extras": {}})),
         (
             "light beyond numbers",
             json!({format!("{lamp}/color"): [1e30, 0, 0], "/animations": [], format!("{lamp}/intensity"): 1e30}),
@@ -296,6 +310,8 @@ fn lamps() -> Cases {
         ("an aperture below zero", json!({"/cameras/0/extras/caustique/aperture_radius": -1})),
         ("a focus behind", json!({"/cameras/0/extras/caustique/focus_distance": -1})),
         ("an aperture without a focus", json!({"/cameras/0/extras/caustique": {"aperture_radius": 1}})),
+        ("a near plane", json!({"/cameras/0/perspective/znear": 5})),
+        ("a far plane", json!({"/cameras/0/perspective/zfar": 0.5})),
         ("a shift beyond numbers", json!({"/cameras/0/extras/caustique/shift": [1e300, 0]})),
     ]
 }

@@ -19,7 +19,7 @@ const LOADERS: [&str; 10] = [
 ];
 
 /// Texts that no case can bring up, and why.
-const UNSAID: [(&str, &[&str]); 5] = [
+const UNSAID: [(&str, &[&str]); 6] = [
     (
         "there is memory enough where tests run",
         &[
@@ -27,10 +27,10 @@ const UNSAID: [(&str, &[&str]); 5] = [
             "{placed} placed meshes",
             "place fewer copies, join them into one mesh, or render with more memory",
             "save the image smaller, or render with more memory",
-            "the textures of an image",
             "files that the scene names",
             "name each file once, or render with more memory",
             "its texels",
+            "{width} x {height} texels",
             "its pixels",
             "meshes on nodes whose scale is zero along an axis",
         ],
@@ -41,6 +41,7 @@ const UNSAID: [(&str, &[&str]); 5] = [
             "its weights",
             "its {key} is not {N} numbers",
             "it has no texels",
+            "its texels are neither of 8 nor of 16 bits",
             "the display window has no pixels",
             "part index",
             "the file is deep",
@@ -57,6 +58,10 @@ const UNSAID: [(&str, &[&str]); 5] = [
         &["it cannot be decoded: the decoder failed", "the decoder failed", "the file contradicts itself"],
     ),
     ("no mesh has a rim of one edge", &["edge has one face only"]),
+    (
+        "tests/python/usd_render.py says it, by a variable of the environment",
+        &["{} is no number of seconds", "give a whole number from 1 to 2000000, or none"],
+    ),
     ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 3n", "not said", "default material"]),
 ];
 
