@@ -65,6 +65,9 @@ pub struct Plan {
     /// What is missing from the picture and what may be a mistake in the scene, each with a remedy. What reading the
     /// scene has found is in [`Scene::warnings`].
     pub warnings: Vec<String>,
+    /// Why the picture is black, should it be; empty where that is told already.
+    #[serde(skip)]
+    pub reason_if_black: String,
 }
 
 /// What a plan is made for.
@@ -121,8 +124,11 @@ impl Plan {
                 warnings.push(format!("--effects +{name}: nothing in the scene calls for it"));
             }
         }
+        warnings.extend(asked.max_depth.map(|most| depth_warning(most, &effects, scene)));
         warnings.extend(diagnosis::warnings(scene, camera, asked));
+        let reason_if_black = diagnosis::black::reason(scene, camera, &effects, asked, !warnings.is_empty());
         Plan {
+            reason_if_black,
             scene: scene.source.display().to_string(),
             method: asked.method.into(),
             because: asked.because.into(),
@@ -135,6 +141,19 @@ impl Plan {
     /// One of the effects.
     pub fn effect(&self, effect: Effect) -> &EffectPlan {
         &self.effects[effect as usize]
+    }
+}
+
+/// What a limit of depth leaves out.
+fn depth_warning(most: u32, effects: &[EffectPlan], scene: &Scene) -> String {
+    let cut = effects.iter().filter(|plan| plan.present).map(|plan| (plan.effect, shortest(plan.effect, scene)));
+    let (names, needed): (Vec<&str>, Vec<u32>) =
+        cut.filter(|(_, needed)| *needed > most).map(|(effect, needed)| (effect.name(), needed)).unzip();
+    match needed.iter().min() {
+        None => format!("--max-depth {most}: light of longer paths is left out"),
+        Some(needed) => {
+            format!("--max-depth {most}: left out are {}, whose paths have {needed} segments or more", names.join(", "))
+        }
     }
 }
 

@@ -23,11 +23,16 @@ fn floor() -> Description {
 
 /// The plan of a scene by a kind of method.
 fn plan_by(description: Description, search: Search) -> Plan {
+    plan_to(description, search, None)
+}
+
+/// The same with a longest path.
+fn plan_to(description: Description, search: Search, max_depth: Option<u32>) -> Plan {
     let scene = build(description);
     let camera = scene.camera(&square(64)).expect("there is a camera");
     let removed = Removed::default();
     let asked =
-        Asked { method: "any", because: "", search, max_depth: None, switches: Switches::default(), removed: &removed };
+        Asked { method: "any", because: "", search, max_depth, switches: Switches::default(), removed: &removed };
     Plan::new(&scene, &camera, &asked)
 }
 

@@ -95,6 +95,7 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
         preview: None,
         why: None,
         summary: None,
+        reason_if_black: String::new(),
         made_for: Picture::default(),
     };
     let delivery = pipeline::render(order, &mut told)?;
@@ -112,6 +113,8 @@ struct Telling<'a> {
     /// Why auto has chosen what it has.
     why: Option<String>,
     summary: Option<Summary>,
+    /// Why the picture is black, should it be.
+    reason_if_black: String,
     /// The picture that the scene was made for.
     made_for: Picture,
 }
@@ -153,6 +156,7 @@ impl Watch for Telling<'_> {
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         self.preview = Preview::of(self.args, self.made_for);
         tell_plan(&self.args.job.scene.path, &plan.warnings);
+        self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 
     fn progress(&mut self, progress: &Progress) {
@@ -192,7 +196,7 @@ impl Watch for Telling<'_> {
 impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
-        let Telling { args, summary, preview, made_for, .. } = self;
+        let Telling { args, summary, preview, made_for, reason_if_black, .. } = self;
         let Delivery { set, attributes, techniques, tail, .. } = &delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
@@ -208,6 +212,9 @@ impl Telling<'_> {
             if let Some((name, _)) = &delivery.finished {
                 tell_finish(name, &delivery, summary.told_of_finished());
             }
+        }
+        if !reason_if_black.is_empty() && set.beauty().is_ok_and(|pixels| pixels.iter().flatten().all(|x| *x == 0.0)) {
+            say(&format!("warning: {}: the picture is black: {reason_if_black}", args.output.display()));
         }
         summary.tell_full();
         summary.tell_rejected(&args.output, talk);

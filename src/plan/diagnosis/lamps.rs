@@ -23,7 +23,8 @@ const BOUNCES: usize = 4;
 const PLACES: (usize, u32) = (8, 64);
 
 /// Lamps in lumens beside surfaces and environments in watts, or the other way round: the units are a guess, and by the
-/// other guess the lights were in proportion. Lamps are compared with surfaces, suns with the environment.
+/// other guess the lights were in proportion. Lamps are compared with surfaces, suns with the environment; where there is
+/// nothing to compare lumens with, the guess is told.
 pub(super) fn units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
@@ -38,6 +39,13 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
             Emitter::Sun { irradiance, .. } => suns += luminance(*irradiance),
             Emitter::Environment => {}
         }
+    }
+    let alone = surfaces == 0.0 && sky.environment.is_none() && lamps + suns > 0.0;
+    if alone && guessed.photometric {
+        return Some(format!(
+            "lamps give all its light, and their numbers were taken for lumens, going by {}; if the picture is far too dark, use --light-units radiometric",
+            guessed.from
+        ));
     }
     let around = sky.environment.as_ref().map_or(0.0, |environment| PI * luminance(environment.mean()));
     let about = EFFICACY / ABOUT..EFFICACY * ABOUT;
@@ -129,6 +137,19 @@ pub(super) fn encased(scene: &Scene, camera: Vec3) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// An environment that nothing which the camera sees gets any light from: a sky dome, or a room without windows.
+pub(super) fn shut_out(scene: &Scene, camera: Vec3) -> Option<String> {
+    scene.lights.sky().environment.as_ref()?;
+    let rays = rays::directions(DIRECTIONS).map(|d| (camera, d)).collect();
+    let mut around = enclosure(scene, rays)?;
+    around.retain(|object| within(scene, &BTreeSet::from([*object]), camera));
+    let names: Vec<String> = around.iter().map(|object| format!("\"{}\"", scene.objects[*object as usize])).collect();
+    let by = if names.is_empty() { "what stands around the camera".into() } else { cut(&names) };
+    Some(format!(
+        "the environment lights nothing that the camera sees: {by} shuts it out; make an opening, let it glow if it is the sky, or take it away"
+    ))
 }
 
 /// All opaque objects that light meets which goes on from surface to surface; `None` if some gets away.

@@ -4,6 +4,7 @@
 //! Where rays are asked here, they go in fixed directions and their number is fixed: the same scene gets the same
 //! answer everywhere.
 
+pub(super) mod black;
 mod glass;
 mod lamps;
 mod rays;
@@ -16,10 +17,12 @@ use crate::scene::Scene;
 pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<String> {
     let mut warnings = glass::thin(scene);
     warnings.extend(glass::wide(scene));
+    warnings.extend(glass::faded(scene));
     warnings.extend(lamps::units(scene));
     warnings.extend(lamps::no_environment(scene, asked));
     if !scene.lights.is_empty() {
         warnings.extend(lamps::encased(scene, camera.position()));
+        warnings.extend(lamps::shut_out(scene, camera.position()));
         warnings.extend(lamps::behind_glass(scene, asked));
         warnings.extend(glass::unlit(scene));
     }

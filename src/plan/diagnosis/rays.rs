@@ -28,12 +28,25 @@ pub(super) fn first(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, tok
 
 /// The first surface along a ray that lets no light through. What lets light through does not bend the ray.
 pub(super) fn first_opaque(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
+    first_opaque_after(scene, origin, direction, tmax, token, |_| {})
+}
+
+/// The same; `passed` gets each surface before it.
+pub(super) fn first_opaque_after(
+    scene: &Scene,
+    origin: Vec3,
+    direction: Vec3,
+    tmax: f32,
+    token: u32,
+    mut passed: impl FnMut(&Surface),
+) -> Option<Surface> {
     let mut along = Along::new(Ray { origin, direction, tmax, token }, None);
     for _ in 0..MOST_SURFACES {
         let (surface, _) = along.next(scene)?;
         if !scene.materials.list[surface.material as usize].transmits() {
             return Some(surface);
         }
+        passed(&surface);
         along.pass(&surface);
     }
     None

@@ -1,10 +1,10 @@
 //! What looks like a mistake is told, with its name and a remedy; what does not is not.
 
-use super::{floor, plan, plan_by};
+use super::{floor, plan, plan_by, plan_to};
 use crate::support::scenes::{add, cuboid, glass, matte, point_light, quad, sphere};
 use caustique::geometry::Mesh;
 use caustique::light::SpotEdge;
-use caustique::material::Material;
+use caustique::material::{Alpha, Material};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::plan::Search;
 use caustique::scene::Description;
@@ -213,4 +213,109 @@ fn glass_that_no_light_reaches() {
         warning(past),
         "object \"Ball\": no light shines on its glass, so it casts no caustic; aim a light at it"
     );
+}
+
+/// A beam of half a degree on a slab of two large triangles a face misses the points that are asked for light, and is
+/// light all the same, also through a pane before it; a beam beside the slab is not.
+#[test]
+fn narrow_beams_light_large_glass() {
+    let scene = |x: f64, pane: bool| {
+        let slab = cuboid(Vec3::new(-3.0, 1.0, -3.0), Vec3::new(3.0, 1.2, 3.0), false);
+        let mut description = with(lit(), "Slab", slab, glass(1.5));
+        if pane {
+            add(
+                &mut description,
+                "Pane",
+                cuboid(Vec3::new(-5.0, 2.0, -5.0), Vec3::new(5.0, 2.1, 5.0), false),
+                glass(1.5),
+            );
+        }
+        let light = &mut description.lights[0];
+        light.kind = PunctualKind::Spot { inner: 0.0, outer: 0.01, edge: SpotEdge::Squared };
+        light.to_world = glam::DAffine3::from_translation(DVec3::new(x, 3.0, 0.7))
+            * glam::DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+        description
+    };
+    silent(scene(0.3, false));
+    silent(scene(0.3, true));
+    let told = "object \"Slab\": no light shines on its glass, so it casts no caustic; aim a light at it";
+    assert_eq!(warning(scene(4.0, false)), told);
+}
+
+/// Old models fade glass by alpha. Veils that are open, rough, flat or hardly fade may be meant to.
+#[test]
+fn alpha_in_place_of_glass() {
+    let faded = |alpha: f32, roughness: f32| Material {
+        base_color: [1.0, 1.0, 1.0, alpha],
+        alpha: Alpha::Blend,
+        roughness,
+        ..matte(0.8, 0.0)
+    };
+    assert_eq!(
+        warning(ball(faded(0.1, 0.1))),
+        "material \"Ball\" on \"Ball\": its alpha of 0.1 lets light through straight, so it bends no light and casts no caustic; if it is \
+         glass, give it transmission 1 and alpha 1"
+    );
+    for material in
+        [faded(0.1, 1.0), faded(0.9, 0.1), faded(0.0, 0.1), Material { alpha: Alpha::Opaque, ..faded(0.1, 0.1) }]
+    {
+        silent(ball(material));
+    }
+    let pane = quad(Vec3::new(-1.0, 0.5, 0.0), Vec3::X, Vec3::Y);
+    silent(with(lit(), "Pane", pane, faded(0.1, 0.1)));
+}
+
+#[test]
+fn a_dome_shuts_the_environment_out() {
+    let under = |dome: Material, radius: f32| {
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        let environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        let dome_mesh = sphere(Vec3::ZERO, radius, 16);
+        with(Description { environment, ..floor() }, "Dome", dome_mesh, dome)
+    };
+    let told = "the environment lights nothing that the camera sees: \"Dome\" shuts it out; make an opening, let it glow if it is the sky, \
+                or take it away";
+    let plan = plan(under(matte(0.5, 0.0), 50.0));
+    assert_eq!(plan.warnings, [told]);
+    assert_eq!(plan.reason_if_black, "what the warnings above name is the likely reason");
+    silent(under(glass(1.0), 50.0));
+    // A ball beside the camera.
+    silent(under(matte(0.5, 0.0), 1.0));
+}
+
+#[test]
+fn a_limit_of_depth_is_told() {
+    let to = |most| plan_to(ball(glass(1.5)), Search::Photons, Some(most));
+    assert_eq!(
+        to(2).warnings,
+        ["--max-depth 2: left out are indirect, caustic, sds, whose paths have 3 segments or more"]
+    );
+    assert_eq!(to(3).warnings, ["--max-depth 3: left out are sds, whose paths have 4 segments or more"]);
+    assert_eq!(to(8).warnings, ["--max-depth 8: light of longer paths is left out"]);
+    assert!(to(2).reason_if_black.starts_with("what is left out may be all its light: indirect, caustic"));
+}
+
+/// Each reason that a black picture may have.
+#[test]
+fn reasons_of_black_pictures() {
+    let reason = |description: Description| plan(description).reason_if_black;
+    assert_eq!(reason(floor()), "");
+    let mut away = lit();
+    away.cameras = vec![crate::support::scenes::look_at(DVec3::new(0.0, 5.0, 6.0), DVec3::new(0.0, 9.0, 6.1), 50.0)];
+    assert!(reason(away).starts_with("the camera sees no surface; "));
+    assert!(reason(lit()).ends_with("too hard to find for any"));
+}
+
+/// Where lamps give all light, nothing tells whether the guess of their unit is right.
+#[test]
+fn guessed_lumens_of_lamps_alone_are_told() {
+    let mut description = lit();
+    description.guessed_units = Some(GuessedUnits { photometric: true, from: "generator \"Any\"".into() });
+    assert_eq!(
+        warning(description.clone()),
+        "lamps give all its light, and their numbers were taken for lumens, going by generator \"Any\"; if the picture is far too dark, \
+         use --light-units radiometric"
+    );
+    description.guessed_units = Some(GuessedUnits { photometric: false, from: "generator \"Any\"".into() });
+    silent(description);
 }

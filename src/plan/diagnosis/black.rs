@@ -1,0 +1,46 @@
+//! Why a picture is black.
+
+use super::super::{Asked, EffectPlan};
+use super::rays;
+use crate::camera::Camera;
+use crate::math::Vec2;
+use crate::scene::Scene;
+
+/// Camera rays along each edge of the picture.
+const EDGE: u32 = 16;
+
+/// The likeliest reason, and a remedy, should the whole picture be black; empty without any light, which is told when the
+/// scene is built. `warned`: something looks like a mistake.
+pub(in super::super) fn reason(
+    scene: &Scene,
+    camera: &Camera,
+    effects: &[EffectPlan],
+    asked: &Asked,
+    warned: bool,
+) -> String {
+    if scene.lights.is_empty() {
+        return String::new();
+    }
+    if !sees_anything(scene, camera) {
+        return "the camera sees no surface; look at its place and direction, or choose another with --camera".into();
+    }
+    let left: Vec<&str> = effects.iter().filter(|e| e.present && !e.simulated).map(|e| e.effect.name()).collect();
+    if !left.is_empty() {
+        return format!("what is left out may be all its light: {}", left.join(", "));
+    }
+    if warned {
+        return "what the warnings above name is the likely reason".into();
+    }
+    let method = asked.method;
+    format!("no light has reached the camera: lights may be enclosed or turned away, or too hard to find for {method}")
+}
+
+fn sees_anything(scene: &Scene, camera: &Camera) -> bool {
+    let (width, height) = camera.size();
+    let at = |i: u32, size: u32| ((f64::from(i) + 0.5) / f64::from(EDGE) * f64::from(size)) as u32;
+    (0..EDGE * EDGE).any(|i| {
+        let film = camera.film((at(i % EDGE, width), at(i / EDGE, height)), Vec2::splat(0.5));
+        let ray = camera.ray(film, Vec2::splat(0.5));
+        rays::first(scene, ray.origin, ray.direction, f32::INFINITY, i).is_some()
+    })
+}
