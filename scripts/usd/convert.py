@@ -18,6 +18,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 from faults import Fault, text_of  # noqa: E402, from this folder
+from guard import guarded  # noqa: E402
 
 
 @contextlib.contextmanager
@@ -59,9 +60,21 @@ def main(given):
     parser.add_argument("--frame", type=float, metavar="N", help="time code [default: the stage's first]")
     parser.add_argument("--allow-outside", action="store_true",
                         help="let the stage name files outside its own folder")
+    parser.add_argument("--guard", type=int, nargs=2, metavar=("SECONDS", "BYTES"), help=argparse.SUPPRESS)
     given = parser.parse_args(given)
     if given.arguments == bool(given.output):
         parser.error("give either -o OUT.glb or --arguments")
+    if given.guard is None:
+        return _convert(given)
+    folder = os.path.dirname(os.path.abspath(__file__))
+    try:
+        return guarded(lambda: _convert(given), folder, *given.guard)
+    except Fault as fault:
+        return _tell(fault.where, fault.fault, fault.hint)
+
+
+def _convert(given):
+    """Does what the command line asks for; the exit code."""
     try:
         if given.arguments:
             print(json.dumps(arguments(given.stage, given.allow_outside)))
@@ -74,8 +87,14 @@ def main(given):
         where, what = "", f"{sys.executable} lacks a module: {error}"
         hint = ("run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip install usd-core "
                 "numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
+    except MemoryError:
+        where, what, hint = "", "the stage takes more memory than there is", "use a simpler stage or smaller textures"
     except Exception as error:  # whatever USD raises about stages that come from anywhere
         where, what, hint = "", f"USD says: {text_of(error)}", None
+    return _tell(where, what, hint)
+
+
+def _tell(where, what, hint):
     print(json.dumps({"prim": where, "fault": what, "hint": hint}), file=sys.stderr)
     return 1
 

@@ -30,6 +30,8 @@ def surface(shader, reader, losses):
         out.presence = opacity
         if isinstance(opacity, Texture) and out.threshold == 0 and opacity.channel != "a":
             losses.name(where, "its opacity texture is taken for presence: where it is 0 there is nothing, no glass")
+    elif opacity != 1 and _is_metal(out.metallic):
+        losses.name(where, f"opacity {opacity:g} is not carried: metal is opaque (opacityMode \"presence\" makes holes in it)")
     elif opacity != 1:
         out.transmission = 1 - opacity
         if opacity == 0:
@@ -37,6 +39,10 @@ def surface(shader, reader, losses):
         else:
             losses.name(where, f"opacity {opacity:g} is taken for glass that its diffuseColor tints")
     return out
+
+
+def _is_metal(metallic):
+    return isinstance(metallic, (int, float)) and metallic >= 0.5
 
 
 def _by_specular(out, color, where, losses):

@@ -95,11 +95,11 @@ class Scene:
             if kind != "PortalLight":
                 yield (lambda at: _named(name, lights.node(prim, self._stage, self.document, at))), matrix
         elif prim.IsA(UsdGeom.Mesh) or shapes.is_shape(prim) and kind not in _UNSEEN:
-            mesh = self._mesh(prim)
+            mesh, size = self._mesh(prim)
             if mesh is not None:
                 keys = said(prim, self._stage)
                 extras = {"extras": {"caustique": keys}} if keys else {}
-                yield (lambda _: {"name": name, "mesh": mesh, **extras}), matrix
+                yield (lambda _: {"name": name, "mesh": mesh, **extras}), Gf.Matrix4d().SetScale(size) * matrix
         elif kind in _UNSEEN:
             self._stage.losses.name(name, f"{_UNSEEN[kind]} not carried: convert to a mesh")
 
@@ -137,16 +137,27 @@ class Scene:
                 yield make, at
 
     def _mesh(self, prim):
-        """The glTF mesh of a Mesh or another shape: one for all instances that wear the same; None if it is empty."""
+        """The glTF mesh of a Mesh or another shape, None if it is empty, and the size that it is shown in: one mesh for all
+        instances, and for all shapes that differ in size alone, that wear the same."""
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         material = self._materials.bound(prim)
         subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
         parts = [(s, self._materials.bound(s.GetPrim()) or material) for s in subsets]
-        key = (source.GetPath(), material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts),
-               self._inherited(prim) if prim.IsInstanceProxy() else ())
+        form, size = (source.GetPath(), self._inherited(prim) if prim.IsInstanceProxy() else ()), 1.0
+        if shapes.is_shape(prim) and not parts and not prim.HasAPI(UsdLux.LightAPI):
+            shape, size = shapes.form(prim, self._stage)
+            form = shape, self._worn_values(prim)
+        key = form, material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts)
         if key not in self._meshes:
-            self._meshes[key] = self._made(prim, material, parts)
-        return self._meshes[key]
+            self._meshes[key] = self._made(prim, material, parts, size)
+        return self._meshes[key], size
+
+    def _worn_values(self, prim):
+        """All primvars that a shape has, or gets from above: names, values and what these are of."""
+        found = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
+        moment = self._stage.time
+        return tuple((primvar.GetName(), primvar.GetInterpolation(), str(primvar.Get(moment)),
+                      str(primvar.GetIndices(moment))) for primvar in found)
 
     def _inherited(self, prim):
         """Primvars that an instance gives its meshes from outside: their names and values."""
@@ -154,7 +165,7 @@ class Scene:
         outside = [primvar for primvar in found if not primvar.GetAttr().GetPrim().IsInstanceProxy()]
         return tuple((primvar.GetName(), str(primvar.Get(self._stage.time))) for primvar in outside)
 
-    def _made(self, prim, material, parts):
+    def _made(self, prim, material, parts, size):
         stage, where, holes = self._stage, prim.GetPath(), ()
         if prim.IsA(UsdGeom.Mesh):
             found = meshes.of_prim(prim, stage)
@@ -164,7 +175,7 @@ class Scene:
             faces, holes = found
             normals = self._normals(prim, faces)
         else:
-            found = shapes.of_prim(prim, stage)
+            found = shapes.of_prim(prim, stage, size)
             if found is None:
                 stage.losses.name(where, f"a {prim.GetTypeName()} is not carried")
                 return None

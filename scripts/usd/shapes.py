@@ -11,10 +11,28 @@ from meshes import Faces
 _SIDES, _RINGS = 64, 32
 
 
-def of_prim(prim, stage):
-    """Faces of a Sphere, Cube, Cylinder, Cone, Capsule or Plane, and their normals at each corner; None of others."""
+# Of shapes that differ in size alone: the attribute that says it, and its usual value.
+_SIZES = {"Sphere": ("radius", 1.0), "Cube": ("size", 2.0)}
+# What else makes a shape.
+_ATTRIBUTES = ("radius", "radiusTop", "radiusBottom", "height", "size", "width", "length", "axis")
+
+
+def form(prim, stage):
+    """What shapes that are copies of each other have in common, and the size of this one."""
     kind = prim.GetTypeName()
-    get = lambda name, default: float(stage.get(prim.GetAttribute(name), default))
+    if kind in _SIZES:
+        name, usual = _SIZES[kind]
+        size = float(stage.get(prim.GetAttribute(name), usual)) / usual
+        if size > 0:
+            return (kind,), size
+    return (kind, *(stage.get(prim.GetAttribute(name)) for name in _ATTRIBUTES)), 1.0
+
+
+def of_prim(prim, stage, size=1.0):
+    """Faces of a Sphere, Cube, Cylinder, Cone, Capsule or Plane, its lengths divided by a size, and their normals at each
+    corner; None of others."""
+    kind = prim.GetTypeName()
+    get = lambda name, default: float(stage.get(prim.GetAttribute(name), default)) / size
     if kind == "Cube":
         return _cube(prim.GetPath(), get("size", 2.0) / 2)
     if kind == "Plane":

@@ -37,11 +37,16 @@ class Stage:
             self.losses.name(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
                              f"composition: {text_of(error)}")
         self.time = self._moment(frame)
-        self.metres = UsdGeom.GetStageMetersPerUnit(self.stage)
+        # USD's own function refuses a number that is no double.
+        said = self.stage.HasAuthoredMetadata("metersPerUnit") and self.stage.GetMetadata("metersPerUnit")
+        self.metres = said if isinstance(said, float) else UsdGeom.GetStageMetersPerUnit(self.stage)
         if not _LEAST <= self.metres <= _MOST:
             raise Fault("/", f"metersPerUnit is {self.metres}", "it has to be a number above zero")
         self.by_blender = (self.stage.GetRootLayer().documentation or "").startswith("Blender v4.")
-        self.z_up = UsdGeom.GetStageUpAxis(self.stage) == UsdGeom.Tokens.z
+        axis = UsdGeom.GetStageUpAxis(self.stage)
+        if axis not in (UsdGeom.Tokens.y, UsdGeom.Tokens.z):
+            self.losses.name("/", f"upAxis is {axis}, which is neither Y nor Z: Y is up (turn the stage by a transform)")
+        self.z_up = axis == UsdGeom.Tokens.z
         self.to_world = self._axes() * Gf.Matrix4d().SetScale(self.metres)
         self._bake_skins()
 

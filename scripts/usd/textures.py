@@ -13,6 +13,8 @@ from PIL import Image
 from faults import Fault
 
 _MIMES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+# Of what Pillow reads, nothing that runs another program, as EPS does.
+_FORMATS = ("PNG", "JPEG", "TIFF", "TGA", "BMP", "WEBP")
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3, "x": 0, "y": 1, "z": 2, "w": 3}
 
 
@@ -45,10 +47,10 @@ class Textures:
         """An image (index) that glTF decodes from sRGB, and the factor to it (3 numbers)."""
         data, name = self._file(texture)
         scale, bias = texture.scale[:3], texture.bias[:3]
-        texels, srgb = self._load(texture)
+        srgb = self._is_srgb(texture)
         if texture.channel == "rgb" and not any(bias) and max(scale) <= 1 and srgb and _mime(data):
             return self._document.image(data, _mime(data), name), list(scale)
-        values = self._linear(texels, srgb, texture)
+        values = self._linear(self._load(texture), srgb)
         if texture.channel != "rgb":
             values = numpy.repeat(self._channel(texture, values), 3, axis=2)
         else:
@@ -67,14 +69,13 @@ class Textures:
     def normals(self, texture):
         """An image of normals, and their strength."""
         data, name = self._file(texture)
-        texels, _ = self._load(texture)
         standard = texture.scale[:3] in ((1.0,) * 3, (2.0,) * 3)
         if texture.channel == "rgb" and _mime(data) and standard:
             return self._document.image(data, _mime(data), name), 1.0
         scale, bias = texture.scale[:3], texture.bias[:3]
         if scale[0] == scale[1] and scale[2] == 2.0 and bias == (-1.0,) * 3 and _mime(data):
             return self._document.image(data, _mime(data), name), scale[0] / 2
-        values = _colors(texels) * scale + bias
+        values = _colors(self._load(texture)) * scale + bias
         return self._png(values * 0.5 + 0.5, name), 1.0
 
     def packed(self, parts):
@@ -90,17 +91,15 @@ class Textures:
     def with_alpha(self, base, alpha):
         """An image of colour (a texture, or 3 numbers) with a presence; the factor to its colour."""
         data, name = self._file(alpha)
-        texels, srgb = self._load(alpha)
         same = not isinstance(base, tuple) and base.asset == alpha.asset and alpha.channel == "a"
-        if same and srgb and _mime(data) == "image/png" and base.channel == "rgb" and not any(base.bias) \
+        if same and self._is_srgb(alpha) and _mime(data) == "image/png" and base.channel == "rgb" and not any(base.bias) \
                 and max(base.scale) <= 1 and alpha.scale[3] == 1 and not alpha.bias[3]:
             return self._document.image(data, "image/png", name), list(base.scale[:3])
         presence = self.values(alpha)
         if isinstance(base, tuple):
             color, factor = numpy.ones((*presence.shape, 3)), list(base)
         else:
-            texels, srgb = self._load(base)
-            values = self._linear(texels, srgb, base)
+            values = self._linear(self._load(base), self._is_srgb(base))
             values = (_colors(values) * base.scale[:3] + base.bias[:3] if base.channel == "rgb" else
                       numpy.repeat(self._channel(base, values), 3, axis=2))
             color, factor = _to_srgb(values), [1.0] * 3
@@ -110,21 +109,22 @@ class Textures:
 
     def values(self, texture):
         """The numbers (height, width) of one channel of a texture."""
-        texels, srgb = self._load(texture)
-        values = self._channel(texture, self._linear(texels, srgb, texture))[:, :, 0]
+        values = self._channel(texture, self._linear(self._load(texture), self._is_srgb(texture)))[:, :, 0]
         self._clip(texture, values)
         return values
 
     def data_as_is(self, texture, at):
         """The image itself where its channel `at` (glTF's) holds what the texture gives; else None."""
         data, name = self._file(texture)
-        texels, srgb = self._load(texture)
         channel = 0 if texture.channel == "rgb" else _CHANNELS[texture.channel]
-        grey = texels.shape[2] < 3 or (channel < 3 and (texels[:, :, :3] == texels[:, :, :1]).all())
-        plain = texture.scale[channel] == 1 and texture.bias[channel] == 0 and not srgb
-        if plain and _mime(data) and (channel == at or grey):
+        plain = texture.scale[channel] == 1 and texture.bias[channel] == 0 and not self._is_srgb(texture)
+        if plain and _mime(data) and (channel == at or self._is_grey(texture, channel)):
             return self._document.image(data, _mime(data), name)
         return None
+
+    def _is_grey(self, texture, channel):
+        texels = self._load(texture)
+        return texels.shape[2] < 3 or (channel < 3 and (texels[:, :, :3] == texels[:, :, :1]).all())
 
     def _channel(self, texture, values):
         at = 0 if texture.channel == "rgb" else _CHANNELS[texture.channel]
@@ -145,16 +145,27 @@ class Textures:
         return self._data[path]
 
     def _load(self, texture):
-        """Texels (height, width, channels) as the file has them, 0 to 1 of integers; whether they are sRGB."""
+        """Texels (height, width, channels) as the file has them, 0 to 1 of integers."""
+        return _scaled(*self._decoded(texture))[0]
+
+    def _decoded(self, texture):
         data, name = self._file(texture)
         if name not in self._texels:
-            self._texels[name] = read(data, name, texture.prim.GetPath())
-        texels, bits = self._texels[name]
-        # The specification: images of 8 bits and three channels or more are sRGB unless they are said to be raw.
-        srgb = texture.space == "sRGB" or (texture.space == "auto" and bits == 8 and texels.shape[2] >= 3)
-        return texels, srgb
+            self._texels[name] = _decode(data, name, texture.prim.GetPath())
+        return self._texels[name]
 
-    def _linear(self, texels, srgb, texture):
+    def _is_srgb(self, texture):
+        """Whether an image holds sRGB: with 8 bits and three channels or more, says the specification, unless it is said
+        to be raw."""
+        if texture.space != "auto":
+            return texture.space == "sRGB"
+        channels = _channels_of_8_bits(self._file(texture)[0])
+        if channels is None:
+            texels, bits = self._decoded(texture)
+            channels = texels.shape[2] if bits == 8 and texels.ndim == 3 else 1
+        return channels >= 3
+
+    def _linear(self, texels, srgb):
         if not srgb:
             return texels
         colors = min(texels.shape[2], 3)
@@ -170,22 +181,43 @@ class Textures:
 
 def read(data, name, where):
     """Texels (height, width, channels; grey, grey and alpha, or colours) of the bytes of a file, and bits a channel."""
+    return _scaled(*_decode(data, name, where))
+
+
+def _channels_of_8_bits(data):
+    """How many channels the header of an image of 8 bits tells; None of others."""
+    try:
+        with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+            return {"L": 1, "LA": 2, "RGB": 3, "RGBA": 4}.get(image.mode)
+    except Exception:  # decoding it tells what is wrong
+        return None
+
+
+def _scaled(texels, bits):
+    """Texels in double precision, integers from 0 to 1, with an axis of channels; and bits a channel."""
+    scale = 1.0 if texels.dtype.kind == "f" else 2.0 ** bits - 1
+    texels = texels.astype(numpy.float64) / scale
+    return (texels[:, :, None] if texels.ndim == 2 else texels), bits
+
+
+def _decode(data, name, where):
+    """Texels as the file has them, and bits a channel."""
     if data[:4] == b"\x76\x2f\x31\x01":
         return _read_exr(data, where), 32
     try:
-        image = Image.open(io.BytesIO(data))
+        image = Image.open(io.BytesIO(data), formats=_FORMATS)
         if image.mode in ("P", "CMYK", "YCbCr", "1"):
             image = image.convert("RGBA" if "transparency" in image.info else "RGB")
         texels = numpy.asarray(image)
+    except MemoryError:
+        raise
     except Exception as error:  # whatever Pillow raises about bytes that come from anywhere
         raise Fault(where, f"the image {os.path.basename(name)} cannot be read: {error}",
                     "save it as PNG, JPEG or OpenEXR")
     bits = 8 if texels.dtype == numpy.uint8 else 16
     if texels.dtype.kind not in "ui" and texels.dtype != numpy.float32:
         raise Fault(where, f"the image {os.path.basename(name)} has texels of {texels.dtype}", "save it with 8 bits")
-    scale = 1.0 if texels.dtype == numpy.float32 else 2.0 ** bits - 1
-    texels = texels.astype(numpy.float64) / scale
-    return (texels[:, :, None] if texels.ndim == 2 else texels), bits
+    return texels, bits
 
 
 def _read_exr(data, where):
@@ -198,8 +230,7 @@ def _read_exr(data, where):
             raise Fault(where, f"the OpenEXR image cannot be read: {error}", "write it again")
         for name in ("RGBA", "RGB", "Y"):
             if name in channels:
-                texels = channels[name].pixels.astype(numpy.float64)
-                return texels[:, :, None] if texels.ndim == 2 else texels
+                return channels[name].pixels
     raise Fault(where, "the OpenEXR image has neither RGB nor Y", "write it with channels R, G and B")
 
 

@@ -111,6 +111,18 @@ class Faults(usd_support.Stages):
             (textured(BASE.format("q"), FILE, "float3 outputs:q"), "/Material/Texture: it has no output q"),
         )
 
+    def test_images_are_of_the_formats_that_are_meant(self):
+        # Pillow hands EPS to Ghostscript, whatever the file is called.
+        program = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 2 2\n%%EndComments\nshowpage\n"
+        (self.dir / "e.png").write_bytes(program)
+        text = textured(BASE.format("rgb"), 'asset inputs:file = @e.png@\ntoken inputs:sourceColorSpace = "raw"',
+                        "float3 outputs:rgb")
+        self.assertIn("the image e.png cannot be read: ", self.outcome(text))
+
+    def test_axes_that_are_none(self):
+        self.assertEqual(self.outcome('(\nupAxis = "X"\n)'),
+                         "/: upAxis is X, which is neither Y nor Z: Y is up (turn the stage by a transform)")
+
     def test_bytes_that_are_no_text(self):
         self.check(
             (b'def Sphere "S" { custom string caustique:name = "\xff" }', "not UTF-8"),

@@ -59,6 +59,12 @@ class Materials(usd_support.Stages):
         shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set("presence")
         self.assertEqual(self.convert()[0]["materials"][0]["alphaMode"], "BLEND")
 
+    def test_metal_stays_opaque_and_is_told_so(self):
+        found, lost = self.worn(opacity=0.5, metallic=1.0)
+        self.assertNotIn("KHR_materials_transmission", found.get("extensions", {}))
+        self.assertEqual(lost, ['/Material/Shader: opacity 0.5 is not carried: metal is opaque (opacityMode "presence" '
+                                "makes holes in it)"])
+
     def test_glass_on_a_mesh_with_holes_is_a_pane(self):
         pane = self.mesh("/Pane", [(0, 0, 0), (1, 0, 0), (1, 1, 0)], [3], [0, 1, 2])
         self.stage.RemovePrim("/Cube")

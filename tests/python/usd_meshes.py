@@ -155,6 +155,25 @@ class Meshes(usd_support.Stages):
                     self.assertEqual("XYZ"[widest], mesh["name"][-1])
 
 
+    def test_shapes_alike_but_for_their_size_share_a_mesh(self):
+        for at, radius in enumerate((1.0, 2.5, 0.1)):
+            ball = UsdGeom.Sphere.Define(self.stage, f"/Ball{at}")
+            ball.CreateRadiusAttr(radius)
+            UsdGeom.Cube.Define(self.stage, f"/Cube{at}").CreateSizeAttr(radius)
+            UsdGeom.Cylinder.Define(self.stage, f"/Cylinder{at}").CreateRadiusAttr(radius)
+        ball.CreateDisplayColorAttr([Gf.Vec3f(1, 0, 0)])
+        document, buffer, _ = self.convert()
+        nodes = {node["name"]: node for node in document["nodes"]}
+        mesh_of = lambda name: nodes[name]["mesh"]
+        self.assertEqual(mesh_of("/Ball0"), mesh_of("/Ball1"))
+        self.assertNotEqual(mesh_of("/Ball0"), mesh_of("/Ball2"))
+        self.assertEqual(len({mesh_of(f"/Cube{at}") for at in range(3)}), 1)
+        self.assertEqual(len({mesh_of(f"/Cylinder{at}") for at in range(3)}), 3)
+        for name, reach in (("/Ball0", 1), ("/Ball1", 2.5), ("/Ball2", 0.1), ("/Cube1", 1.25), ("/Cylinder1", 2.5)):
+            place = corners(document, buffer, mesh_of(name))["POSITION"].reshape(-1, 3)
+            self.assertAlmostEqual(abs(place[:, 0]).max() * nodes[name]["matrix"][0], reach, 5, name)
+
+
 class Places(usd_support.Stages):
     def matrices(self, **options):
         """World matrices of the nodes with meshes, by name, as points are multiplied by them from the right."""

@@ -1,7 +1,14 @@
 """The program on stages: render, plan, info and frames, faults as errors, and the layer that tells of an EXR."""
 
+import contextlib
+import json
+import os
+import signal
+import subprocess
 import sys
+import time
 import unittest
+from pathlib import Path
 
 import numpy
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender, UsdUtils, UsdValidation
@@ -38,6 +45,55 @@ class Program(usd_support.Stages):
         support.run(["render", self.dir / "out.glb", "-o", self.out, *QUICK], check=0)
         numpy.testing.assert_array_equal(ours, usd_support.read_exr(self.out))
         self.assertGreater(ours.mean(), 0.4)
+
+    def endless(self):
+        """Makes the path that of a stage of 2^30 prims, by references to references."""
+        both = "".join(f'def "{side}" (\nreferences = </A{{1}}>\n) {{{{}}}}\n' for side in "lr")
+        levels = "".join('def "A{0}" {{\n'.format(at) + both.format(at, at + 1) + "}\n" for at in range(30))
+        self.path = self.dir / "endless.usda"
+        self.path.write_text("#usda 1.0\n" + levels + 'def Sphere "A30" {}\n')
+
+    def converters(self):
+        """Processes that convert the stage."""
+        lines = []
+        for entry in Path("/proc").glob("[0-9]*/cmdline"):
+            with contextlib.suppress(OSError):
+                lines.append(entry.read_bytes())
+        return [line for line in lines if b"convert.py" in line and str(self.path).encode() in line]
+
+    def until(self, what):
+        end = time.monotonic() + 60
+        while not what():
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.02)
+
+    def test_a_killed_program_leaves_nothing_of_its_converter(self):
+        self.endless()
+        for word in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT):
+            with self.subTest(word.name):
+                program = subprocess.Popen([support.binary(), "info", self.path], env={**os.environ, "TMPDIR": self.dir},
+                                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                self.until(lambda: len(self.converters()) == 2)
+                self.assertEqual(len(list(self.dir.glob("caustique-usd-*"))), 1)
+                program.send_signal(word)
+                self.assertNotEqual(program.wait(), 0)
+                self.until(lambda: not self.converters())
+                self.until(lambda: not list(self.dir.glob("caustique-usd-*")))
+
+    def test_a_conversion_has_limits(self):
+        self.endless()
+        done = self.run_on("info", check=1, env={"CAUSTIQUE_USD_SECONDS": 1, "TMPDIR": self.dir})
+        self.assertIn(f"{self.path}: the conversion takes longer than 1 s\n"
+                      "hint: use a simpler stage, or set CAUSTIQUE_USD_SECONDS to more\n", done.stderr)
+        self.assertEqual((self.converters(), list(self.dir.glob("caustique-usd-*"))), ([], []))
+        done = self.run_on("info", check=2, env={"CAUSTIQUE_USD_SECONDS": "soon"})
+        self.assertIn("CAUSTIQUE_USD_SECONDS: soon is no number of seconds\nhint: ", done.stderr)
+        command = [sys.executable, usd_support.SCRIPTS / "convert.py", self.path, "--arguments", "--guard", "600",
+                   str(150 << 20)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+            fault = json.loads(program.stderr.read().splitlines()[-1])  # while standard input is open
+        self.assertEqual(program.returncode, 1)
+        self.assertRegex(fault["fault"], "memory|MiB are left|bad_alloc|allocat")
 
     def test_every_container_and_command(self):
         self.save()

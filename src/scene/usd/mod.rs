@@ -10,20 +10,23 @@ pub use python::Interpreter;
 use super::description::Description;
 use super::gltf::{self, Frame, ReadOptions};
 use crate::error::{Error, Kind, Result};
+use crate::memory;
 use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
 
 /// Extensions of stages.
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
 /// The converter's files.
-const SOURCES: [(&str, &str); 17] = [
+const SOURCES: [(&str, &str); 18] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
     ("document.py", include_str!("../../../scripts/usd/document.py")),
     ("dome.py", include_str!("../../../scripts/usd/dome.py")),
     ("faults.py", include_str!("../../../scripts/usd/faults.py")),
+    ("guard.py", include_str!("../../../scripts/usd/guard.py")),
     ("lights.py", include_str!("../../../scripts/usd/lights.py")),
     ("materials.py", include_str!("../../../scripts/usd/materials.py")),
     ("materialx.py", include_str!("../../../scripts/usd/materialx.py")),
@@ -75,6 +78,22 @@ pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
     answer::options(&output.stdout, path)
 }
 
+/// Environment variable: how long a conversion may take.
+const SECONDS_VARIABLE: &str = "CAUSTIQUE_USD_SECONDS";
+/// Seconds that it may take otherwise: what takes longer is hardly meant to end.
+const MAX_SECONDS: u32 = 3600;
+
+/// Seconds that a conversion may take.
+fn seconds() -> Result<u32> {
+    let Some(said) = std::env::var_os(SECONDS_VARIABLE) else { return Ok(MAX_SECONDS) };
+    // poll(2) counts milliseconds in 31 bits.
+    let seconds = said.to_str().and_then(|said| said.parse().ok()).filter(|seconds| (1..=2_000_000).contains(seconds));
+    seconds.ok_or_else(|| {
+        let error = Error::new(Kind::Usage, SECONDS_VARIABLE, format!("{} is no number of seconds", said.display()));
+        error.hint("give a whole number from 1 to 2000000, or none")
+    })
+}
+
 /// The converter, laid out in a folder that ends with it.
 struct Converter<'p> {
     stage: &'p Path,
@@ -103,8 +122,17 @@ impl<'p> Converter<'p> {
         if allow_outside {
             command.arg("--allow-outside");
         }
-        let output = command
-            .output()
+        // Zero: nobody tells what is left.
+        let bytes = memory::available().map_or(0, |available| available.bytes);
+        command.arg("--guard").arg(seconds()?.to_string()).arg(bytes.to_string());
+        // A group of its own: Ctrl-C ends this program, and the pipe that closes then ends the converter.
+        command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let run = |command: &mut Command| {
+            let mut child = command.spawn()?;
+            let _open = child.stdin.take();
+            child.wait_with_output()
+        };
+        let output = run(&mut command)
             .map_err(|cause| Error::new(Kind::Library, self.interpreter.path().display(), cause).hint(python::HINT))?;
         if output.status.success() {
             return Ok(output);

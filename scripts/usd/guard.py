@@ -1,0 +1,45 @@
+"""Work in a process of its own, with limits, that ends with the program which asked for it."""
+
+import os
+import resource
+import select
+import shutil
+import signal
+import sys
+
+from faults import Fault
+
+
+def guarded(work, folder, seconds, memory):
+    """Exit code of `work`, which a child does in at most so many seconds and bytes of memory.
+
+    The program that asked for it keeps the other end of standard input open. When that end closes, the program is gone:
+    the child is ended, and `folder` removed.
+    """
+    child = os.fork()
+    if child == 0:
+        if memory:
+            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+        code = work()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    done = os.pidfd_open(child)
+    poll = select.poll()
+    poll.register(done, select.POLLIN)
+    poll.register(sys.stdin.fileno(), select.POLLIN)
+    events = [descriptor for descriptor, _ in poll.poll(seconds * 1000)]
+    if done not in events:
+        os.kill(child, signal.SIGKILL)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if done in events:
+        if code < 0:
+            left = f" ({memory >> 20} MiB are left for it)" if memory else ""
+            raise Fault("", f"the conversion was ended by {signal.Signals(-code).name}{left}",
+                        "use a simpler stage, or a machine with more memory")
+        return code
+    if events:
+        shutil.rmtree(folder, ignore_errors=True)
+        return 1
+    raise Fault("", f"the conversion takes longer than {seconds} s",
+                "use a simpler stage, or set CAUSTIQUE_USD_SECONDS to more")
