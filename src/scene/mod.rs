@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::geometry::Shapes;
 use crate::light::{Emitter, Environment, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
 use description::{CameraDescription, GuessedUnits, Picture};
 use std::path::PathBuf;
@@ -74,6 +74,15 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Distance from the middle of the scene up to which paths from `origin` are as near as can be to all that they may
+    /// bring light from or to: that of the scene, of their first flight, or of where they start; infinite where no
+    /// medium scatters outside of solids.
+    pub fn reach(&self, origin: Vec3) -> f32 {
+        let Some(medium) = self.medium.filter(MediumParameters::scatters) else { return f32::INFINITY };
+        let sky = self.lights.sky();
+        (sky.radius + 1.0 / medium.sigma_t().max_element()).max(origin.distance(sky.center))
+    }
+
     /// Builds a scene; Embree builds with `threads` threads (0: all).
     ///
     /// # Errors

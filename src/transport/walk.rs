@@ -116,6 +116,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         throughput,
         interior,
         survival_scale,
+        reach: if BESIDES >= SCATTERING { scene.reach(origin) } else { f32::INFINITY },
         scattered: None,
         in_medium: false,
         leaving: None,
@@ -169,6 +170,8 @@ struct Path<'a> {
     interior: Interior,
     /// See [`Vertex::survival_scale`].
     survival_scale: f32,
+    /// Distance from the middle of the scene beyond which what it carries matters less and less ([`Scene::reach`]).
+    reach: f32,
     /// How the last vertex has scattered it.
     scattered: Option<Scattered>,
     /// The last vertex lies in a medium.
@@ -219,8 +222,10 @@ impl<'a> Path<'a> {
     /// Scatters it in a medium; `None` ends it.
     #[inline(always)]
     fn medium<V: Visitor<'a>>(&mut self, met: MediumArrival, flight: Flight, visitor: &mut V) -> Option<()> {
-        let Path { depth, wavelength, survival_scale, .. } = *self;
+        let Path { scene, depth, wavelength, survival_scale, reach, .. } = *self;
         let arriving = self.throughput * met.weight;
+        // What light at a distance still brings to the scene, or takes from it, falls with the distance squared.
+        let back = (reach * reach / met.p.distance_squared(scene.lights.sky().center)).min(1.0);
         let draws = self.stream.vertex(depth);
         let vertex = MediumVertex {
             wo: -self.direction,
@@ -234,7 +239,7 @@ impl<'a> Path<'a> {
             opacity: 1.0,
             next_event: 1.0,
             wavelength,
-            survival_scale,
+            survival_scale: survival_scale * back,
         };
         // Where the channel that has brought it here scatters nothing, it carries nothing.
         if !is_lit(vertex.throughput) {

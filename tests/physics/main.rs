@@ -25,6 +25,7 @@ mod merging;
 mod mis;
 mod narrow_spots;
 mod nesting;
+mod open_space;
 mod photon_mapping;
 mod progressive;
 mod shadow_rays;

@@ -1,0 +1,50 @@
+//! Media without an end that absorb nothing: paths wander about for ever unless roulette ends them.
+
+use crate::support;
+
+use caustique::material::MediumParameters;
+use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, photons_per_path, render};
+use caustique::scene::{Description, Scene};
+use support::channels::{SIZE, agree, seeds};
+use support::scenes::{add, build, look_at, matte, point_light, quad, square};
+
+/// A floor under a point light in a medium that fills all space; with `far`, an object lies many mean free paths away.
+fn foggy(far: bool) -> Scene {
+    let mut description = Description::default();
+    description.medium = Some(MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::ONE, g: 0.0 });
+    add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, 1.0), 2.0 * Vec3::X, -2.0 * Vec3::Z), matte(0.5, 0.0));
+    if far {
+        add(&mut description, "far", quad(Vec3::splat(300.0), 0.1 * Vec3::X, 0.1 * Vec3::Z), matte(0.5, 0.0));
+    }
+    description.lights.push(point_light(DVec3::new(0.5, 1.0, 0.0), 5.0));
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 3.0), DVec3::ZERO, 50.0));
+    build(description)
+}
+
+/// Light paths leave some dozens of photons, where there were thousands; so do eye paths.
+#[test]
+fn paths_that_leave_everything_end() {
+    let scene = foggy(false);
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let photons = photons_per_path(&scene, &camera, &Settings { method: Method::Bpm, ..Settings::default() });
+    let gathered = photons_per_path(&scene, &camera, &Settings::default());
+    println!("photons of a path: {photons} on surfaces, {gathered} in all");
+    assert!(gathered > 1.0 && gathered < 100.0, "{gathered}");
+}
+
+/// Something far away makes the scene so wide that hardly a path leaves it: no roulette, and the same light.
+#[test]
+fn roulette_takes_no_light() {
+    let by = |scene: &Scene| -> Vec<Vec<f64>> {
+        let camera = scene.camera(&square(SIZE)).expect("a camera");
+        let of = |seed| -> Rendered {
+            let (method, levels) = (Method::Path, Levels::new(1));
+            let settings =
+                Settings { method, levels, iterations: Some(32), max_depth: 40, seed, ..Settings::default() };
+            render(scene, &camera, &settings, |_, _| Control::Continue)
+        };
+        seeds(Method::Path, 8, of)
+    };
+    agree("open space", &by(&foggy(false)), &by(&foggy(true)), 0.0, 0.15);
+}
