@@ -11,6 +11,8 @@ pub mod installed;
 
 pub mod memory;
 
+pub mod stop;
+
 pub mod math;
 
 pub mod random;

@@ -1,8 +1,9 @@
-//! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end after the current iteration, the second
+//! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end, the second
 //! ends the program at once. Ctrl-C is answered, by a thread of its own: a handler may not print.
 
 use super::say;
 use caustique::error::{Error, Kind, Result};
+use caustique::stop::Stop;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
 use std::path::Path;
@@ -33,7 +34,7 @@ impl Interrupt {
         let mut pressed = Signals::new([SIGINT]).map_err(failed)?;
         let answer = move || {
             if pressed.forever().next().is_some() {
-                say("finishing the iteration; press again to stop now");
+                say("stopping; press again to stop now");
             }
         };
         std::thread::Builder::new().spawn(answer).map_err(failed)?;
@@ -55,6 +56,11 @@ impl Interrupt {
         }
         let cause = "interrupted before the first iteration; nothing is written";
         Err(Error::new(Kind::Interrupted, output.display(), cause))
+    }
+
+    /// What tells a render to end.
+    pub fn stop(&self) -> Stop {
+        Stop::by(Arc::clone(&self.0))
     }
 
     /// Whether a signal came.

@@ -8,6 +8,7 @@ pub mod checkpoint;
 mod deliver;
 mod facts;
 pub mod finish;
+mod hurry;
 mod judge;
 pub mod layers;
 pub mod load;
@@ -42,8 +43,9 @@ use crate::image::exr;
 use crate::plan::{Plan, Switches};
 use crate::render::auto::{self, Choice};
 use crate::render::output::shape;
-use crate::render::{Control, Progress, Rendered, Session, Settings, Spent, Stage, Strategy, drive};
+use crate::render::{Control, Progress, Rendered, Session, Settings, Spent, Stage, StopReason, Strategy, drive};
 use crate::scene::{Scene, View};
+use crate::stop::Stop;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
@@ -112,8 +114,12 @@ pub trait Watch {
     /// # Errors
     /// What is looked at will not do.
     fn loaded(&mut self, scene: &Scene) -> Result<()>;
+    /// What asks for an end, also in the midst of an iteration.
+    fn stop(&self) -> Stop;
     /// An end is asked for.
-    fn stops(&self) -> bool;
+    fn stops(&self) -> bool {
+        self.stop().asked()
+    }
     /// It is decided how to render. An error ends the render before its first iteration.
     ///
     /// # Errors
@@ -197,7 +203,12 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         (Some(_), Some(target)) => (Some(target), Settings { target_error: None, ..settings }),
         _ => (None, settings),
     };
+    let settings = Settings { stop: watch.stop(), ..settings };
+    // Told, but not kept in the header: a clock says so.
+    let kept = plan.warnings.len();
+    plan.warnings.extend(hurry::warn(stage, &settings));
     watch.begins(&plan, &settings);
+    plan.warnings.truncate(kept);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
     let facts = Facts::new(scene, &order.view, &settings)?;
@@ -246,6 +257,10 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
             _ => Control::Continue,
         }
     });
+    if session.iterations() == 0 && stop == StopReason::Interrupted {
+        // There is as much to write as before its beginning.
+        watch.chosen(None)?;
+    }
     if let Some(saver) = &mut saver {
         saver.finish(&session, stop, watch);
     }

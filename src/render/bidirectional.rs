@@ -2,7 +2,9 @@
 //! mapping, vertex connection and merging.
 //!
 //! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its
-//! pixels. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
+//! pixels. Where the film is a window and nothing is merged, the light paths of all other pixels are walked, too: their
+//! light reaches the window as it reaches the whole picture, and so the window's pixels are those of the whole picture
+//! to the bit. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
 //! that have left it, so the sums do not depend on threads; photons are likewise concatenated and wait for the next iteration.
 //!
 //! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone,
@@ -11,12 +13,12 @@
 use super::clock::cpu_seconds;
 use super::guiding::learnt;
 use super::iterate::{Iterate, Work};
-use super::measures::Measures;
+use super::measures::{self, Measures};
 use super::result::Phases;
 use super::settings::Settings;
 use super::techniques::{TechniquePicture, Watch, Watched};
-use super::tiles::{TILE_PIXELS, Tiles};
-use crate::camera::Camera;
+use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
+use crate::camera::{Camera, GROUP};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::light::Guide;
@@ -59,10 +61,11 @@ pub struct Passes<'a> {
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
+    /// Tiles whose light paths are walked, and what those have left; lists that are kept grow but once.
+    sources: Vec<WholeTile>,
+    left: Vec<Deposits>,
     /// Measures of the iteration, by pair.
     measures: Vec<Measures>,
-    /// What the light paths of each tile have left; lists that are kept grow but once.
-    left: Vec<Deposits>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     watched: Watched,
@@ -87,14 +90,15 @@ impl<'a> Passes<'a> {
             let rest = (1, levels.count - 1);
             pairs.push(Pair { light: Domain::LightCorrelated, eye: Domain::EyeCorrelated, levels: rest });
         }
-        let (width, height) = camera.size();
-        let pixels = (width * height) as f32;
+        let tiles = Tiles::new(camera);
+        let sources: Vec<WholeTile> =
+            if strategies.merge { tiles.of_film().collect() } else { tiles.of_whole().collect() };
+        let pixels = light_paths(camera, strategies) as f32;
         let eye = settings.eye(scene, camera, surroundings);
         let merged_paths = pixels * pairs.len() as f32;
         let shared = Bidirectional { eye, surroundings, strategies, light_paths: pixels, merged_paths, only: None };
         let guide = settings.guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);
-        let tiles = Tiles::new(camera);
-        let measures = pairs.iter().map(|pair| Measures::new(tiles.count(), pair.levels.1)).collect();
+        let measures = pairs.iter().map(|pair| Measures::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
         Passes {
             scene,
             camera,
@@ -104,8 +108,9 @@ impl<'a> Passes<'a> {
             guide,
             pairs,
             tiles,
+            left: sources.iter().map(|_| Deposits::default()).collect(),
+            sources,
             measures,
-            left: (0..tiles.count()).map(|_| Deposits::default()).collect(),
             photons: None,
             watched: Watched::new(settings, scene, &tiles),
             covered: 0.0,
@@ -117,9 +122,9 @@ impl<'a> Passes<'a> {
     }
 
     fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
-        let (width, height) = self.camera.size();
         let Settings { seed, max_depth, .. } = *self.settings;
-        let pass = LightPass::new(seed, i, pair.light, width * height, max_depth).guided(guide);
+        let paths = light_paths(self.camera, self.shared.strategies);
+        let pass = LightPass::new(seed, i, pair.light, paths, max_depth).guided(guide);
         // Others put paths together of one hue alone, whichever it is. There each light path is its pixel's own, and
         // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
         if self.shared.strategies.merge {
@@ -139,6 +144,9 @@ impl<'a> Passes<'a> {
             let walk = |tile| {
                 let (mut left, mut arena) = (Deposits::default(), Bump::new());
                 for place in tiles.pixels(tile) {
+                    if shared.eye.is_given_up() {
+                        break;
+                    }
                     arena.reset();
                     let mut vertices = LightVertices::new_in(&arena);
                     shared.light_path(&pass, place.index as u32, true, &mut vertices, &mut left, &mut ());
@@ -150,12 +158,17 @@ impl<'a> Passes<'a> {
         PhotonMap::build(parts.concat())
     }
 
-    /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged.
-    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Work {
+    /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged; `None`
+    /// where it was given up.
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Option<Work> {
         let shared = self.shared;
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
-            self.photons = Some((i - 1, self.photons_of(i - 1)));
+            let photons = self.photons_of(i - 1);
+            if self.settings.stop.gave_up() {
+                return None;
+            }
+            self.photons = Some((i - 1, photons));
         }
         let schedule = self.settings.schedule(i);
         let merged = self.photons.is_some();
@@ -183,28 +196,41 @@ impl<'a> Passes<'a> {
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
             let streams = Streams::in_sequence(seed, i, pair.eye);
-            measures.par_tiles().zip(watches.par_iter_mut()).zip(&mut self.left).enumerate().for_each(
-                |(tile, ((mut measures, watch), left))| {
-                    left.clear();
-                    let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
-                    for places in tiles.groups(tile) {
-                        let mut starts = shared.eye.starts(&places, streams);
-                        for (place, start) in places.iter().flatten().zip(starts.iter_mut().flatten()) {
-                            let index = place.index as u32;
-                            // One wavelength for both, so that they can be connected.
-                            start.0.hue = pass.hue(index);
-                            arena.reset();
-                            let mut vertices = LightVertices::new_in(&arena);
-                            shared.light_path(pass, index, false, &mut vertices, left, &mut ());
-                            let levels = levels(bandwidths[index as usize].bandwidths[0], pair);
-                            let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
-                            watch.begin(place.at, own);
-                            shared.eye_path(&arena, start, &meets, watch, &mut measure);
-                            measures.set(place.at, &measure);
-                        }
+            let mut on_film = measures.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
+            let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
+            self.sources.par_iter().zip(film).zip(&mut self.left).for_each(|((tile, mut film), left)| {
+                left.clear();
+                let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
+                for Group { keys, places } in tiles.all_groups(*tile) {
+                    if shared.eye.is_given_up() {
+                        return;
                     }
-                },
-            );
+                    let mut starts = film.as_ref().map(|_| shared.eye.starts(&places, streams)).unwrap_or_default();
+                    for k in 0..GROUP {
+                        let of_film = places[k].map(|place| place.index);
+                        let Some(index) = (if shared.strategies.merge { of_film } else { keys[k] }) else { continue };
+                        let index = index as u32;
+                        arena.reset();
+                        let mut vertices = LightVertices::new_in(&arena);
+                        shared.light_path(pass, index, false, &mut vertices, left, &mut ());
+                        let (Some((measures, watch)), Some(place), Some(start)) =
+                            (&mut film, &places[k], &mut starts[k])
+                        else {
+                            continue;
+                        };
+                        // One wavelength for both, so that they can be connected.
+                        start.0.hue = pass.hue(index);
+                        let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
+                        let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
+                        watch.begin(place.at, own);
+                        shared.eye_path(&arena, start, &meets, *watch, &mut measure);
+                        measures.set(place.at, &measure);
+                    }
+                }
+            });
+            if self.settings.stop.gave_up() {
+                return None;
+            }
             let splats = SplatsByTile::new(&self.left, &tiles);
             measures.par_tiles().zip(watches.par_iter_mut()).enumerate().for_each(|(tile, (mut measures, watch))| {
                 for splat in splats.of(tile) {
@@ -221,25 +247,20 @@ impl<'a> Passes<'a> {
             self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
-        self.add(i, pixels, watches);
+        let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
+        measures::add(&self.measures, (&shared.eye, i), pixels, |index| tiles.slot(index as u32), groups);
         if shared.strategies.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
-        Work { light_paths: walked, photons: merges, rejected }
+        Some(Work { light_paths: walked, photons: merges, rejected })
     }
+}
 
-    /// Adds the measures of iteration `i` to the pixels.
-    fn add<W: Watch>(&self, i: u64, pixels: &mut [Pixel], watches: &[W]) {
-        let eye = self.eye();
-        pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
-            let slot = self.tiles.slot(index as u32);
-            let measure = self.measures[0].get(slot);
-            pixel.see(i, || eye.seen(&measure));
-            let others = self.measures.get(1).map(|measures| measures.get(slot));
-            let groups = watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
-            pixel.add_with_groups(i, &measure, others.as_ref(), groups);
-        });
-    }
+/// Light paths of a pass: where nothing is merged, as many as the whole picture has pixels, of which the film may be a
+/// window.
+fn light_paths(camera: &Camera, strategies: Strategies) -> u32 {
+    let (width, height) = if strategies.merge { camera.size() } else { camera.whole()[0] };
+    width * height
 }
 
 /// Splats by the tile that they go to, each tile's in the order of the tiles that have left them: whoever adds them, the
@@ -309,7 +330,7 @@ impl Iterate for Passes<'_> {
         self.guide.as_deref()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
         let start = cpu_seconds();
         let mut watched = std::mem::take(&mut self.watched);
         let work = match watched.begin() {

@@ -36,7 +36,7 @@ pub(super) fn passes<'a>(
         Method::Light => pairs(Strategies::LIGHT),
         Method::Bdpt => pairs(Strategies::BDPT),
         Method::Bpm => pairs(Strategies::BPM),
-        Method::Vcm => pairs(Strategies::vcm(camera.connects())),
+        Method::Vcm => pairs(Strategies::VCM),
         Method::Mlt => Box::new(Metropolis::new(scene, camera, settings, surroundings)),
     }
 }

@@ -1,4 +1,5 @@
-//! Clocks and memory of the process. The only clocks of a render are here, and decide nothing but when it stops.
+//! Clocks and memory of the process. The clocks of a render are here and in [`crate::stop`]; they decide nothing but when
+//! it stops.
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};

@@ -7,6 +7,7 @@
 
 use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
+use super::measures::Measures;
 use super::method::Method;
 use super::result::Phases;
 use super::settings::Settings;
@@ -196,7 +197,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     }
 
     /// `maps` holds the photons, or those of each channel.
-    fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &mut [Pixel]) {
+    fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &[Pixel]) {
         let [independent, correlated] =
             [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
         let Counting { sppm, settings, rule, kernel, layout, bandwidths, counts, .. } = self;
@@ -205,11 +206,15 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         let states = layout.count() * maps.len();
         let line = (64 / size_of::<R::Count>().max(1)).max(1);
         let bands = pixels
-            .par_chunks_mut(band(size.0))
+            .par_chunks(band(size.0))
+            .zip(Measures::par_of_paths(sppm.measures(), band(size.0)))
             .zip(bandwidths.par_chunks_mut(band(size.0) * states))
             .zip(counts.par_chunks_mut(band(size.0) * states * each));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
-        par_pixels(bands, size, scratches, |scratches, ((pixels, bandwidths), counts), places| {
+        par_pixels(bands, size, scratches, |scratches, (((pixels, measures), bandwidths), counts), places| {
+            if eye.is_given_up() {
+                return;
+            }
             let waiting = places.iter().flatten().map(|place| {
                 let first = place.at * states;
                 // Those of the first kind, which most pixels see.
@@ -218,7 +223,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 for count in counts.iter().step_by(line).chain(counts.last()) {
                     std::hint::black_box(*count);
                 }
-                pixels[place.at].touch() + f64::from(R::radius2(&bandwidths[first]))
+                f64::from(R::radius2(&bandwidths[first]))
             });
             std::hint::black_box(waiting.sum::<f64>());
             let starts = |[film, streams]: [Streams; 2]| maps[0].tune(eye.starts_through(places, film, streams));
@@ -226,7 +231,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             let correlated = levels.two_paths.then(|| starts(correlated));
             for (k, place) in places.iter().enumerate() {
                 let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
-                let pixel = &mut pixels[place.at];
+                let pixel = &pixels[place.at];
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let counts = &mut counts[place.at * states * each..][..states * each];
                 // Measures some levels by one eye path, with the photons of a channel, and updates them.
@@ -251,8 +256,10 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                         add_photons(others, &measure(pixel, start, channel, 1..count));
                     }
                 }
-                pixel.see(i, || eye.seen(&first));
-                pixel.add(i, &first, others.as_ref());
+                measures.0.set(place.at, &first);
+                if let (Some(into), Some(others)) = (&mut measures.1, &others) {
+                    into.set(place.at, others);
+                }
             }
         });
     }
@@ -296,7 +303,7 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         pixels
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
         let (maps, work) = match &self.channels {
             None => {
                 let (map, work) = self.sppm.map(i, phases);
@@ -308,9 +315,15 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
             }
         };
         let start = cpu_seconds();
+        // Eye paths change them; an iteration that is given up must not have.
+        let before = (self.bandwidths.clone(), self.counts.clone());
         self.eye_pass(i, &maps, pixels);
+        let done = self.sppm.add(i, pixels);
+        if !done {
+            (self.bandwidths, self.counts) = before;
+        }
         phases.eye += cpu_seconds() - start;
-        work
+        done.then_some(work)
     }
 
     fn state(&self) -> postcard::Result<Vec<u8>> {

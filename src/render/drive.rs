@@ -41,7 +41,12 @@ pub fn drive<'a>(
         if session.finished() {
             return StopReason::Iterations;
         }
-        let progress = session.step();
+        // A picture is the least that is wanted: the first iteration may take longer.
+        let left = settings.time.filter(|_| session.iterations() > 0).map(|time| time - session.spent().seconds);
+        if !session.step_within(left) {
+            return if settings.stop.asked() { StopReason::Interrupted } else { StopReason::Time };
+        }
+        let progress = session.progress();
         match observe(&progress, session) {
             Control::Continue => {}
             Control::Stop => return StopReason::Interrupted,

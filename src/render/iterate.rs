@@ -20,8 +20,9 @@ pub(super) struct Work {
 pub(super) trait Iterate {
     /// The pixels before the first iteration.
     fn pixels(&mut self) -> Vec<Pixel>;
-    /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`.
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work;
+    /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`; `None` where it was given up
+    /// ([`Settings::stop`](super::Settings::stop)) and has changed nothing.
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work>;
     /// Squared radii by kind of photons of every pixel and level after the last iteration (square scene units), of
     /// methods where they do not follow from the iteration.
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {

@@ -1,11 +1,13 @@
-//! What an iteration has measured of all pixels, where light of one pixel's paths still arrives in others: one level
-//! takes half the bytes of a measure that has room for all.
+//! What an iteration has measured of all pixels, until it is done: light of one pixel's paths arrives in others, and an
+//! iteration that is given up counts for none of them. One level takes half the bytes of a measure that has room for
+//! all.
 
 use super::method::Method;
-use super::settings::Settings;
+use super::settings::{Levels, Settings};
 use super::tiles::TILE_PIXELS;
+use crate::estimator::Pixel;
 use crate::math::Rgb;
-use crate::transport::{Cause, EyeMeasure, Features, FirstHit};
+use crate::transport::{Cause, Eye, EyeMeasure, Features, FirstHit};
 use rayon::prelude::*;
 use std::mem::size_of;
 
@@ -24,19 +26,16 @@ struct Shared {
 /// What photons bring at a level, or what depends on their bandwidth: caustics, indirect light, light from media.
 type OfLevel = [Rgb; 3];
 
-/// Bytes that an iteration keeps of a pixel besides its sums: nothing where no light arrives in other pixels than a
-/// path's own.
+/// Bytes that an iteration keeps of a pixel besides its sums.
 pub fn bytes_of_measures(settings: &Settings) -> usize {
     let pairs = 1 + usize::from(settings.levels.two_paths);
     match settings.method {
-        Method::Path => 0,
-        method if method.gathers() || method == Method::Pm => 0,
         Method::Mlt => size_of::<EyeMeasure>(),
         _ => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
     }
 }
 
-/// Measures of all pixels, tile by tile.
+/// Measures of all pixels, in the order of the units of work.
 pub(super) struct Measures {
     levels: usize,
     shared: Vec<Shared>,
@@ -44,19 +43,45 @@ pub(super) struct Measures {
 }
 
 impl Measures {
-    /// Of so many tiles and levels; nothing measured yet.
-    pub fn new(tiles: usize, levels: usize) -> Measures {
-        let pixels = tiles * TILE_PIXELS;
+    /// Those of a render whose pixels have two eye paths or one, by path.
+    pub fn of_paths(pixels: usize, levels: Levels) -> Vec<Measures> {
+        if levels.two_paths {
+            vec![Measures::new(pixels, 1), Measures::new(pixels, levels.count.max(2) - 1)]
+        } else {
+            vec![Measures::new(pixels, levels.count)]
+        }
+    }
+
+    /// Of so many pixels and levels; nothing measured yet.
+    pub fn new(pixels: usize, levels: usize) -> Measures {
         let by_level = vec![OfLevel::default(); pixels * levels];
         Measures { levels, shared: vec![Shared::default(); pixels], by_level }
     }
 
     /// Those of each tile.
-    pub fn par_tiles(&mut self) -> impl IndexedParallelIterator<Item = TileMeasures<'_>> {
+    pub fn par_tiles(&mut self) -> impl IndexedParallelIterator<Item = SomeMeasures<'_>> {
+        self.par_parts(TILE_PIXELS)
+    }
+
+    /// Those of each unit of work of so many pixels.
+    pub fn par_parts(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = SomeMeasures<'_>> {
         let levels = self.levels;
-        let by_level = self.by_level.par_chunks_mut(TILE_PIXELS * levels);
-        let tile = move |(shared, by_level)| TileMeasures { levels, shared, by_level };
-        self.shared.par_chunks_mut(TILE_PIXELS).zip(by_level).map(tile)
+        let by_level = self.by_level.par_chunks_mut(pixels * levels);
+        let part = move |(shared, by_level)| SomeMeasures { levels, shared, by_level };
+        self.shared.par_chunks_mut(pixels).zip(by_level).map(part)
+    }
+
+    /// Those of each unit of work of so many pixels, by one or two eye paths.
+    pub fn par_of_paths(
+        all: &mut [Measures],
+        pixels: usize,
+    ) -> impl IndexedParallelIterator<Item = (SomeMeasures<'_>, Option<SomeMeasures<'_>>)> {
+        let (first, others) = all.split_at_mut(1);
+        let first: Vec<_> = first[0].par_parts(pixels).collect();
+        let mut others: Vec<_> =
+            others.iter_mut().flat_map(|others| others.par_parts(pixels).collect::<Vec<_>>()).map(Some).collect();
+        others.resize_with(first.len(), || None);
+        first.into_par_iter().zip(others)
     }
 
     /// The measure of the pixel that is kept at `slot`.
@@ -66,15 +91,15 @@ impl Measures {
     }
 }
 
-/// Measures of the pixels of a tile.
-pub(super) struct TileMeasures<'m> {
+/// Measures of the pixels of a unit of work.
+pub(super) struct SomeMeasures<'m> {
     levels: usize,
     shared: &'m mut [Shared],
     by_level: &'m mut [OfLevel],
 }
 
-impl TileMeasures<'_> {
-    /// The measure at a slot of the tile.
+impl SomeMeasures<'_> {
+    /// The measure at a slot of them.
     #[inline]
     pub fn get(&self, slot: usize) -> EyeMeasure {
         unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
@@ -89,6 +114,24 @@ impl TileMeasures<'_> {
             *into = [measure.caustic_photons[level], measure.indirect_photons[level], measure.volume_photons[level]];
         }
     }
+}
+
+/// Adds iteration `i`, measured by one or two eye paths, to the pixels: the measures that are kept at the pixel's `slot`,
+/// and its light by `groups`.
+pub(super) fn add<'g>(
+    measures: &[Measures],
+    (eye, i): (&Eye<'_>, u64),
+    pixels: &mut [Pixel],
+    slot: impl Fn(usize) -> usize + Sync,
+    groups: impl Fn(usize) -> &'g [[Rgb; 2]] + Sync,
+) {
+    pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
+        let slot = slot(index);
+        let measure = measures[0].get(slot);
+        pixel.see(i, || eye.seen(&measure));
+        let others = measures.get(1).map(|measures| measures.get(slot));
+        pixel.add_with_groups(i, &measure, others.as_ref(), groups(slot));
+    });
 }
 
 #[inline]
@@ -112,7 +155,7 @@ mod tests {
     #[test]
     fn a_measure_comes_back() {
         for levels in [1, 4, MAX_LEVELS] {
-            let mut measures = Measures::new(2, levels);
+            let mut measures = Measures::new(2 * TILE_PIXELS, levels);
             let measure = |at: usize| {
                 let value = |k: usize| Rgb::new(at as f32, k as f32, 0.5);
                 let mut measure = EyeMeasure { emission: value(1), direct: value(2), ..EyeMeasure::default() };

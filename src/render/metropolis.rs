@@ -226,6 +226,9 @@ impl Walks<'_, '_> {
         let mut current = self.state(arena, &mut chain, segments, streams);
         let mut stayed = 0.0;
         for _ in 0..steps {
+            if self.shared.eye.is_given_up() {
+                break;
+            }
             chain.propose();
             let proposal = self.state(arena, &mut chain, segments, streams);
             // Rounding may have put out the path that the chain began with; then any that shines is better.
@@ -296,6 +299,9 @@ impl<'a> Metropolis<'a> {
             .map(|(tile, measures)| {
                 let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Vec::new());
                 for place in tiles.pixels(tile) {
+                    if walks.shared.eye.is_given_up() {
+                        break;
+                    }
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
                     let measure = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
@@ -323,7 +329,7 @@ impl Iterate for Metropolis<'_> {
         self.settings.pixels(self.eye.scene, self.eye.camera)
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
         let started = cpu_seconds();
         let Settings { seed, max_depth, .. } = *self.settings;
         let (width, height) = self.eye.camera.size();
@@ -347,6 +353,9 @@ impl Iterate for Metropolis<'_> {
             .enumerate()
             .map_init(Bump::new, |arena, (number, candidate)| walks.chain(arena, number as u64, candidate, steps))
             .collect();
+        if self.settings.stop.gave_up() {
+            return None;
+        }
         // A step stands for as many paths as there are pixels over steps, and light divided by its importance for `b`.
         let scale = (total / (count * steps) as f64) as f32;
         for Deposit { pixel, part, value } in left.into_iter().flatten() {
@@ -365,6 +374,6 @@ impl Iterate for Metropolis<'_> {
             pixel.add(i, measure, None);
         });
         phases.eye += cpu_seconds() - started;
-        Work { light_paths: u64::from(width) * u64::from(height), photons: 0, rejected }
+        Some(Work { light_paths: u64::from(width) * u64::from(height), photons: 0, rejected })
     }
 }

@@ -1,12 +1,12 @@
-//! One iteration of path tracing. No light arrives in another pixel than its path's, so a pixel's measure is added at
-//! once, and none is kept.
+//! One iteration of path tracing.
 
 use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
+use super::measures::{self, Measures};
 use super::result::Phases;
 use super::settings::Settings;
 use super::techniques::{TechniquePicture, Watch, Watched};
-use super::tiles::Tiles;
+use super::tiles::{TILE_PIXELS, Tiles};
 use crate::estimator::Pixel;
 use crate::random::{Domain, Streams};
 use crate::transport::{Eye, EyeMeasure, path_measure};
@@ -18,6 +18,7 @@ pub(super) struct Paths<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
     tiles: Tiles,
+    measures: [Measures; 1],
     watched: Watched,
 }
 
@@ -25,29 +26,36 @@ impl<'a> Paths<'a> {
     /// Nothing done yet.
     pub fn new(eye: Eye<'a>, settings: &'a Settings) -> Paths<'a> {
         let tiles = Tiles::new(eye.camera);
-        Paths { eye, settings, tiles, watched: Watched::new(settings, eye.scene, &tiles) }
+        let measures = [Measures::new(tiles.count() * TILE_PIXELS, 1)];
+        Paths { eye, settings, tiles, measures, watched: Watched::new(settings, eye.scene, &tiles) }
     }
 
-    /// Adds iteration `i` (from 1) to all pixels.
-    fn pass<W: Watch>(&self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) {
+    /// Adds iteration `i` (from 1) to all pixels; false where it was given up.
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> bool {
         let (eye, tiles) = (self.eye, self.tiles);
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
-        let parts = tiles.cut(pixels).into_par_iter().zip(watches);
-        parts.enumerate().for_each(|(tile, (mut pixels, watch))| {
-            let mut arena = Bump::new();
+        let parts = self.measures[0].par_tiles().zip(watches.par_iter_mut());
+        parts.enumerate().for_each(|(tile, (mut measures, watch))| {
+            let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
             for places in tiles.groups(tile) {
+                if eye.is_given_up() {
+                    return;
+                }
                 let starts = eye.starts(&places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     arena.reset();
                     watch.begin(place.at, Some(0));
-                    let mut measure = EyeMeasure::default();
                     path_measure(&eye, &arena, start, watch, &mut measure);
-                    let pixel = pixels.at(place.at);
-                    pixel.see(i, || eye.seen(&measure));
-                    pixel.add_with_groups(i, &measure, None, watch.groups(place.at));
+                    measures.set(place.at, &measure);
                 }
             }
         });
+        if self.settings.stop.gave_up() {
+            return false;
+        }
+        let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
+        measures::add(&self.measures, (&eye, i), pixels, |index| tiles.slot(index as u32), groups);
+        true
     }
 }
 
@@ -56,16 +64,16 @@ impl Iterate for Paths<'_> {
         self.settings.pixels(self.eye.scene, self.eye.camera)
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
         let start = cpu_seconds();
         let mut watched = std::mem::take(&mut self.watched);
-        match watched.begin() {
+        let done = match watched.begin() {
             Some(watches) => self.pass(i, pixels, watches),
             None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
-        }
+        };
         self.watched = watched;
         phases.eye += cpu_seconds() - start;
-        Work { light_paths: 0, photons: 0, rejected: 0 }
+        done.then_some(Work { light_paths: 0, photons: 0, rejected: 0 })
     }
 
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {

@@ -14,6 +14,7 @@
 
 use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
+use super::measures::{self, Measures};
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::trace_some;
@@ -26,7 +27,6 @@ use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::transport::{Bandwidths, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
 use bumpalo::Bump;
-use rayon::prelude::*;
 
 /// Light paths traced between two looks at the memory.
 const BATCH: u32 = 1 << 16;
@@ -106,13 +106,15 @@ pub(super) struct Pm<'a> {
     maps: Option<PhotonMaps>,
     /// The light paths of the maps are counted.
     counted: bool,
+    measures: [Measures; 1],
 }
 
 impl<'a> Pm<'a> {
     /// Nothing done yet.
     pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &'a Settings, surroundings: &'a Surroundings) -> Pm<'a> {
         let eye = settings.eye(scene, camera, surroundings);
-        Pm { eye, settings, surroundings, maps: None, counted: false }
+        let measures = [Measures::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
+        Pm { eye, settings, surroundings, maps: None, counted: false, measures }
     }
 
     /// The maps, how many light paths they are of, and what was left out.
@@ -120,7 +122,8 @@ impl<'a> Pm<'a> {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
         let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
-            .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons);
+            .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons)
+            .stopped_by(&self.settings.stop);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
         let (photons, traced, lost) = trace(self.eye.scene, self.surroundings, &pass, most);
         phases.light += cpu_seconds() - start;
@@ -137,11 +140,14 @@ impl Iterate for Pm<'_> {
         self.settings.pixels(self.eye.scene, self.eye.camera)
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
         let (maps, traced, rejected) = match self.maps.take() {
             Some(maps) => (maps, 0, 0),
             None => self.build(phases),
         };
+        if self.settings.stop.gave_up() {
+            return None;
+        }
         let start = cpu_seconds();
         let (eye, camera) = (&self.eye, self.eye.camera);
         let count = match self.settings.initial {
@@ -152,27 +158,33 @@ impl Iterate for Pm<'_> {
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
-            pixels.par_chunks_mut(band(camera.size().0)),
+            self.measures[0].par_parts(band(camera.size().0)),
             camera.size(),
             scratch,
-            |(scratch, nearest), pixels, places| {
+            |(scratch, nearest), measures, places| {
+                if eye.is_given_up() {
+                    return;
+                }
                 let starts = eye.starts(places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                    let pixel = &mut pixels[place.at];
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    let measure = eye.measure(scratch, start, &maps, None, neighbours, kernel::Box);
-                    pixel.see(i, || eye.seen(&measure));
-                    pixel.add(i, &measure, None);
+                    measures.set(place.at, &eye.measure(scratch, start, &maps, None, neighbours, kernel::Box));
                 }
             },
         );
+        if !self.settings.stop.gave_up() {
+            measures::add(&self.measures, (eye, i), pixels, |index| index, |_| &[]);
+        }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();
         self.maps = Some(maps);
+        if self.settings.stop.gave_up() {
+            return None;
+        }
         // After a pause the maps are made again, of the same paths.
         let (light_paths, rejected) =
             if std::mem::replace(&mut self.counted, true) { (0, 0) } else { (u64::from(traced), rejected) };
-        Work { light_paths, photons, rejected }
+        Some(Work { light_paths, photons, rejected })
     }
 
     fn state(&self) -> postcard::Result<Vec<u8>> {

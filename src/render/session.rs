@@ -73,6 +73,8 @@ pub struct Session<'a> {
     rejected: u64,
     history: Vec<History>,
     next_record: u64,
+    /// The error after the last iteration, where it was wanted.
+    last: Option<ErrorEstimate>,
 }
 
 impl<'a> Session<'a> {
@@ -104,6 +106,7 @@ impl<'a> Session<'a> {
             rejected: 0,
             history: Vec::new(),
             next_record: 1,
+            last: None,
         }
     }
 
@@ -159,14 +162,28 @@ impl<'a> Session<'a> {
         self.next >= self.stage.settings.iterations.unwrap_or(u64::MAX).min(MOST_TERMS)
     }
 
-    /// Adds one iteration.
+    /// Adds one iteration; none where an end was asked for in its midst ([`Settings::stop`]).
     pub fn step(&mut self) -> Progress {
+        self.step_within(None);
+        self.progress()
+    }
+
+    /// The same, which is given up after so many seconds, too; false where it was.
+    pub fn step_within(&mut self, seconds: Option<f64>) -> bool {
         let mut spent = self.spent;
-        let (record, error) = spent.during(|| self.iterate());
+        self.stage.settings.stop.begin(seconds);
+        let done = spent.during(|| self.iterate());
         self.spent = spent;
-        if record {
+        if let Some((true, error)) = done {
             self.record(error);
         }
+        self.last = done.and_then(|(_, error)| error);
+        done.is_some()
+    }
+
+    /// What there is to say after an iteration.
+    pub fn progress(&self) -> Progress {
+        let error = self.last;
         let error = error.or_else(|| self.history.last().and_then(|moment| moment.estimate));
         let settings = &self.stage.settings;
         let total = self.total();
@@ -210,11 +227,12 @@ impl<'a> Session<'a> {
         (iterations - self.done as f64).max(0.0) * pace
     }
 
-    /// An iteration, and the error where it is wanted: for the history, or to stop the render.
-    fn iterate(&mut self) -> (bool, Option<ErrorEstimate>) {
+    /// An iteration, and the error where it is wanted: for the history, or to stop the render. `None` where it was given
+    /// up.
+    fn iterate(&mut self) -> Option<(bool, Option<ErrorEstimate>)> {
         let settings = &self.stage.settings;
         // Iterations count from 1; pass 0 is the pilot's.
-        let work = self.passes.iterate(self.next + 1, &mut self.pixels, &mut self.phases);
+        let work = self.passes.iterate(self.next + 1, &mut self.pixels, &mut self.phases)?;
         self.next += settings.shard.count;
         self.done += 1;
         self.light_paths += work.light_paths;
@@ -223,7 +241,7 @@ impl<'a> Session<'a> {
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = self.done >= self.next_record || Some(self.done) == self.total();
         let wanted = record || settings.target_error.is_some();
-        (record, if wanted { self.estimate() } else { None })
+        Some((record, if wanted { self.estimate() } else { None }))
     }
 
     fn record(&mut self, estimate: Option<ErrorEstimate>) {

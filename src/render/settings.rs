@@ -12,6 +12,7 @@ use crate::photon::ByKind;
 use crate::photon::kernel;
 use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
+use crate::stop::Stop;
 use crate::transport::{Eye, Indirect, MAX_LEVELS, Surroundings};
 use serde::{Deserialize, Serialize};
 
@@ -137,6 +138,9 @@ pub struct Settings {
     pub target_error: Option<f64>,
     /// Part of the iterations to render.
     pub shard: Shard,
+    /// What ends an iteration that is under way.
+    #[serde(skip)]
+    pub stop: Stop,
 }
 
 impl Default for Settings {
@@ -163,6 +167,7 @@ impl Default for Settings {
             time: None,
             target_error: None,
             shard: Shard { index: 0, count: 1 },
+            stop: Stop::default(),
         }
     }
 }
@@ -197,9 +202,11 @@ impl Settings {
     }
 
     /// The eye of a render with these settings.
-    pub(super) fn eye<'a>(&self, scene: &'a Scene, camera: &'a Camera, surroundings: &Surroundings) -> Eye<'a> {
+    pub(super) fn eye<'a>(&'a self, scene: &'a Scene, camera: &'a Camera, surroundings: &Surroundings) -> Eye<'a> {
         let Settings { max_depth, indirect, classes, .. } = *self;
-        Eye { scene, camera, interior: surroundings.eye, max_depth, indirect, classes }
+        // Pictures per technique are summed at once, and cannot do without part of an iteration.
+        let stop = (!self.techniques).then_some(&self.stop);
+        Eye { scene, camera, interior: surroundings.eye, max_depth, indirect, classes, stop }
     }
 
     /// What makes its pixels before the first iteration, from their largest initial bandwidths.

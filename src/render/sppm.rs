@@ -7,6 +7,7 @@ use super::chunks::chunks;
 use super::clock::cpu_seconds;
 use super::guiding::learnt;
 use super::iterate::{Iterate, Work};
+use super::measures::{self, Measures};
 use super::region::region;
 use super::result::Phases;
 use super::settings::{KernelChoice, Settings};
@@ -19,7 +20,9 @@ use crate::photon::{ByKind, Kernel, Kind, PhotonMap, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
-use crate::transport::{EqualFlux, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
+use crate::transport::{
+    EqualFlux, Eye, Indirect, LevelRadii, LightPass, PathStart, Photons, Scratch, Surroundings, light_path,
+};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -31,17 +34,17 @@ pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPas
 
 /// Traces some of the light paths of a pass.
 pub(super) fn trace_some(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, paths: Range<u32>) -> Photons {
-    trace_by(paths, |arena, index, photons| {
+    trace_by(pass, paths, |arena, index, photons| {
         light_path(scene, arena, surroundings, pass, index, photons);
     })
 }
 
-/// Calls `light_path` for some paths; photons are in the order of paths.
-fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync) -> Photons {
+/// Calls `light_path` for some paths of a pass; photons are in the order of paths.
+fn trace_by(pass: &LightPass, paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync) -> Photons {
     let parts: Vec<Photons> = chunks(paths.len() as u32)
         .map_init(Bump::new, |arena, part| {
             let mut photons = Photons::default();
-            for index in part {
+            for index in part.take_while(|index| !pass.is_given_up(*index)) {
                 light_path(arena, paths.start + index, &mut photons);
                 arena.reset();
             }
@@ -57,14 +60,14 @@ fn trace_by(paths: Range<u32>, light_path: impl Fn(&mut Bump, u32, &mut Photons)
     photons
 }
 
-/// One eye pass: adds iteration `i` (from 1) to all pixels.
+/// One eye pass: measures iteration `i` (from 1) of all pixels.
 fn eye_pass(
     eye: &Eye<'_>,
     settings: &Settings,
     i: u64,
     later2: f32,
     maps: &Maps,
-    pixels: &mut [Pixel],
+    (pixels, measures): (&[Pixel], &mut [Measures]),
     kernel: impl Kernel,
 ) {
     let photons = &maps.surface;
@@ -73,36 +76,33 @@ fn eye_pass(
     let schedule = settings.schedule(i);
     let [independent, correlated] =
         [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::in_sequence(settings.seed, i, domain));
-    par_pixels(pixels.par_chunks_mut(band(size.0)), size, Scratch::default, |scratch, pixels, places| {
-        let waiting = places.iter().flatten().map(|place| pixels[place.at].touch()).sum::<f64>();
-        std::hint::black_box(waiting);
+    let band = band(size.0);
+    let bands = pixels.par_chunks(band).zip(Measures::par_of_paths(measures, band));
+    par_pixels(bands, size, Scratch::default, |scratch, (pixels, (measures, others)), places| {
+        if eye.is_given_up() {
+            return;
+        }
         let independent = maps.tune(eye.starts(places, independent));
         let correlated = levels.two_paths.then(|| maps.tune(eye.starts(places, correlated)));
         for (k, place) in places.iter().enumerate() {
             let (Some(place), Some(start)) = (place, &independent[k]) else { continue };
-            let pixel = &mut pixels[place.at];
+            let pixel = &pixels[place.at];
             let radii = |range: Range<usize>| {
                 pixel.bandwidths.map(|bandwidth| {
                     let radii2 = range.clone().map(|level| schedule.radius2(bandwidth, level));
                     LevelRadii::new(radii2).later(later2 * schedule.factor2())
                 })
             };
-            match correlated.as_ref().and_then(|starts| starts[k].as_ref()) {
-                Some(correlated) => {
-                    let volume = maps.volume(pixel, 0..1);
-                    let independent = eye.measure(scratch, start, photons, volume, &radii(0..1), kernel);
-                    let others = usize::from(levels.count > 1)..levels.count;
-                    let volume = maps.volume(pixel, others.clone());
-                    let correlated = eye.measure(scratch, correlated, photons, volume, &radii(others), kernel);
-                    pixel.see(i, || eye.seen(&independent));
-                    pixel.add(i, &independent, Some(&correlated));
+            let mut measure = |start: &(PathStart, _), levels: Range<usize>| {
+                let volume = maps.volume(pixel, levels.clone());
+                eye.measure(scratch, start, photons, volume, &radii(levels), kernel)
+            };
+            match (correlated.as_ref().and_then(|starts| starts[k].as_ref()), &mut *others) {
+                (Some(correlated), Some(others)) => {
+                    measures.set(place.at, &measure(start, 0..1));
+                    others.set(place.at, &measure(correlated, usize::from(levels.count > 1)..levels.count));
                 }
-                None => {
-                    let volume = maps.volume(pixel, 0..levels.count);
-                    let all = eye.measure(scratch, start, photons, volume, &radii(0..levels.count), kernel);
-                    pixel.see(i, || eye.seen(&all));
-                    pixel.add(i, &all, None);
-                }
+                _ => measures.set(place.at, &measure(start, 0..levels.count)),
             }
         }
     });
@@ -118,6 +118,8 @@ pub(super) struct Sppm<'a> {
     region: Option<Region>,
     /// Largest initial bandwidth, squared, beyond an eye path's first broad bounce.
     later2: f32,
+    /// Of the iteration, by eye path.
+    measures: Vec<Measures>,
 }
 
 impl<'a> Sppm<'a> {
@@ -132,7 +134,8 @@ impl<'a> Sppm<'a> {
         let guided = settings.guided && !settings.of_photons(&scene.survey).is_empty();
         let region = region(&eye, settings.seed);
         let guide = guided.then(|| learnt(&eye, surroundings, settings, region)).flatten();
-        Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY }
+        let measures = Measures::of_paths(camera.size().0 as usize * camera.size().1 as usize, settings.levels);
+        Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY, measures }
     }
 
     /// Eye paths.
@@ -143,6 +146,20 @@ impl<'a> Sppm<'a> {
     /// Kinds of photons that there are.
     pub fn kinds(&self) -> ByKind<bool> {
         self.settings.kinds(&self.eye.scene.survey)
+    }
+
+    /// What an iteration is to measure.
+    pub fn measures(&mut self) -> &mut [Measures] {
+        &mut self.measures
+    }
+
+    /// Adds iteration `i`, as it is measured, to the pixels; false where it was given up.
+    pub fn add(&self, i: u64, pixels: &mut [Pixel]) -> bool {
+        let done = !self.settings.stop.gave_up();
+        if done {
+            measures::add(&self.measures, (&self.eye, i), pixels, |index| index, |_| &[]);
+        }
+        done
     }
 
     /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
@@ -156,10 +173,11 @@ impl<'a> Sppm<'a> {
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
             let pass = pass
                 .with(Comb::new(seed, i))
+                .stopped_by(&self.settings.stop)
                 .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons);
             let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
-                trace_by(0..each, |arena, index, photons| {
+                trace_by(&pass, 0..each, |arena, index, photons| {
                     flux.light_path(self.eye.scene, arena, self.surroundings, &pass, index, photons);
                 })
             });
@@ -211,6 +229,7 @@ impl<'a> Sppm<'a> {
             .lighting(self.region)
             .wanting(self.settings.of_photons(&self.eye.scene.survey), self.settings.indirect)
             .with(Comb::new(seed, i))
+            .stopped_by(&self.settings.stop)
     }
 }
 
@@ -242,19 +261,18 @@ impl Iterate for Sppm<'_> {
         self.guide.as_ref()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Work {
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
         let (maps, work) = self.map(i, phases);
         let start = cpu_seconds();
-        match self.settings.kernel {
-            KernelChoice::Box => eye_pass(&self.eye, self.settings, i, self.later2, &maps, pixels, kernel::Box),
-            KernelChoice::Epanechnikov => {
-                eye_pass(&self.eye, self.settings, i, self.later2, &maps, pixels, kernel::Epanechnikov)
-            }
-            KernelChoice::Gaussian => {
-                eye_pass(&self.eye, self.settings, i, self.later2, &maps, pixels, kernel::Gaussian)
-            }
+        let Sppm { eye, settings, later2, measures, .. } = self;
+        let all = (&*pixels, &mut measures[..]);
+        match settings.kernel {
+            KernelChoice::Box => eye_pass(eye, settings, i, *later2, &maps, all, kernel::Box),
+            KernelChoice::Epanechnikov => eye_pass(eye, settings, i, *later2, &maps, all, kernel::Epanechnikov),
+            KernelChoice::Gaussian => eye_pass(eye, settings, i, *later2, &maps, all, kernel::Gaussian),
         }
+        let done = self.add(i, pixels);
         phases.eye += cpu_seconds() - start;
-        work
+        done.then_some(work)
     }
 }

@@ -33,12 +33,9 @@ impl Strategies {
     pub const BDPT: Strategies = Strategies { camera: true, connect: true, merge: false, first_merged: [1, 1] };
     /// Bidirectional photon mapping: every vertex merges, even direct light.
     pub const BPM: Strategies = Strategies { camera: false, connect: false, merge: true, first_merged: [1, 1] };
-
-    /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly, if it can be
-    /// connected to: other strategies do both better, without bias.
-    pub fn vcm(camera_connects: bool) -> Strategies {
-        Strategies { camera: true, connect: true, merge: true, first_merged: [2, if camera_connects { 2 } else { 1 }] }
-    }
+    /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly: other strategies do
+    /// both better, without bias.
+    pub const VCM: Strategies = Strategies { camera: true, connect: true, merge: true, first_merged: [2, 2] };
 
     /// Whether a light path's vertex at `depth` leaves photons.
     #[inline]
@@ -156,11 +153,10 @@ impl Bidirectional<'_> {
         self.only.is_some_and(|only| only.light().is_none_or(|light| light <= depth))
     }
 
-    /// Number of pixels.
+    /// Number of pixels of the whole picture.
     #[inline]
     pub fn pixels(&self) -> f32 {
-        let (width, height) = self.eye.camera.size();
-        width as f32 * height as f32
+        self.eye.camera.whole_pixels()
     }
 }
 

@@ -22,6 +22,7 @@ use crate::medium::Flight;
 use crate::photon::PhotonMap;
 use crate::plan::{LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, mix};
+use crate::stop::Stop;
 use bumpalo::Bump;
 
 /// What an eye path meets.
@@ -33,6 +34,9 @@ pub struct Meets<'a> {
     /// Its bandwidths.
     pub levels: &'a MergeLevels,
 }
+
+/// Vertices between two looks at whether the iteration is given up.
+const LOOK: u32 = 64;
 
 struct EyeWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
@@ -230,6 +234,18 @@ impl<R: Record> EyeWalk<'_, R> {
             self.connect(vertex, light);
         }
     }
+
+    /// What a segment's length does to densities; rays of an orthographic camera do not spread.
+    #[inline]
+    fn distance2(&self, distance: f32, scattered: Option<Scattered>) -> f32 {
+        if scattered.is_none() && self.shared.eye.camera.is_orthographic() { 1.0 } else { distance * distance }
+    }
+
+    /// Whether the work of a path that has grown long is in vain.
+    #[inline]
+    fn is_given_up(&self, depth: u32) -> bool {
+        depth.is_multiple_of(LOOK) && self.shared.eye.stop.is_some_and(Stop::gives_up)
+    }
 }
 
 impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
@@ -239,7 +255,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         look(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
-        self.mis = self.mis.arrive(vertex.distance * vertex.distance, cos).fly(vertex.flight);
+        self.mis = self.mis.arrive(self.distance2(vertex.distance, scattered), cos).fly(vertex.flight);
         if let Some((radiance, density)) =
             eye.scene.lights.emitted(&eye.scene.materials, &self.last, vertex.surface, vertex.wo)
         {
@@ -273,7 +289,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         }
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
         // One that is to run into a light has its end there.
-        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) {
+        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) || self.is_given_up(vertex.depth) {
             return Next::Stop;
         }
         self.last = vertex.receiver();
@@ -290,7 +306,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         }
         self.depth = glow.depth;
         let cos = glow.wo.dot(glow.surface.ng).abs();
-        self.mis = self.mis.arrive(glow.distance * glow.distance, cos).fly(glow.flight);
+        self.mis = self.mis.arrive(self.distance2(glow.distance, scattered), cos).fly(glow.flight);
         self.run_into(
             (glow.throughput * radiance, lights.group_of(&glow.surface)),
             glow.depth,
@@ -315,12 +331,12 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         let Bidirectional { eye, strategies, .. } = self.shared;
         look_in_medium(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
-        self.mis = self.mis.arrive(vertex.met.distance * vertex.met.distance, 1.0).fly(vertex.flight);
+        self.mis = self.mis.arrive(self.distance2(vertex.met.distance, scattered), 1.0).fly(vertex.flight);
         if strategies.connect && vertex.depth < eye.max_depth {
             self.connect_all(vertex);
         }
         self.trail.leave(None);
-        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) {
+        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) || self.is_given_up(vertex.depth) {
             return Next::Stop;
         }
         self.last = vertex.receiver();

@@ -41,6 +41,7 @@ use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::spectrum::{Wavelength, WavelengthSample};
+use crate::stop::Stop;
 use crate::trace::Ray;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::FRAC_1_PI;
@@ -526,9 +527,17 @@ pub struct Eye<'a> {
     pub indirect: Indirect,
     /// Classes of light paths to be measured.
     pub classes: ClassSet,
+    /// What ends an iteration, if anything may.
+    pub stop: Option<&'a Stop>,
 }
 
 impl Eye<'_> {
+    /// Whether the iteration under way is given up.
+    #[inline]
+    pub fn is_given_up(&self) -> bool {
+        self.stop.is_some_and(Stop::gives_up)
+    }
+
     /// Camera depth and position of what a measure has seen first, if anything (scene units; of the scene as it was
     /// read).
     pub fn seen(&self, measure: &EyeMeasure) -> Option<(f32, Vec3)> {
@@ -576,9 +585,10 @@ impl Eye<'_> {
         let mut starts = [const { None }; GROUP];
         for (start, place) in starts.iter_mut().zip(places) {
             if let Some(place) = place {
-                let stream = streams.path(place.index);
+                let key = self.camera.key(place.pixel);
+                let stream = streams.path(key);
                 let first = PrecomputedHit::Nothing;
-                let film = film.path(place.index);
+                let film = film.path(key);
                 *start = Some((PathStart { first, ..self.start(place.pixel, film) }, stream));
             }
         }

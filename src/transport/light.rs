@@ -13,6 +13,7 @@ use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
 use crate::spectrum::{Band, Comb, WavelengthSample};
+use crate::stop::Stop;
 use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
@@ -28,7 +29,11 @@ pub struct LightPass<'a> {
     region: Option<Region>,
     kinds: ByKind<bool>,
     comb: Option<Comb>,
+    stop: Option<&'a Stop>,
 }
+
+/// Light paths between two looks at whether they are given up.
+const LOOK: u32 = 16;
 
 /// How a light path begins.
 #[derive(Clone, Copy, Debug)]
@@ -70,6 +75,7 @@ impl<'a> LightPass<'a> {
             region: None,
             kinds: [true; 2],
             comb: None,
+            stop: None,
         }
     }
 
@@ -101,6 +107,18 @@ impl<'a> LightPass<'a> {
     #[must_use]
     pub fn with(self, comb: Comb) -> LightPass<'a> {
         LightPass { comb: Some(comb), ..self }
+    }
+
+    /// Which ends where its iteration is given up.
+    #[must_use]
+    pub fn stopped_by(self, stop: &'a Stop) -> LightPass<'a> {
+        LightPass { stop: Some(stop), ..self }
+    }
+
+    /// Whether path `index` and all others of its iteration are given up.
+    #[inline]
+    pub fn is_given_up(&self, index: u32) -> bool {
+        index.is_multiple_of(LOOK) && self.stop.is_some_and(Stop::gives_up)
     }
 
     /// The hue of path `index`.

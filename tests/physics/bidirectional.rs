@@ -311,7 +311,7 @@ fn under_the_sky() {
     agree("under the sky", &scene, &methods, 0.05, 0.03, 0.2);
 }
 
-/// Parallel projection, which no light path can be connected to, and paths of four segments at most.
+/// Parallel projection, and paths of four segments at most.
 #[test]
 fn short_paths_seen_in_parallel() {
     let mut description = lit_room(matte(0.6, 0.0));

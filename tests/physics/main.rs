@@ -7,6 +7,7 @@ mod agreement;
 mod analytic;
 mod bidirectional;
 mod bsdf;
+mod cameras;
 mod classes;
 mod contact;
 mod dispersion;

@@ -471,9 +471,10 @@ impl<'a> Lab<'a> {
             max_depth: 12,
             indirect: Indirect::Photons,
             classes: ClassSet::ALL,
+            stop: None,
         };
         let pixels = (SIZE * SIZE) as f32;
-        let strategies = Strategies::vcm(true);
+        let strategies = Strategies::VCM;
         let shared = Bidirectional {
             eye,
             surroundings,

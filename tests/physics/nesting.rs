@@ -144,7 +144,15 @@ fn rays_start_where_the_film_is() {
     let scene = build(description);
     let camera = scene.camera(&square(16)).expect("a camera");
     let (interior, classes) = (Surroundings::of(&scene, &camera).eye, ClassSet::ALL);
-    let eye = Eye { scene: &scene, camera: &camera, interior, max_depth: 8, indirect: Indirect::Photons, classes };
+    let eye = Eye {
+        scene: &scene,
+        camera: &camera,
+        interior,
+        max_depth: 8,
+        indirect: Indirect::Photons,
+        classes,
+        stop: None,
+    };
     for index in 0..256u32 {
         let start = eye.start((index % 16, index / 16), Stream::new(0, 1, Domain::Test, u64::from(index)));
         let wet = start.interior.material(&scene).is_some();

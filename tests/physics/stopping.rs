@@ -5,8 +5,11 @@ use crate::support;
 use caustique::film::{Layer, LayerSet};
 use caustique::image::{Floor, metrics};
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Control, Levels, Method, Rendered, Settings, StopReason, render};
+use caustique::render::{Control, Levels, Method, Rendered, Session, Settings, Stage, StopReason, render};
 use caustique::scene::{Description, Scene};
+use caustique::stop::Stop;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
 
 const SIZE: u32 = 16;
@@ -107,4 +110,61 @@ fn comparisons_above_a_relative_floor() {
         let square = f64::from(scale).powi(2);
         assert!((papers.relmse - 0.015625 * square / (square + 0.01)).abs() < 1e-9 * papers.relmse, "{papers:?}");
     }
+}
+
+/// An iteration that is given up in its midst, by any method, leaves no trace: the render goes on from what was
+/// finished, to the bits of one that nobody has disturbed.
+#[test]
+fn iterations_are_given_up_as_a_whole() {
+    let scene = lit(1.0);
+    let camera = scene.camera(&square(48)).expect("a camera");
+    let all = [Method::Path, Method::Light, Method::Bdpt, Method::Pm, Method::Ppm, Method::Sppm, Method::Appm];
+    let mut given_up = 0;
+    for method in all.into_iter().chain([Method::Cppm, Method::Bpm, Method::Vcm, Method::Mlt]) {
+        let levels = if method.has_levels() { Levels::decorrelated(3) } else { Levels::new(1) };
+        let photons = 3000;
+        let settings = Settings { method, levels, photons, iterations: Some(3), ..Settings::default() };
+        let stage = Stage::new(&scene, &camera, &settings);
+        let undisturbed = rendered_by(&stage, |_| {});
+        let disturbed = rendered_by(&stage, |session| {
+            let mut seconds = 2e-4;
+            while !session.step_within(Some(seconds)) {
+                (given_up, seconds) = (given_up + 1, 2.0 * seconds);
+                assert_eq!(session.iterations(), 1, "{method:?}");
+            }
+        });
+        assert_eq!(disturbed.iterations, 3);
+        for (a, b) in undisturbed.pixels.iter().zip(&disturbed.pixels) {
+            assert_eq!(format!("{a:?}"), format!("{b:?}"), "{method:?}");
+        }
+    }
+    assert!(given_up > 11, "hardly an iteration was given up: {given_up}");
+}
+
+/// Three iterations, with something done after the first.
+fn rendered_by<'a>(stage: &'a Stage<'a>, between: impl FnOnce(&mut Session<'a>)) -> Rendered {
+    let mut session = Session::new(stage);
+    session.step();
+    between(&mut session);
+    while !session.finished() {
+        session.step();
+    }
+    session.finish(StopReason::Iterations)
+}
+
+/// A first iteration is finished whatever the clock says; one that is asked to end is not.
+#[test]
+fn the_first_iteration_ends_by_request_alone() {
+    let scene = lit(1.0);
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let asked = Arc::new(AtomicBool::new(false));
+    let settings =
+        Settings { method: Method::Bdpt, time: Some(1e-9), stop: Stop::by(asked.clone()), ..Settings::default() };
+    let ends = |expected: (u64, StopReason)| {
+        let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+        assert_eq!((rendered.iterations, rendered.stop), expected);
+    };
+    ends((1, StopReason::Time));
+    asked.store(true, Ordering::Relaxed);
+    ends((0, StopReason::Interrupted));
 }

@@ -136,7 +136,8 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
 /// What paths are traced from: all classes of light, of any length.
 pub fn eye<'a>(scene: &'a Scene, camera: &'a Camera) -> Eye<'a> {
     let interior = Surroundings::of(scene, camera).eye;
-    Eye { scene, camera, interior, max_depth: u32::MAX, indirect: Indirect::Photons, classes: ClassSet::ALL }
+    let (indirect, classes) = (Indirect::Photons, ClassSet::ALL);
+    Eye { scene, camera, interior, max_depth: u32::MAX, indirect, classes, stop: None }
 }
 
 /// Builds a scene, panicking with the error: tests know their scenes are good.

@@ -130,7 +130,7 @@ fn reference(given: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Reference> 
 
 /// Who is told how it goes.
 struct Told<'a> {
-    caller: &'a Caller<'a>,
+    caller: &'a Caller,
     progress: Option<Arc<Py<PyAny>>>,
 }
 

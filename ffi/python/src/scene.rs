@@ -18,6 +18,7 @@ use caustique::render::auto::{Choice, choose};
 use caustique::render::{Rendered, Settings};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::{Scene as Built, gltf};
+use caustique::stop::Stop;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict};
@@ -148,8 +149,8 @@ impl Scene {
     /// threads                   0 takes all cores
     /// progress                  called with a Progress after every iteration, in the calling thread; False ends it
     ///
-    /// An exception of `progress`, or Ctrl-C, ends the render after the running iteration; what is finished is the
-    /// attribute `image` of the exception. Other threads of Python run meanwhile.
+    /// An exception of `progress`, or Ctrl-C, ends the render: the running iteration is given up, and what is finished, if
+    /// anything is, is the attribute `image` of the exception. Other threads of Python run meanwhile.
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
@@ -396,7 +397,7 @@ fn read_options(keywords: &mut Keywords<'_>) -> PyResult<gltf::ReadOptions> {
 
 /// Tells Python how a render goes.
 struct Watcher<'a> {
-    caller: &'a Caller<'a>,
+    caller: &'a Caller,
     progress: Option<Arc<Py<PyAny>>>,
 }
 
@@ -407,8 +408,8 @@ impl Watch for Watcher<'_> {
         Ok(())
     }
 
-    fn stops(&self) -> bool {
-        self.caller.stops()
+    fn stop(&self) -> Stop {
+        self.caller.stop()
     }
 
     fn chosen(&mut self, _: Option<&Choice>) -> Result<()> {

@@ -6,10 +6,12 @@
 
 use crate::error::{SceneWarning, in_python, raised, usage};
 use caustique::error::{Error, Kind, Result};
+use caustique::stop::Stop;
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
 use std::ffi::CString;
 use std::num::NonZero;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
@@ -22,12 +24,12 @@ const LOOK: Duration = Duration::from_millis(100);
 type Request = Box<dyn FnOnce(Python<'_>) -> PyResult<bool> + Send>;
 
 /// The calling thread as the work sees it.
-pub struct Caller<'a> {
+pub struct Caller {
     requests: Sender<(Request, Sender<()>)>,
-    stopped: &'a AtomicBool,
+    stopped: Arc<AtomicBool>,
 }
 
-impl Caller<'_> {
+impl Caller {
     /// Has something done in Python, and waits for it.
     pub fn ask(&self, request: impl FnOnce(Python<'_>) -> PyResult<bool> + Send + 'static) {
         let (done, answered) = channel();
@@ -35,6 +37,11 @@ impl Caller<'_> {
             // An answer that does not come is no other than one that does.
             let _ = answered.recv();
         }
+    }
+
+    /// What tells the work to end.
+    pub fn stop(&self) -> Stop {
+        Stop::by(Arc::clone(&self.stopped))
     }
 
     /// Whether an end was asked for: by a signal, by a callback that said False, or by one that raised.
@@ -89,7 +96,7 @@ const THREADS_PER_CORE: usize = 4;
 pub fn work<T: Send>(
     py: Python<'_>,
     threads: usize,
-    job: impl FnOnce(&Caller<'_>) -> Result<T> + Send,
+    job: impl FnOnce(&Caller) -> Result<T> + Send,
 ) -> PyResult<Done<T>> {
     let cores = thread::available_parallelism().map_or(1, NonZero::get);
     let most = THREADS.max(THREADS_PER_CORE * cores);
@@ -101,11 +108,11 @@ pub fn work<T: Send>(
         .num_threads(threads)
         .build()
         .map_err(|cause| raised(Error::new(Kind::Io, "threads", cause).hint("ask for fewer threads")))?;
-    let stopped = AtomicBool::new(false);
+    let stopped = Arc::new(AtomicBool::new(false));
     Ok(py.detach(|| {
         thread::scope(|scope| {
             let (requests, asked) = channel::<(Request, Sender<()>)>();
-            let caller = Caller { requests, stopped: &stopped };
+            let caller = Caller { requests, stopped: Arc::clone(&stopped) };
             let worker = scope.spawn(move || pool.install(|| job(&caller)));
             let mut first = None;
             loop {

@@ -51,7 +51,7 @@ class Settings(bpy.types.PropertyGroup):
     use_time: bpy.props.BoolProperty(name="Time", description="Stop after so much time")
     time: bpy.props.FloatProperty(
         name="Time", default=60, min=0.1, soft_max=3600, step=100, precision=1,
-        description="Seconds of rendering; the running iteration is finished")
+        description="Seconds of rendering; the running iteration is given up, but the first is finished")
     use_error: bpy.props.BoolProperty(name="Error", description="Stop when the picture is good enough")
     error: bpy.props.FloatProperty(
         name="Error", default=5, min=0.01, max=100, subtype="PERCENTAGE",

@@ -19,6 +19,7 @@ use caustique::render::{
 };
 use caustique::scene::{Crop, MAX_SIZE, View};
 use caustique::stat::sum::MOST_TERMS;
+use caustique::stop::Stop;
 use caustique::transport::MAX_LEVELS;
 use clap::ValueEnum;
 use serde::Serialize;
@@ -112,7 +113,7 @@ pub struct Job {
     #[arg(long, value_enum, default_value_t = FrameSeed::Vary, help_heading = "Method")]
     pub frame_seed: FrameSeed,
 
-    /// Stop after so many seconds of rendering; the running iteration is finished
+    /// Stop after so many seconds of rendering; the running iteration is given up, but the first is finished
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop after so many iterations [default: 64, if nothing else says when to stop]
@@ -597,6 +598,7 @@ impl Job {
             time: self.time,
             target_error: self.target_error,
             shard,
+            stop: Stop::default(),
             guided: way.guided,
             indirect: way.indirect,
             classes: self.scene.switches().classes(),

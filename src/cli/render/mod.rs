@@ -28,6 +28,7 @@ use caustique::render::output::shape_of;
 use caustique::render::{Progress, Rendered, Settings};
 use caustique::scene::description::Picture;
 use caustique::scene::{Scene, Survey};
+use caustique::stop::Stop;
 use preview::Preview;
 use serde_json::json;
 use std::path::Path;
@@ -136,8 +137,8 @@ impl Watch for Telling<'_> {
         Ok(())
     }
 
-    fn stops(&self) -> bool {
-        self.interrupt.as_ref().is_some_and(Interrupt::asked)
+    fn stop(&self) -> Stop {
+        self.interrupt.as_ref().map(Interrupt::stop).unwrap_or_default()
     }
 
     fn chosen(&mut self, choice: Option<&Choice>) -> Result<()> {

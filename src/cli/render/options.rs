@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Render a scene to a multichannel EXR, and to a PNG to look at.
 ///
 /// Without options: 64 iterations at 1280 pixels across, seen through the scene's first camera, by the method that
-/// suits the scene, denoised as far as its own errors allow. Ctrl-C finishes the running iteration and writes what
+/// suits the scene, denoised as far as its own errors allow. Ctrl-C gives up the running iteration and writes what
 /// there is; a second one ends at once.
 ///
 /// An option given twice: the last one holds. -h shows what a person needs first, --help everything.

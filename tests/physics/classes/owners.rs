@@ -88,7 +88,7 @@ fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
     let surroundings = Surroundings::new(scene, camera.position());
     let classes = caustique::plan::ClassSet::ALL;
     let (interior, indirect) = (surroundings.eye, Indirect::Photons);
-    let eye = Eye { scene, camera: &camera, interior, max_depth: 7, indirect, classes };
+    let eye = Eye { scene, camera: &camera, interior, max_depth: 7, indirect, classes, stop: None };
     let pass = LightPass::new(5, 0, Domain::Test, walks, 7);
     for index in 0..walks {
         let arena = bumpalo::Bump::new();

@@ -90,7 +90,7 @@ impl Chain {
 /// Each weight is a number from 0 to 1 and all sum to one, whatever the densities and the bandwidth.
 #[test]
 fn weights_of_any_densities_sum_to_one() {
-    let strategies = Strategies::vcm(true);
+    let strategies = Strategies::VCM;
     let (mut worst, mut planted) = (0.0f64, 0.0f64);
     for index in 0..PATHS {
         let chain = Chain::new(index);

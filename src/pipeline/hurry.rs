@@ -1,0 +1,40 @@
+//! Whether a render has the time for one iteration, told before it begins: the same view in a smaller picture is rendered
+//! once, with as much work for a pixel.
+
+use crate::camera::Camera;
+use crate::render::auto::small;
+use crate::render::{Session, Settings, Stage};
+use crate::scene::Scene;
+
+/// Pixels of the smaller picture, at most.
+const PIXELS: f64 = 64.0 * 64.0;
+/// Its share of the picture, at most.
+const SHARE: f64 = 1.0 / 64.0;
+/// Warned of are iterations that take this many times what there is, and at least a second: the estimate is rough.
+const FACTOR: f64 = 1.25;
+const LEAST_SECONDS: f64 = 1.0;
+
+/// The warning, if an iteration takes more time than there is.
+pub(super) fn warn((scene, camera): (&Scene, &Camera), settings: &Settings) -> Option<String> {
+    let time = settings.time?;
+    let seconds = seconds((scene, camera), settings)?;
+    let remedy = match settings.method.counts_photons() {
+        true => "fewer --photons, a smaller --width or more --time",
+        false => "a smaller --width or more --time",
+    };
+    (seconds > (FACTOR * time).max(LEAST_SECONDS)).then(|| {
+        format!("one iteration takes about {seconds:.0} s, longer than the {time:.0} s there are to render: the picture comes late and has one iteration (ask for {remedy})")
+    })
+}
+
+/// About how long an iteration takes.
+fn seconds((scene, camera): (&Scene, &Camera), settings: &Settings) -> Option<f64> {
+    let pixels = |camera: &Camera| f64::from(camera.size().0) * f64::from(camera.size().1);
+    let pilot = camera.smaller((PIXELS / pixels(camera)).min(SHARE).sqrt());
+    let share = pixels(&pilot) / pixels(camera);
+    let settings = Settings { guided: false, ..small(settings, share) };
+    let stage = Stage::new(scene, &pilot, &settings);
+    let mut session = Session::new(&stage);
+    let before = session.spent().seconds;
+    session.step_within(None).then(|| (session.spent().seconds - before) / share)
+}

@@ -1,0 +1,135 @@
+//! Cameras as light paths meet them, windows of pictures, and very wide views.
+//!
+//! Tests of agreement compare channels of tiles, or means, by independent seeds; see `support/channels.rs` and
+//! `support/stats.rs` for the error rate and the planted errors that are told.
+
+use crate::support;
+
+use caustique::camera::Filter;
+use caustique::math::{DVec3, Vec3};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
+use caustique::scene::description::Projection;
+use caustique::scene::{Crop, Description, Scene, View};
+use support::channels::{SIZE, agree, seeds};
+use support::scenes::{add, build, glass, lit_room, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::stats::{Check, mean_and_error};
+
+fn rendered(scene: &Scene, view: &View, (method, iterations): (Method, u64), seed: u64) -> Rendered {
+    let camera = scene.camera(view).expect("a camera");
+    let levels = Levels::new(1);
+    let settings = Settings { method, levels, iterations: Some(iterations), seed, ..Settings::default() };
+    render(scene, &camera, &settings, |_, _| Control::Continue)
+}
+
+/// A floor, a mirror that lights it and a lamp, seen in parallel from a slant.
+fn in_parallel(aperture_radius: f32) -> Scene {
+    let mut description = Description::default();
+    add(&mut description, "floor", quad(Vec3::new(-1.5, 0.0, 1.5), 3.0 * Vec3::X, -3.0 * Vec3::Z), matte(0.7, 0.0));
+    let upright = quad(Vec3::new(-1.0, 0.0, -1.0), 2.0 * Vec3::X, 1.2 * Vec3::Y);
+    add(&mut description, "mirror", upright, mirror());
+    add(&mut description, "ball", sphere(Vec3::new(0.3, 0.3, 0.4), 0.3, 32), matte(0.4, 0.0));
+    let lamp = quad(Vec3::new(-0.4, 1.6, -0.2), 0.8 * Vec3::X, 0.8 * Vec3::Z);
+    add(&mut description, "lamp", lamp, matte(0.0, 4.0));
+    let mut camera = look_at(DVec3::new(1.0, 2.5, 3.0), DVec3::new(0.0, 0.2, 0.0), 40.0);
+    camera.projection = Projection::Orthographic { xmag: 1.2, ymag: 1.2 };
+    (camera.aperture_radius, camera.focus_distance) = (aperture_radius, 4.0);
+    description.cameras.push(camera);
+    build(description)
+}
+
+/// Light paths meet an orthographic camera, with a lens and without, as often as rays of its own meet lights: all that
+/// they can bring, and weights sum to one.
+#[test]
+fn light_paths_meet_orthographic_cameras() {
+    for aperture_radius in [0.0, 0.3] {
+        let scene = in_parallel(aperture_radius);
+        let by = |method, iterations, count| {
+            seeds(method, count, |seed| rendered(&scene, &square(SIZE), (method, iterations), seed))
+        };
+        let reference = by(Method::Path, 64, 8);
+        for method in [Method::Bdpt, Method::Vcm, Method::Mlt] {
+            agree(&format!("{method:?}, lens {aperture_radius}"), &by(method, 16, 8), &reference, 0.01, 0.3);
+        }
+    }
+}
+
+/// A caustic of a point light, which no path from the camera finds, is as bright to an orthographic camera as to one
+/// that looks at the same square from so far that its rays are parallel.
+#[test]
+fn caustics_are_as_bright_from_far_away() {
+    let scene = |parallel: bool| {
+        let mut description = Description::default();
+        add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, 1.0), 2.0 * Vec3::X, -2.0 * Vec3::Z), matte(0.8, 0.0));
+        add(&mut description, "ball", sphere(Vec3::new(0.0, 0.8, 0.0), 0.4, 48), glass(1.5));
+        description.lights.push(point_light(DVec3::new(0.4, 3.0, 0.0), 20.0));
+        let distance = if parallel { 4.0 } else { 60.0 };
+        let target = DVec3::new(0.0, 0.0, 0.55);
+        let eye = target + distance * DVec3::new(0.0, 0.8, 0.6);
+        let mut camera = look_at(eye, target, 2.0 * (0.5f32 / 60.0).atan().to_degrees());
+        if parallel {
+            camera.projection = Projection::Orthographic { xmag: 0.5, ymag: 0.5 };
+        }
+        description.cameras.push(camera);
+        build(description)
+    };
+    let caustic = |scene: &Scene, method, seed| {
+        let rendered = rendered(scene, &square(16), (method, 32), seed);
+        let light = rendered.pixels.iter().map(|pixel| (pixel.parts().caustic / f64::from(pixel.iterations)).x);
+        light.sum::<f64>() / rendered.pixels.len() as f64
+    };
+    let (far, parallel) = (scene(false), scene(true));
+    let from_far: Vec<f64> = (0..8).map(|seed| caustic(&far, Method::Light, seed)).collect();
+    let (expected, error) = mean_and_error(&from_far);
+    assert!(expected > 0.01 && error < 0.02 * expected, "{expected} +- {error}");
+    for method in [Method::Light, Method::Bdpt] {
+        let values: Vec<f64> = (10..18).map(|seed| caustic(&parallel, method, seed)).collect();
+        Check { expected, bias: 0.04, detects: 0.3 }.run(2, &format!("{method:?}"), &values);
+    }
+}
+
+/// A window's pixels are those of the whole picture, to the bit, by methods that know no photons; wherever it begins
+/// and whatever the filter.
+#[test]
+fn windows_are_the_whole_picture_there() {
+    let mut description = lit_room(matte(0.6, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 32), glass(1.5));
+    description.cameras[0].aperture_radius = 0.02;
+    let scene = build(description);
+    for filter in [Filter::Box(1.0), Filter::Gaussian(2.0)] {
+        let whole = View { width: Some(37), height: Some(29), filter, ..View::default() };
+        for method in [Method::Path, Method::Bdpt, Method::Light] {
+            let all = rendered(&scene, &whole, (method, 3), 5);
+            for [x, y, width, height] in [[16, 16, 16, 13], [5, 3, 23, 19], [36, 0, 1, 29]] {
+                let view = View { crop: Some(Crop::Pixels([x, y, width, height])), ..whole.clone() };
+                let window = rendered(&scene, &view, (method, 3), 5);
+                let bits = |pixel: &caustique::estimator::Pixel| {
+                    let values = [pixel.mean(0), pixel.variance_of_mean(0), pixel.albedo(), pixel.parts().indirect];
+                    values.map(|value| value.to_array().map(f64::to_bits))
+                };
+                for (index, pixel) in (0..).zip(&window.pixels) {
+                    let at = (y + index / width) * 37 + x + index % width;
+                    assert_eq!(bits(pixel), bits(&all.pixels[at as usize]), "{method:?}, {filter:?}, pixel {index}");
+                }
+            }
+        }
+    }
+}
+
+/// A view of nearly half the space: bandwidths follow what a pixel can see, not the film, which is 229 times as wide as
+/// it is far away.
+#[test]
+fn wide_views_keep_their_light() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    description.cameras[0].projection = Projection::Perspective { yfov: 179f32.to_radians(), aspect: Some(1.0) };
+    let scene = build(description);
+    assert!(scene.camera(&square(32)).expect("a camera").span().0 <= std::f32::consts::PI);
+    let mean = |method, iterations, seed| {
+        let rendered = rendered(&scene, &square(32), (method, iterations), seed);
+        rendered.pixels.iter().map(|pixel| pixel.mean(0).x).sum::<f64>() / rendered.pixels.len() as f64
+    };
+    let by_paths: Vec<f64> = (0..6).map(|seed| mean(Method::Path, 32, seed)).collect();
+    let (expected, error) = mean_and_error(&by_paths);
+    assert!(error < 0.01 * expected, "{expected} +- {error}");
+    let values: Vec<f64> = (10..16).map(|seed| mean(Method::Vcm, 8, seed)).collect();
+    Check { expected, bias: 0.03, detects: 0.12 }.run(1, "vcm, 179 degrees", &values);
+}
