@@ -1,6 +1,6 @@
 //! Triangle meshes and where they stand.
 
-use super::precision::error_within;
+use super::precision::{Extent, coordinate_error};
 use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
 
 /// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has
@@ -74,17 +74,16 @@ pub struct Placement {
     pub points: Affine3A,
     /// Of normals, up to length: the inverse transpose. The front of a mirrored mesh stays its front, as glTF wants.
     pub normals: Mat3A,
-    /// Largest coordinate of a point of the mesh, once turned and scaled, over its largest coordinate before.
-    stretch: f32,
+    /// `points` with the absolute value of each number: bounds all terms of a transformed coordinate.
+    absolute: Affine3A,
 }
 
 impl Placement {
     /// From an affine transform that can be inverted.
     pub fn new(points: Affine3A) -> Placement {
         let normals = points.matrix3.inverse().transpose();
-        let rows = points.matrix3.transpose();
-        let sums = [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().element_sum());
-        Placement { points, normals, stretch: sums.into_iter().fold(0.0, f32::max) }
+        let absolute = Affine3A { matrix3: points.matrix3.abs(), translation: points.translation.abs() };
+        Placement { points, normals, absolute }
     }
 }
 
@@ -98,12 +97,18 @@ impl Instance {
         }
     }
 
-    /// How far a point `p` in world space may be off from a triangle of the mesh no coordinate of whose corners is
-    /// larger than `largest` in the mesh's own space.
+    /// How far a point `p` in world space may be off the plane of its triangle, given by the largest coordinates of its
+    /// corners and two edges, in the mesh's own space.
     #[inline]
-    pub(super) fn error(&self, largest: f32, p: Vec3) -> f32 {
-        let stretch = self.to_world.as_ref().map_or(1.0, |placement| placement.stretch);
-        error_within((largest * stretch).max(p.abs().max_element()))
+    pub(super) fn error(&self, own: Extent, p: Vec3) -> f32 {
+        let extent = match &self.to_world {
+            None => own,
+            Some(placement) => Extent {
+                largest: placement.absolute.transform_point3(own.largest),
+                edges: own.edges.map(|edge| placement.points.transform_vector3(edge)),
+            },
+        };
+        extent.plane_error() + coordinate_error(p)
     }
 
     /// A normal of the mesh in world space, not normalised.

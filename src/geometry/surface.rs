@@ -1,7 +1,7 @@
 //! The point of a surface that a ray has hit, with everything shading needs.
 
 use super::mesh::Corner;
-use super::precision::{shadow_end, spawn};
+use super::precision::{Extent, shadow_end, spawn};
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -73,6 +73,7 @@ impl Surface {
             let t = mesh.tangents[i0] * b0 + mesh.tangents[i1] * b1 + mesh.tangents[i2] * b2;
             tangent = instance.direction(t.truncate()).extend(if t.w < 0.0 { -1.0 } else { 1.0 });
         }
+        let largest = c0.p.abs().max(c1.p.abs()).max(c2.p.abs());
         Some(Surface {
             p,
             ng,
@@ -83,7 +84,7 @@ impl Surface {
             instance: instance_index,
             primitive,
             material: instance.material,
-            error: instance.error(c0.p.abs().max(c1.p.abs()).max(c2.p.abs()).max_element(), p),
+            error: instance.error(Extent { largest, edges: [e1, e2] }, p),
             touching: false,
         })
     }

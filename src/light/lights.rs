@@ -376,14 +376,13 @@ impl Lights {
         }
     }
 
-    /// Radiance that a surface hit by a ray sends back along it, and the density per solid angle with which
-    /// [`Lights::sample_direct`] would have found that point from the ray's origin.
+    /// Radiance that a surface hit by a ray sends back along it, which is `wo`, and the density per solid angle with which
+    /// [`Lights::sample_direct`] would have found that point from the ray's origin. A light that touches the surface that
+    /// the ray has left is at no distance.
     #[inline]
-    pub fn hit(&self, materials: &Materials, from: &Receiver, surface: &Surface) -> Option<(Rgb, f32)> {
-        let to = surface.p - from.p;
-        let distance2 = to.length_squared();
-        let (radiance, density) = self.emitted(materials, from, surface, -to / distance2.sqrt())?;
-        Some((radiance, density.direct * distance2 / density.cos))
+    pub fn hit(&self, materials: &Materials, from: &Receiver, surface: &Surface, wo: Vec3) -> Option<(Rgb, f32)> {
+        let (radiance, density) = self.emitted(materials, from, surface, wo)?;
+        Some((radiance, density.direct * surface.p.distance_squared(from.p) / density.cos))
     }
 
     /// Density per solid angle of emission along cosine `cos` from a triangle.

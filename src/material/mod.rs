@@ -67,6 +67,8 @@ pub struct Material {
     pub medium: Option<MediumParameters>,
     /// Nested dielectrics: where solids overlap, the one of highest priority is there.
     pub priority: i32,
+    /// It lies on opaque surfaces, or others on it, without a film of air: paint, a label, a liquid.
+    pub optical_contact: bool,
     /// KHR_materials_specular strength.
     pub specular: f32,
     /// Its texture, A.
@@ -125,6 +127,7 @@ impl Default for Material {
             thin: true,
             medium: None,
             priority: 0,
+            optical_contact: false,
             specular: 1.0,
             specular_texture: None,
             specular_color: Rgb::ONE,

@@ -1,21 +1,31 @@
 //! Surfaces that lie on each other: a glass on a table, a liquid in a glass, sheets in a stack.
 //!
-//! A ray goes on a little past the surface it leaves ([`Surface::error`]), for rounding decides about what is nearer; so
-//! whatever lies in that little way has to be met by other means. Where light passes a triangle that others may lie on
-//! ([`Contacts`](super::Contacts)), all others there are looked for, and taken to lie on each other in this order,
-//! whichever Embree finds first:
+//! A ray goes on a little past the surface it leaves ([`Surface::error`]), because rounding decides which of two surfaces
+//! within that distance is nearer. So everything within it has to be found by other means. Where triangles may touch
+//! ([`Contacts`](super::Contacts)), all surfaces at a place are collected and met in a stated order, whichever of them
+//! Embree finds first.
 //!
-//! - what lets no light pass comes first: glass and the table that it stands on are in contact;
+//! Surfaces that pass light, among themselves, are in optical contact:
+//!
 //! - a solid is entered before another is left, so that solids overlap, and nested dielectrics
-//!   (`transport/interior.rs`) say what fills the space: liquid and glass are in contact, without air between them;
-//! - what has no inside is behind solids that are in front of it.
+//!   (`transport/interior.rs`) say what fills the space: liquid and glass meet without air between them;
+//! - a sheet, which has no inside, is behind solids that are in front of it.
 //!
-//! Seen from the other side, the order is the reverse, but for the opaque, which nothing passes: light and importance
-//! go the same ways.
+//! Beside an opaque surface they stand off it by a film of air, as rigid bodies do, so that a picture does not change
+//! when a glass is lifted off its table by a hair:
+//!
+//! - solids are left before the opaque surface is met, and entered after it has been left;
+//! - a sheet lies on the side of the opaque surface that its front points to.
+//!
+//! A material in optical contact (`Material::optical_contact`: paint, a label, water on the floor of a pool) has no such
+//! film: where one of the two has it, a ray meets the opaque surface alone.
+//!
+//! A ray in the other direction meets the surfaces in the reverse order, so light and importance take the same paths.
 
 use super::Scene;
 use super::contacts::face_each_other;
-use crate::geometry::Surface;
+use crate::geometry::{Surface, error};
+use crate::light::Emitter;
 use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
@@ -27,7 +37,7 @@ fn passes(scene: &Scene, surface: &Surface) -> bool {
 }
 
 /// A point of a surface, by what tells it from others there.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Place {
     p: Vec3,
     ng: Vec3,
@@ -49,14 +59,38 @@ impl Place {
         let Surface { p, ng, instance, primitive, material, error, .. } = *surface;
         Place { p, ng, instance, primitive, material, error }
     }
+
+    /// The place on the triangle of light `index` that is nearest to `near`, if others may lie on that triangle.
+    #[inline]
+    pub fn on_light(scene: &Scene, index: u32, near: Vec3) -> Option<Place> {
+        if scene.contacts.is_empty() { None } else { Place::on_touched_light(scene, index, near) }
+    }
+
+    #[inline(never)]
+    fn on_touched_light(scene: &Scene, index: u32, near: Vec3) -> Option<Place> {
+        let Emitter::Triangle { instance, primitive, plane, corners: [corner, a, b], .. } =
+            scene.lights.emitters()[index as usize]
+        else {
+            return None;
+        };
+        let ng = plane.truncate();
+        let p = near - ng * (ng.dot(near) - plane.w);
+        let error = scene.contacts.reach(instance, primitive, error([corner, corner + a, corner + b]))?;
+        let material = scene.shapes.instances[instance as usize].material;
+        Some(Place { p, ng, instance, primitive, material, error })
+    }
 }
 
-/// Where a surface comes among those at one place, for a ray along `direction`.
-fn order(scene: &Scene, place: &Place, direction: Vec3) -> (u8, i64, i64) {
+/// Rank of a surface among those at one place, for a ray along `direction`; `film`: one of them is opaque.
+fn rank(scene: &Scene, place: &Place, direction: Vec3, film: bool) -> (u8, i64, i64) {
     let front = direction.dot(place.ng) < 0.0;
     let material = &scene.materials.list[place.material as usize];
     let rank = match (material.transmits(), material.thin, front) {
-        (false, ..) => 0,
+        (false, ..) => 2,
+        (true, false, false) if film => 0,
+        (true, true, true) if film => 1,
+        (true, true, false) if film => 3,
+        (true, false, true) if film => 4,
         (true, true, false) => 1,
         (true, false, true) => 2,
         (true, false, false) => 3,
@@ -66,13 +100,14 @@ fn order(scene: &Scene, place: &Place, direction: Vec3) -> (u8, i64, i64) {
     (rank, reversed(place.instance), reversed(place.primitive))
 }
 
-/// What is at a place besides what is known to be there.
-type Others = SmallVec<[(Place, Hit); 3]>;
+/// Surfaces at one place.
+type Stack = SmallVec<[(Place, Hit); 4]>;
 
-fn others(scene: &Scene, at: &Place, token: u32) -> Others {
+/// The surfaces at a place besides `at`, in no order.
+fn others(scene: &Scene, at: &Place, token: u32) -> Stack {
     let reach = at.error;
     let (origin, direction) = (at.p - at.ng * reach, at.ng);
-    let mut others = Others::new();
+    let mut others = Stack::new();
     let mut add = |hit: Hit| {
         if (hit.instance, hit.primitive) == (at.instance, at.primitive) {
             return;
@@ -80,47 +115,71 @@ fn others(scene: &Scene, at: &Place, token: u32) -> Others {
         let Some(other) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
         let one = |place: &Place| place.instance == other.instance && !face_each_other(place.ng, other.ng);
         if !one(at) && !others.iter().any(|(place, _)| one(place)) {
-            others.push((Place::of(&other), hit));
+            others.push((Place { error: reach, ..Place::of(&other) }, hit));
         }
     };
     scene.tracer.each_hit(&Ray { origin, direction, tmax: 2.0 * reach, token }, &mut add);
     others
 }
 
-/// The first of the surfaces that lie where a ray along `direction` has met one that light passes; `None` where that is
-/// alone.
-#[inline(never)]
-fn first(scene: &Scene, met: Place, hit: Hit, direction: Vec3, token: u32) -> Option<Hit> {
-    let others = others(scene, &met, token);
-    if others.is_empty() {
-        return None;
+/// Leaves out what touches an opaque surface of `stack` without a film of air, and whether there is a film.
+fn without_wetted(scene: &Scene, stack: &mut Stack) -> bool {
+    let material = |place: &Place| &scene.materials.list[place.material as usize];
+    let opaque = |place: &Place| !material(place).transmits();
+    let film = stack.iter().any(|(place, _)| opaque(place));
+    if film {
+        let wets = stack.iter().any(|(place, _)| opaque(place) && material(place).optical_contact);
+        stack.retain(|(place, _)| opaque(place) || !(wets || material(place).optical_contact));
     }
-    let all = others.into_iter().chain([(met, hit)]);
-    all.min_by_key(|(place, _)| order(scene, place, direction)).map(|(_, hit)| hit)
+    film
 }
 
-/// What lies at a place and comes after the surface there for a ray along `direction`, the next first.
-fn after(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Others {
+/// The surfaces at the place where a ray along `direction` has met `met`, in order.
+fn stack(scene: &Scene, met: Place, hit: Hit, direction: Vec3, token: u32) -> Stack {
+    let mut stack = others(scene, &met, token);
+    if !stack.is_empty() {
+        stack.push((met, hit));
+        let film = without_wetted(scene, &mut stack);
+        stack.sort_unstable_by_key(|(place, _)| rank(scene, place, direction, film));
+    }
+    stack
+}
+
+/// The surfaces at a place that come after the one there for a ray along `direction`, in order.
+fn following(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Stack {
     let mut others = others(scene, place, token);
-    others.retain(|(other, _)| order(scene, other, direction) > order(scene, place, direction));
-    others.sort_unstable_by_key(|(other, _)| order(scene, other, direction));
+    let passes = |place: &Place| scene.materials.list[place.material as usize].transmits();
+    // A ray that leaves an opaque surface does not meet another one that coincides with it.
+    others.retain(|(other, _)| passes(place) || passes(other));
+    let own = (*place, Hit { t: 0.0, instance: place.instance, primitive: place.primitive, barycentric: [0.0; 2] });
+    others.push(own);
+    let film = without_wetted(scene, &mut others);
+    let leaving = rank(scene, place, direction, film);
+    others.retain(|(other, _)| rank(scene, other, direction, film) > leaving);
+    others.sort_unstable_by_key(|(other, _)| rank(scene, other, direction, film));
     others
 }
 
 #[cold]
 #[inline(never)]
 fn next(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Option<Hit> {
-    after(scene, place, direction, token).first().map(|(_, hit)| *hit)
+    following(scene, place, direction, token).first().map(|(_, hit)| *hit)
+}
+
+/// Surfaces at a place that a ray along `direction` meets after the one there, in order.
+#[cold]
+#[inline(never)]
+pub fn after(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
+    let surface = |(_, hit): &(Place, Hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
+    following(scene, place, direction, token).iter().filter_map(surface).collect()
 }
 
 /// Surfaces at a place that a ray along `direction` has to pass before it reaches the one there, in order.
-#[cold]
-#[inline(never)]
 pub fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
     // They come after it for light on its way back.
-    let back = after(scene, place, -direction, token);
-    let surface = |(_, hit): &(Place, Hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
-    back.iter().rev().filter_map(surface).collect()
+    let mut back = after(scene, place, -direction, token);
+    back.reverse();
+    back
 }
 
 /// The surfaces along a ray, one after the other.
@@ -144,44 +203,29 @@ impl Along {
         &self.ray
     }
 
-    /// The next surface and how far from where the ray is now; `None` where there is none.
+    /// The next surface and its distance from where the ray is now; `None` where there is none. `inside`: the ray is in
+    /// a solid, which it may have to leave before it meets an opaque surface.
     #[inline(always)]
-    pub fn next(&mut self, scene: &Scene) -> Option<(Surface, f32)> {
+    pub fn next(&mut self, scene: &Scene, inside: bool) -> Option<(Surface, f32)> {
         if let Some(place) = self.here.take()
             && let Some(hit) = next(scene, &place, self.ray.direction, self.ray.token)
         {
-            return self.surface(scene, hit, true).map(|surface| (surface, 0.0));
+            let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
+            return Some((Surface { touching: true, error: place.error, ..surface }, 0.0));
         }
         let hit = scene.tracer.intersect(&self.ray)?;
-        self.met(scene, &hit)
+        self.met(scene, &hit, inside)
     }
 
-    /// The same where what is hit is known.
+    /// [`Along::next`] where it is known which triangle the ray hits.
     #[inline(always)]
-    pub fn met(&self, scene: &Scene, hit: &Hit) -> Option<(Surface, f32)> {
-        self.surface(scene, *hit, false).map(|surface| (surface, hit.t))
-    }
-
-    /// What is hit, or what comes before it there; `is_first`: it is known that nothing does.
-    #[inline(always)]
-    fn surface(&self, scene: &Scene, mut hit: Hit, mut is_first: bool) -> Option<Surface> {
-        loop {
-            let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
-            // What lets no light pass is left on the side from which it was met, where nothing is in front of it.
-            if !passes(scene, &surface) {
-                return Some(surface);
-            }
-            if is_first {
-                return Some(Surface { touching: true, ..surface });
-            }
-            if !scene.contacts.may_touch(hit.instance, hit.primitive) {
-                return Some(surface);
-            }
-            let Some(other) = first(scene, Place::of(&surface), hit, self.ray.direction, self.ray.token) else {
-                return Some(surface);
-            };
-            (hit, is_first) = (other, true);
-        }
+    pub fn met(&self, scene: &Scene, hit: &Hit, inside: bool) -> Option<(Surface, f32)> {
+        let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
+        // From outside of all solids nothing is left before an opaque surface, unless a sheet lies on it.
+        let alone = !passes(scene, &surface) && !inside && !scene.contacts.sheets;
+        let reach = if alone { None } else { scene.contacts.reach(hit.instance, hit.primitive, surface.error) };
+        let first = reach.and_then(|error| first(scene, &Surface { error, ..surface }, *hit, &self.ray));
+        Some((first.unwrap_or(surface), hit.t))
     }
 
     /// Goes on behind a surface.
@@ -192,4 +236,13 @@ impl Along {
         self.ray.origin = next;
         self.here = Place::touching(surface);
     }
+}
+
+/// The first of the surfaces at the place where a ray has met `met`; `None` where that is alone.
+#[inline(never)]
+fn first(scene: &Scene, met: &Surface, hit: Hit, ray: &Ray) -> Option<Surface> {
+    let stack = stack(scene, Place::of(met), hit, ray.direction, ray.token);
+    let (_, first) = stack.first()?;
+    let surface = scene.shapes.surface(first.instance, first.primitive, first.barycentric)?;
+    Some(Surface { touching: stack.len() > 1, error: met.error, ..surface })
 }

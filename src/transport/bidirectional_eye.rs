@@ -147,7 +147,7 @@ impl<R: Record> EyeWalk<'_, R> {
         if !self.finds(technique, value) {
             return;
         }
-        let way = vertex.shadow_ray(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
+        let way = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
         if !is_lit(way.left) {
             return;
         }

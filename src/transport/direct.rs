@@ -77,7 +77,7 @@ pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f3
         return Rgb::ZERO;
     }
     let token = token(scene, draws, Purpose::ShadowAlpha);
-    let left = vertex.shadow_ray(scene, sample.wi, sample.target, token).left;
+    let left = vertex.shadow_ray_to_light(scene, &sample, token).left;
     // Nothing of infinitely much is nothing.
     if is_lit(left) { arriving * left } else { Rgb::ZERO }
 }
@@ -95,7 +95,8 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
     match next_surface(scene, start) {
         End::Surface(arrival) => {
             reach = arrival.distance;
-            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), &arrival.surface) {
+            let from = vertex.receiver();
+            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &from, &arrival.surface, -sample.wi) {
                 light = radiance * arrival.transmittance * weight(pdf);
             }
         }
@@ -106,7 +107,7 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
         End::Medium(_) | End::Lost => {}
     }
     glows(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
-        if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), surface) {
+        if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), surface, -sample.wi) {
             light += radiance * left * weight(pdf);
         }
     });

@@ -384,7 +384,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         self.sight = self.arrived(scattered);
         self.length += vertex.distance;
         let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
-        if let Some((radiance, pdf)) = lights.hit(materials, &from, surface) {
+        if let Some((radiance, pdf)) = lights.hit(materials, &from, surface, vertex.wo) {
             let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
             self.run_into((radiance, vertex.throughput), pdf, scattered, density);
         }
@@ -425,7 +425,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let from =
             if scattered.is_none() { Receiver::anywhere(glow.surface.p + glow.wo * glow.distance) } else { self.last };
         self.sight = self.arrived(scattered);
-        if let Some((radiance, pdf)) = lights.hit(materials, &from, &glow.surface) {
+        if let Some((radiance, pdf)) = lights.hit(materials, &from, &glow.surface, glow.wo) {
             let density = || Some(lights.emitted(materials, &from, &glow.surface, glow.wo)?.1);
             self.run_into((radiance, glow.throughput), pdf, scattered, density);
         }
@@ -562,6 +562,7 @@ impl Eye<'_> {
             direction: ray.direction,
             throughput: Rgb::ONE,
             interior: self.interior.at(self.scene, ray.origin),
+            leaving: None,
             first: PrecomputedHit::Unknown,
             far: false,
             channel: None,

@@ -8,16 +8,25 @@
 
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
-use crate::scene::contact::Along;
+use crate::scene::contact::{self, Place};
 use crate::scene::{OPEN, Scene, Stack};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;
+use smallvec::SmallVec;
 
 /// Solids that a path keeps with it, the last ones entered; of those before them it keeps one number.
 const INNERMOST: usize = 5;
 
-/// Surfaces looked at to find where a path starts; a scene with more along one ray has walls enough around the point.
-const MAX_SURROUNDING_HITS: u32 = 1 << 16;
+/// Two hits of an object that differ by less than this part of their distance are hits of one edge.
+const SAME_CROSSING: f32 = 8.0 * f32::EPSILON;
+
+/// Where the ray that looks for the solids around a point crosses the surface of one.
+struct Boundary {
+    object: u32,
+    t: f32,
+    instance: u32,
+    leaves: bool,
+}
 
 /// The solids a path is inside of, in order of entry: each by the instance through whose surface it was entered.
 #[derive(Clone, Copy, Debug)]
@@ -109,15 +118,8 @@ impl Interior {
         }
     }
 
-    /// Takes away the last.
-    fn pop(&mut self, scene: &Scene) -> Option<u32> {
-        let last = self.entries().last().copied()?;
-        self.len -= 1;
-        self.fill(scene);
-        Some(last)
-    }
-
-    /// The solids around `p`: those that a ray from it leaves without having entered. Where paths start.
+    /// The solids around `p`, where paths start: those that a ray from there leaves more often than it enters them. All
+    /// surfaces along the ray count, however many lie on each other or on opaque ones.
     pub fn at(scene: &Scene, p: Vec3) -> Interior {
         let mut interior = Interior::default();
         if !scene.survey.solids {
@@ -125,25 +127,48 @@ impl Interior {
         }
         // No axis, so that it grazes no wall of a box.
         let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
-        let mut along = Along::new(Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, None);
-        let (mut entered, mut left) = (Interior::default(), Interior::default());
-        for _ in 0..MAX_SURROUNDING_HITS {
-            let Some((surface, _)) = along.next(scene) else { break };
-            along.pass(&surface);
-            if !scene.materials.list[surface.material as usize].is_solid_glass() {
-                continue;
+        let mut crossings = SmallVec::<[Boundary; 16]>::new();
+        scene.tracer.each_hit(&Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, &mut |hit| {
+            let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
+            if scene.materials.list[surface.material as usize].is_solid_glass() {
+                let object = scene.shapes.instances[surface.instance as usize].object;
+                let leaves = direction.dot(surface.ng) >= 0.0;
+                crossings.push(Boundary { object, t: hit.t, instance: surface.instance, leaves });
             }
-            if direction.dot(surface.ng) < 0.0 {
-                entered.push(scene, surface.instance);
-            } else if !entered.remove(scene, surface.instance) {
-                left.push(scene, surface.instance);
+        });
+        crossings.sort_unstable_by(|a, b| a.object.cmp(&b.object).then(a.t.total_cmp(&b.t)));
+        // Triangles that share the edge a ray hits are crossed once.
+        crossings.dedup_by(|b, a| (a.object, a.leaves) == (b.object, b.leaves) && b.t - a.t <= SAME_CROSSING * a.t);
+        let mut around = SmallVec::<[(f32, u32, usize); 8]>::new();
+        for of_object in crossings.chunk_by(|a, b| a.object == b.object) {
+            let left = of_object.iter().filter(|crossing| crossing.leaves).count();
+            if let Some(last) = of_object.iter().rfind(|crossing| crossing.leaves) {
+                around.push((last.t, last.instance, (2 * left).saturating_sub(of_object.len())));
             }
         }
-        // What is left last was entered first.
-        while let Some(instance) = left.pop(scene) {
-            interior.push(scene, instance);
+        // The solid that the ray leaves last was entered first.
+        around.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        for (_, instance, times) in around {
+            (0..times).for_each(|_| interior.push(scene, instance));
         }
         interior
+    }
+
+    /// No solid is around here.
+    #[inline(always)]
+    pub fn is_open(&self) -> bool {
+        self.len == 0 && self.outer == OPEN
+    }
+
+    /// Where a light path starts on a light that lies on solids, before it enters the first of them: without those.
+    #[cold]
+    pub fn before(mut self, scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Interior {
+        for surface in contact::after(scene, place, direction, token) {
+            if direction.dot(surface.ng) < 0.0 {
+                self.remove(scene, surface.instance);
+            }
+        }
+        self
     }
 
     /// Material that fills the space here; `None` is the open space.

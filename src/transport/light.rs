@@ -1,7 +1,7 @@
 //! Light paths that leave photons.
 
 use super::eye::Indirect;
-use super::segment::PrecomputedHit;
+use super::segment::{PrecomputedHit, token};
 use super::surroundings::Surroundings;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
@@ -12,6 +12,7 @@ use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
+use crate::scene::contact::Place;
 use crate::spectrum::{Band, Comb, WavelengthSample};
 use crate::stop::Stop;
 use bumpalo::Bump;
@@ -189,12 +190,19 @@ impl<'a> LightPass<'a> {
             // It has come through the medium that fills all space, from infinity.
             flux *= medium.transmittance(f32::INFINITY);
         }
+        let (origin, direction) = (emission.origin, emission.direction);
+        let mut interior = surroundings.light(scene, emission.light, origin);
+        let leaving = Place::on_light(scene, emission.light, origin);
+        if let Some(place) = &leaving {
+            interior = interior.before(scene, place, direction, token(scene, stream.vertex(0), Purpose::Alpha));
+        }
         Some(Emitted {
             start: PathStart {
-                origin: emission.origin,
-                direction: emission.direction,
+                origin,
+                direction,
                 throughput: flux,
-                interior: surroundings.light(scene, emission.light, emission.origin),
+                interior,
+                leaving,
                 first: PrecomputedHit::Unknown,
                 far: emission.infinite,
                 channel: None,

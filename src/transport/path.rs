@@ -60,7 +60,7 @@ impl<R: Record> PathTracer<'_, R> {
         if (f * light.radiance).max_element() <= 0.0 {
             return;
         }
-        let way = vertex.shadow_ray(scene, light.wi, light.target, token(scene, draws, Purpose::ShadowAlpha));
+        let way = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
         if !is_lit(way.left) {
             return;
         }
@@ -112,7 +112,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         look(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface) {
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface, vertex.wo) {
             let of = (self.trail.sight.lit(false), self.scene.lights.group_of(vertex.surface));
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { eye: self.depth }, of, vertex.throughput * radiance * weight, weight);
@@ -132,7 +132,8 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         if let Some(scattered) = scattered {
             trail.scattered(scattered.lobe);
         }
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, &glow.surface) {
+        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, &glow.surface, glow.wo)
+        {
             let weight = Self::weight(scattered, pdf);
             let light = glow.throughput * radiance * weight;
             let of = (trail.sight.lit(false), self.scene.lights.group_of(&glow.surface));

@@ -67,7 +67,7 @@ fn leave(scene: &Scene, ray: Ray, hit: Hit, interior: Interior, medium: u32, los
     let reach = ray.tmax;
     let mut along = Along::new(ray, None);
     let mut at = Whereabouts { interior, bodies: 0 };
-    let (mut met, mut outside) = (along.met(scene, &hit), None);
+    let (mut met, mut outside) = (along.met(scene, &hit, true), None);
     for _ in 0..MAX_BORDERS {
         let Some((surface, t)) = met else { break };
         let distance = reach - along.ray().tmax + t;
@@ -84,7 +84,7 @@ fn leave(scene: &Scene, ray: Ray, hit: Hit, interior: Interior, medium: u32, los
         if !stays || along.ray().tmax <= 0.0 {
             break;
         }
-        met = along.next(scene);
+        met = along.next(scene, true);
     }
     if let Some(from) = outside {
         lost(from, f32::INFINITY);

@@ -245,8 +245,8 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
     for crossed in 0..MAX_NULL_CROSSINGS {
         let met = match known {
             PrecomputedHit::Nothing if crossed == 0 => None,
-            PrecomputedHit::Hit(hit) if crossed == 0 => along.met(scene, hit),
-            _ => along.next(scene),
+            PrecomputedHit::Hit(hit) if crossed == 0 => along.met(scene, hit, !interior.is_open()),
+            _ => along.next(scene, !interior.is_open()),
         };
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
         let medium = if T::MEDIA && scene.survey.media { interior.medium(scene) } else { None };
@@ -354,7 +354,7 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
     let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
-        let Some((surface, t)) = along.next(scene) else {
+        let Some((surface, t)) = along.next(scene, !interior.is_open()) else {
             way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
             let Some(place) = reaching else { return way };
             for surface in &contact::before(scene, &place, direction, token) {

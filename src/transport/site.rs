@@ -5,7 +5,7 @@ use super::roulette::survival;
 use super::segment::{Between, ShadowRay, Start, shadow_ray};
 use super::vertex::{MediumVertex, Vertex};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
-use crate::light::Receiver;
+use crate::light::{DirectSample, Receiver};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::random::Draws;
@@ -64,6 +64,13 @@ pub trait ScatterPoint {
     #[inline]
     fn shadow_ray(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> ShadowRay {
         self.shadow_ray_to(scene, wi, target, token, false, None)
+    }
+
+    /// [`ScatterPoint::shadow_ray`] to a light.
+    #[inline]
+    fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample, token: u32) -> ShadowRay {
+        let reaching = light.target.and_then(|target| Place::on_light(scene, light.light, target));
+        self.shadow_ray_to(scene, light.wi, light.target, token, false, reaching)
     }
 
     /// The same to a vertex of a medium or not, or to one on a surface that others lie on.

@@ -30,6 +30,8 @@ pub struct PathStart {
     pub throughput: Rgb,
     /// The solids the origin is in.
     pub interior: Interior,
+    /// The surface that the first ray leaves, if others lie on that.
+    pub leaving: Option<Place>,
     /// What the first ray meets, if it has been traced already.
     pub first: PrecomputedHit,
     /// It has come from infinity.
@@ -95,7 +97,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { origin, direction, throughput, interior, ref first, far, channel, hue } = *start;
+    let PathStart { origin, direction, throughput, interior, leaving, ref first, far, channel, hue } = *start;
     let survival_scale = 1.0 / (V::SPARED * throughput.max_element());
     if !(survival_scale.is_finite() && throughput.is_finite()) {
         end(throughput, visitor);
@@ -119,7 +121,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         reach: if BESIDES >= SCATTERING { scene.reach(origin) } else { f32::INFINITY },
         scattered: None,
         in_medium: false,
-        leaving: None,
+        leaving,
         wavelength: None,
     };
     let mut known = first;

@@ -9,12 +9,12 @@ use crate::support;
 
 use caustique::camera::Camera;
 use caustique::geometry::Mesh;
-use caustique::material::Material;
+use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::render::{Control, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
-use support::scenes::{add, add_at, build, cuboid, glass, look_at, matte, quad, square};
+use support::scenes::{add, add_at, build, cuboid, glass, look_at, matte, mirror, point_light, quad, square};
 use support::stats::{mean_and_error, sidak, t_critical};
 
 const ERROR_RATE: f64 = 1e-3;
@@ -200,4 +200,118 @@ fn panes_too_thin_to_tell_are_named() {
 /// A square on the ground.
 fn square_of(low: f32, high: f32) -> Mesh {
     quad(Vec3::new(low, -2.0, low), Vec3::Z * (high - low), Vec3::X * (high - low))
+}
+
+/// Mean of a picture over seeds, and its standard error.
+fn mean_of(scene: &Scene, method: Method, iterations: u64) -> (f64, f64) {
+    let camera = scene.camera(&square(12)).expect("a camera");
+    let mean = |seed| {
+        let pixels = picture(scene, &camera, method, iterations, seed);
+        pixels.iter().sum::<f64>() / pixels.len() as f64
+    };
+    mean_and_error(&(1..=SEEDS).map(mean).collect::<Vec<_>>())
+}
+
+/// All of `methods` see `scenes[0]` as bright as each of the others that should look like it, to 1 % and noise, and tell
+/// it from the last one, which should not, or, by photons, whose noise the last one may hide in, from what is off by 15 %.
+fn look_alike(what: &str, scenes: &[Scene], methods: &[Method]) {
+    let checks = methods.len() * (scenes.len() - 1);
+    let critical = t_critical(sidak(ERROR_RATE, checks), 1, SEEDS as f64 - 1.0);
+    for &method in methods {
+        let iterations = if method == Method::Sppm { 48 } else { 64 };
+        let means: Vec<(f64, f64)> = scenes.iter().map(|scene| mean_of(scene, method, iterations)).collect();
+        println!("{what}, {method:?}: {means:.5?}");
+        let alike =
+            |other: (f64, f64)| (means[0].0 - other.0).abs() <= critical * means[0].1.hypot(other.1) + 0.01 * other.0;
+        let (&planted, others) = means[1..].split_last().expect("another scene");
+        assert!(others.iter().all(|&other| alike(other)), "{what}, {method:?}: {means:?}");
+        let off = (1.15 * others[0].0, others[0].1);
+        let rejects = !alike(planted) || method == Method::Sppm && !alike(off);
+        assert!(rejects, "{what}, {method:?}: cannot tell the two apart {means:?}");
+    }
+}
+
+/// A block of glass `gap` above a table, seen through its side, under a sky and a lamp beside it.
+fn block_on(table: Material, gap: f32, optical_contact: bool) -> Scene {
+    let mut description = white_sky();
+    add(&mut description, "table", quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0), table);
+    add(&mut description, "lamp", quad(Vec3::new(1.5, 0.1, -1.0), Vec3::Z * 2.0, Vec3::Y * 1.5), matte(0.0, 6.0));
+    let block = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 1.0, 1.0), false);
+    let lifted = DAffine3::from_translation(DVec3::Y * f64::from(gap));
+    add_at(&mut description, "block", block, Material { optical_contact, ..glass(1.5) }, lifted);
+    description.cameras.push(look_at(DVec3::new(0.3, 0.9, 4.0), DVec3::new(0.0, 0.35, 0.9), 12.0));
+    build(description)
+}
+
+/// The picture does not change when a glass is lifted off its table by a hair. Where table and glass were taken to be
+/// one, there was no total reflection at its foot.
+#[test]
+fn a_glass_on_a_table_looks_as_just_above_it() {
+    let metal = Material { base_color: [0.7, 0.7, 0.7, 1.0], roughness: 0.4, ..mirror() };
+    for (what, table) in [("matte table", matte(0.6, 0.0)), ("metal table", metal)] {
+        let of = |gap, optical| block_on(table.clone(), gap, optical);
+        look_alike(what, &[of(0.0, false), of(1e-3, false), of(1e-4, false), of(0.0, true)], &METHODS);
+    }
+}
+
+/// A lamp that touches the foot of a glass shines through the glass's surface, as one just below it.
+#[test]
+fn a_lamp_that_touches_a_glass_shines_as_from_below_it() {
+    let of = |gap: f32, optical_contact: bool| {
+        let mut description = Description::default();
+        add(&mut description, "wall", quad(Vec3::new(-2.0, -1.0, -2.0), Vec3::X * 4.0, Vec3::Y * 4.0), matte(0.7, 0.0));
+        let lamp = quad(Vec3::new(-0.6, 0.0, -0.6), Vec3::Z * 1.2, Vec3::X * 1.2);
+        add(&mut description, "lamp", lamp, matte(0.3, 5.0));
+        let block = cuboid(Vec3::new(-1.0, gap, -1.0), Vec3::new(1.0, 1.0 + gap, 1.0), false);
+        let rough = Material { roughness: 0.3, optical_contact, ..glass(1.5) };
+        add(&mut description, "block", block, rough);
+        description.cameras.push(look_at(DVec3::new(0.5, 1.3, 5.0), DVec3::new(0.0, 0.6, 0.0), 30.0));
+        build(description)
+    };
+    look_alike("lamp below a glass", &[of(0.0, false), of(1e-4, false), of(0.0, true)], &METHODS);
+}
+
+/// A room full of fog: the fog's faces lie on the walls, or stand behind them.
+fn foggy_room(beyond: f32, density: f32) -> Scene {
+    let mut description = Description::default();
+    let (low, high) = (Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0));
+    add(&mut description, "room", cuboid(low, high, true), matte(0.5, 0.0));
+    let medium = MediumParameters { sigma_a: Rgb::splat(0.2 * density), sigma_s: Rgb::splat(density), g: 0.3 };
+    let fog = Material { medium: Some(medium), ..glass(1.0) };
+    add(&mut description, "fog", cuboid(low - beyond, high + beyond, false), fog);
+    add(&mut description, "lamp", quad(Vec3::new(-0.3, 1.9, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6), matte(0.0, 8.0));
+    description.lights.push(point_light(DVec3::new(0.5, 0.4, 0.5), 0.3));
+    description.cameras.push(look_at(DVec3::new(0.1, 1.0, 0.9), DVec3::new(0.0, 0.8, -1.0), 60.0));
+    build(description)
+}
+
+/// Fog that ends on the walls of a room is there for cameras, lamps and points within it; where the search for the
+/// solids around a point stopped at the walls, it was not.
+#[test]
+fn fog_that_ends_on_walls_is_there() {
+    let scenes = [foggy_room(0.0, 1.0), foggy_room(0.05, 1.0), foggy_room(0.0, 0.1)];
+    look_alike("fog", &scenes, &[Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm]);
+}
+
+/// A point light in dark glass under a lid that touches the glass: absorption counts from the light on.
+#[test]
+fn a_point_light_in_glass_under_a_touching_lid_is_in_the_glass() {
+    let of = |gap: f32, sigma: f32| {
+        let mut description = Description::default();
+        let (low, high) = (Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 1.0, 1.0));
+        let medium = Some(MediumParameters { sigma_a: Rgb::splat(sigma), ..MediumParameters::default() });
+        add(&mut description, "glass", cuboid(low, high, false), Material { medium, ..glass(1.0) });
+        let lid = quad(Vec3::new(-1.5, 1.0 + gap, -1.5), Vec3::X * 3.0, Vec3::Z * 3.0);
+        add(&mut description, "lid", lid, matte(0.5, 0.0));
+        add(
+            &mut description,
+            "floor",
+            quad(Vec3::new(-3.0, -0.5, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0),
+            matte(0.5, 0.0),
+        );
+        description.lights.push(point_light(DVec3::new(0.1, 0.8, 0.1), 1.0));
+        description.cameras.push(look_at(DVec3::new(3.0, 0.3, 3.0), DVec3::new(0.5, -0.4, 0.5), 25.0));
+        build(description)
+    };
+    look_alike("lid", &[of(0.0, 1.2), of(1e-3, 1.2), of(0.0, 0.6)], &[Method::Path, Method::Bdpt, Method::Vcm]);
 }

@@ -263,6 +263,7 @@ fn deviated(scene: &Scene, hue: WavelengthSample, arriving: f64) -> f64 {
         direction,
         throughput: Rgb::ONE,
         interior: Interior::default(),
+        leaving: None,
         first: caustique::transport::PrecomputedHit::Unknown,
         far: false,
         channel: None,

@@ -5,7 +5,7 @@
 
 use crate::support;
 
-use caustique::math::{DAffine3, DVec3, Rgb};
+use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::Description;
 use caustique::scene::description::{PunctualKind, PunctualLight};
@@ -56,6 +56,39 @@ fn a_large_tilted_plane_does_not_shade_itself() {
                     "{half} m, turned by {angle}, {method:?}: from {least} to {largest} of what it should be"
                 );
             }
+        }
+    }
+}
+
+/// A small square in the sun just above a wide floor shades what it should: the rays of the floor start off it by the
+/// error of its height, not by that of its corners.
+#[test]
+fn a_small_shadow_on_a_wide_floor_is_whole() {
+    for half in [1.0, 100.0, 1e4] {
+        let mut description = Description::default();
+        let floor =
+            quad(DVec3::new(-half, 0.0, -half).as_vec3(), Vec3::Z * 2.0 * half as f32, Vec3::X * 2.0 * half as f32);
+        add(&mut description, "floor", floor, matte(0.5, 0.0));
+        let shade = quad(Vec3::new(-0.02, 1e-3, -0.02), Vec3::Z * 0.04, Vec3::X * 0.04);
+        add(&mut description, "shade", shade, matte(0.0, 0.0));
+        description.lights.push(PunctualLight {
+            name: "sun".into(),
+            to_world: DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::Z, DVec3::new(0.3, 1.0, 0.0).normalize())),
+            intensity: Rgb::splat(3.0),
+            kind: PunctualKind::Sun { angle: 0.0 },
+            radius: 0.0,
+            hidden_from_camera: false,
+            light_group: None,
+        });
+        // From below the square, where all of the floor that is seen is in its shadow.
+        description.cameras.push(look_at(DVec3::new(0.0, 5e-4, 0.03), DVec3::new(0.0, 0.0, 0.005), 0.5));
+        let scene = build(description);
+        let camera = scene.camera(&square(8)).expect("a camera");
+        for method in [Method::Path, Method::Bdpt, Method::Sppm] {
+            let settings = Settings { method, iterations: Some(2), photons: 100, ..Settings::default() };
+            let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
+            let lit = rendered.pixels.iter().filter(|pixel| pixel.mean(0).x > 0.0).count();
+            assert_eq!(lit, 0, "{half} m, {method:?}: pixels of the shadow that are lit");
         }
     }
 }

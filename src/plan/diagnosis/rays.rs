@@ -42,7 +42,7 @@ pub(super) fn first_opaque_after(
 ) -> Option<Surface> {
     let mut along = Along::new(Ray { origin, direction, tmax, token }, None);
     for _ in 0..MOST_SURFACES {
-        let (surface, _) = along.next(scene)?;
+        let (surface, _) = along.next(scene, false)?;
         if !scene.materials.list[surface.material as usize].transmits() {
             return Some(surface);
         }

@@ -102,12 +102,23 @@ impl Medium {
     }
 }
 
+/// How a material lies on opaque surfaces, or others on it.
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Contact {
+    /// With a film of air between.
+    Air,
+    /// Without.
+    Optical,
+}
+
 /// Extras of a material.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct MaterialExtras {
     pub(super) medium: Option<Medium>,
     pub(super) priority: i32,
+    pub(super) contact: Option<Contact>,
     pub(super) null_bsdf: bool,
     pub(super) spread_deg: Option<f32>,
 }
@@ -165,7 +176,7 @@ pub(super) const SCENE: &[&str] = &[
     "frame_rate",
 ];
 pub(super) const MATERIAL: &[&str] =
-    &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "null_bsdf", "spread_deg"];
+    &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "contact", "null_bsdf", "spread_deg"];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
 pub(super) const LIGHT: &[&str] = &["radius", "angle_deg", "blend", "visible", "visible.camera", "light_group"];
 pub(super) const NODE: &[&str] = &[

@@ -298,6 +298,7 @@ impl Reader<'_> {
         extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
         let said: MaterialExtras = extras::read(self.raw, self.place)?;
         material.priority = said.priority;
+        material.optical_contact = said.contact == Some(extras::Contact::Optical);
         material.null_bsdf = said.null_bsdf && material.transmission == 0.0;
         if said.null_bsdf && !material.null_bsdf {
             self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
