@@ -32,7 +32,7 @@ fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
 
 /// Numbers without a pattern, the extremes among them.
 fn noise(count: usize) -> Vec<u16> {
-    let random = |i: usize| (i as u64 * 0x9e37_79b9_7f4a_7c15 >> 40) as u16;
+    let random = |i: usize| ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as u16;
     [0, u16::MAX].into_iter().chain((2..).map(random)).take(count).collect()
 }
 
