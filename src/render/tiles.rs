@@ -144,7 +144,7 @@ mod tests {
         for [x, y, width, height] in [[0, 0, 70, 50], [16, 32, 16, 16], [13, 7, 40, 43], [69, 49, 1, 1]] {
             let camera = whole.window([x, y, width, height]);
             let tiles = Tiles::new(&camera);
-            let (mut on_film, mut keys, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut on_film, mut keys, mut numbers) = (Vec::new(), Vec::<u64>::new(), Vec::<usize>::new());
             for tile in tiles.of_whole() {
                 numbers.extend(tile.tile);
                 for group in tiles.all_groups(tile) {
