@@ -20,6 +20,9 @@ const SCATTER: f64 = 0.2;
 /// Spread of the logarithm of an error that is told from what it is, what judges add apart: fitted on twelve scenes, and
 /// checked on others (`docs/accuracy.md`).
 const MODEL: f64 = 0.25;
+/// Squared bias over what levels tell of it, where it grows with the bandwidth and not with its square, as it does at
+/// edges and on things narrower than the kernel: the next larger level has sqrt(2) times the bias then, not twice.
+const OF_EDGES: f64 = 5.828_427;
 /// The share of pictures whose error lies in the interval.
 pub const CONFIDENCE: f64 = 0.9;
 /// Standard deviations to each side of a normal distribution that hold that share.
@@ -87,15 +90,21 @@ impl Accuracy {
 
     /// Relative error of the picture finished after so many iterations: the root of trimmed relMSE.
     pub fn error(&self, iterations: u64) -> f64 {
-        ((self.level - 2.0 * self.exponent * (iterations as f64).ln()).exp() + self.squared_bias).sqrt()
+        (self.noise(iterations) + self.squared_bias).sqrt()
+    }
+
+    /// Squared error of noise.
+    fn noise(&self, iterations: u64) -> f64 {
+        (self.level - 2.0 * self.exponent * (iterations as f64).ln()).exp()
     }
 
     /// Between what the error lies in [`CONFIDENCE`] of all pictures. Where few bright samples hold the noise, the upper
     /// end is what the error would be with all of it: as if the pixels that were left out were as well told as others.
+    /// The bias is that of edges there.
     pub fn interval(&self, iterations: u64) -> [f64; 2] {
         let factor = (DEVIATIONS * MODEL.hypot(0.5 * self.doubt)).exp();
-        let error = self.error(iterations);
-        [error / factor, error * factor / (1.0 - self.rare).max(1e-4).sqrt()]
+        let most = (self.noise(iterations) + OF_EDGES * self.squared_bias).sqrt();
+        [self.error(iterations) / factor, most * factor / (1.0 - self.rare).max(1e-4).sqrt()]
     }
 
     /// Iterations after which the error is this small; `None` where bias forbids it for longer than can be told.
@@ -142,6 +151,9 @@ mod tests {
     fn bias_stays_and_nothing_is_told_where_nothing_is_known() {
         let told = Accuracy::of(&history(&[8, 16], |n| 0.01 / n, 0.04)).expect("two moments");
         assert!((told.error(1 << 40) - 0.2).abs() < 1e-3 && told.iterations_to(0.19).is_none());
+        // Bias that grows with the bandwidth alone is 1 / (sqrt(2) - 1) times what the levels tell.
+        let [_, high] = told.interval(1 << 40);
+        assert!((high / (0.2 / (2f64.sqrt() - 1.0)) / (DEVIATIONS * MODEL).exp() - 1.0).abs() < 1e-3, "{high}");
         assert_eq!(Accuracy::of(&[]), None);
     }
 
