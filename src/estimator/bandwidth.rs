@@ -4,7 +4,9 @@
 //! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest
 //! bandwidth is the distance to the k-th nearest photon of the kind on its own surface around its pilot path's
 //! gathering point, at most [`SCREEN_CAP`] of the picture's width there (by default). With fewer than k photons within
-//! the cap it is the cap. A pixel whose pilot path gathers nowhere gets the median of the others (or, with no others,
+//! the cap it is the cap. A magnified view may be so small that no photon ever lies within its cap, and all the light
+//! that photons bring would be missing: the cap is no smaller than the radius in which one photon is expected where
+//! photons usually lie. A pixel whose pilot path gathers nowhere gets the median of the others (or, with no others,
 //! the cap at the scene's size).
 
 use crate::camera::{Camera, band, par_pixels};
@@ -55,7 +57,7 @@ pub fn footprint(camera: &Camera, length: f32) -> f32 {
 }
 
 /// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the
-/// picture's width.
+/// picture's width, if one photon is expected within that.
 pub fn initial_bandwidths<const MAPS: usize>(
     eye: &Eye<'_>,
     rule: InitialBandwidth,
@@ -63,8 +65,8 @@ pub fn initial_bandwidths<const MAPS: usize>(
     seed: u64,
     pilots: [&PhotonMap; MAPS],
 ) -> Vec<[f32; MAPS]> {
-    let bounds = Bounds { widest, enough: 0.0 };
-    bandwidths(eye, (rule, bounds), seed, pilots, |arena, start| eye.gather_point(arena, start))
+    let enough = pilots.map(|pilot| enough(rule, pilot, f32::sqrt));
+    bandwidths(eye, (rule, Bounds { widest, enough }), seed, pilots, |arena, start| eye.gather_point(arena, start))
 }
 
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path,
@@ -81,12 +83,7 @@ pub fn initial_volume_bandwidths(
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    let one = match rule {
-        InitialBandwidth::Nearest(k) => usual_radius2(pilot, k).sqrt() / (k as f32).cbrt(),
-        _ => 0.0,
-    };
-    let enough = if one.is_finite() { one } else { 0.0 };
-    let bounds = Bounds { widest, enough };
+    let bounds = Bounds { widest, enough: [enough(rule, pilot, f32::cbrt)] };
     let found = bandwidths(eye, (rule, bounds), seed, [pilot], |arena, start| eye.volume_point(arena, start));
     medians(found.as_flattened(), eye.camera.size().0 as usize)
 }
@@ -104,19 +101,27 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
     (0..values.len()).into_par_iter().map(around_pixel).collect()
 }
 
-/// What bandwidths are not to exceed.
-#[derive(Clone, Copy)]
-struct Bounds {
-    /// Over the picture's width.
-    widest: f32,
-    /// They may be as large as this at least.
-    enough: f32,
+/// The radius in which one photon is expected where photons usually lie, of which those within the k-th nearest take
+/// `root` of k times that; 0 where it is not known.
+fn enough<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
+    let InitialBandwidth::Nearest(k) = rule else { return 0.0 };
+    let one = usual_radius2(pilot, k).sqrt() / root(k as f32);
+    if one.is_finite() { one } else { 0.0 }
 }
 
-impl Bounds {
-    /// At the end of a path where the picture spans so much.
-    fn at(self, span: f32) -> f32 {
-        (self.widest * span).max(self.enough)
+/// What bandwidths are not to exceed.
+#[derive(Clone, Copy)]
+struct Bounds<const MAPS: usize> {
+    /// Over the picture's width.
+    widest: f32,
+    /// They may be as large as this at least, by map.
+    enough: [f32; MAPS],
+}
+
+impl<const MAPS: usize> Bounds<MAPS> {
+    /// For a map, at the end of a path where the picture spans so much.
+    fn at(self, map: usize, span: f32) -> f32 {
+        (self.widest * span).max(self.enough[map])
     }
 }
 
@@ -132,7 +137,7 @@ pub fn usual_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
 
 fn bandwidths<P: Located, const MAPS: usize>(
     eye: &Eye<'_>,
-    (rule, bounds): (InitialBandwidth, Bounds),
+    (rule, bounds): (InitialBandwidth, Bounds<MAPS>),
     seed: u64,
     pilots: [&PhotonMap<P>; MAPS],
     find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
@@ -144,12 +149,11 @@ fn bandwidths<P: Located, const MAPS: usize>(
         return vec![[r; MAPS]; pixels];
     }
     let least = LEAST * scene.lights.sky().radius;
-    let of_point = |pilot: &PhotonMap<P>, nearest: &mut Nearest<P>, point: &GatherPoint| {
-        let span = span(camera, point.length);
-        let cap = bounds.at(span);
+    let of_point = |map: usize, nearest: &mut Nearest<P>, point: &GatherPoint| {
+        let cap = bounds.at(map, span(camera, point.length));
         let r = match rule {
             InitialBandwidth::Nearest(k) => {
-                nearest.radius2(pilot, point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
+                nearest.radius2(pilots[map], point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
             }
             _ => footprint(camera, point.length).min(cap),
         };
@@ -164,7 +168,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
         |(arena, nearest), found, places| {
             let starts = eye.starts(places, streams);
             for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                let of = |point| std::array::from_fn(|map| of_point(pilots[map], &mut nearest[map], &point));
+                let of = |point| std::array::from_fn(|map| of_point(map, &mut nearest[map], &point));
                 found[place.at] = find(arena, start).map(of);
                 arena.reset();
             }
@@ -172,7 +176,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
     );
     let fallback = std::array::from_fn(|map| {
         let mut known: Vec<f32> = found.iter().flatten().map(|r| r[map]).collect();
-        let usual = || bounds.at(span(camera, scene.lights.sky().radius)).max(least);
+        let usual = || bounds.at(map, span(camera, scene.lights.sky().radius)).max(least);
         median(&mut known, f32::total_cmp).unwrap_or_else(usual)
     });
     found.into_iter().map(|r| r.unwrap_or(fallback)).collect()

@@ -15,7 +15,7 @@ use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, square};
 use support::stats::{mean_and_error, t_critical};
 
-const TESTS: usize = 4;
+const TESTS: usize = 7;
 const ERROR_RATE: f64 = 1e-3;
 const SEEDS: u64 = 32;
 const SIZE: u32 = 8;
@@ -57,18 +57,35 @@ fn check(what: &str, values: &[f64], expected: f64, bias: f64, detects: f64) {
 
 /// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho).
 /// The picture stays clear of the edges.
-fn furnace() -> Scene {
+fn furnace(degrees: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
-    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), degrees));
     build(description)
 }
 
 #[test]
 fn furnace_box() {
-    let scene = furnace();
+    let scene = furnace(40.0);
     let values: Vec<f64> = (0..SEEDS).map(|seed| mean(&picture(&scene, &settings(200_000, seed)))).collect();
     check("furnace", &values, 1.0, 5e-3, 0.025);
+}
+
+/// A view of a tenth of a degree is narrower than the photons are apart, and has its light all the same: without
+/// photons there would be three quarters of it.
+#[test]
+fn a_magnified_view_has_its_photons() {
+    let scene = furnace(0.1);
+    for method in [Method::Sppm, Method::Appm, Method::Cppm] {
+        let of = |seed| Settings { method, seed, photons: 1000, iterations: Some(32), ..Settings::default() };
+        let own = of(0).levels.own();
+        let mean = |seed: u64| {
+            let rendered = picture(&scene, &of(seed));
+            rendered.pixels.iter().map(|pixel| pixel.mean(own).x).sum::<f64>() / rendered.pixels.len() as f64
+        };
+        let values: Vec<f64> = (0..SEEDS).map(mean).collect();
+        check(method.name(), &values, 1.0, 5e-3, 0.2);
+    }
 }
 
 /// In a closed box that reflects nine tenths a light path ends at one surface in ten: it leaves nine photons, the first
@@ -94,7 +111,7 @@ fn photons_are_forecast() {
 /// Where the memory ends, light is divided by the light paths that were traced.
 #[test]
 fn a_full_map_is_no_darker() {
-    let scene = furnace();
+    let scene = furnace(40.0);
     let most = 30_000;
     let mut values = vec![];
     for seed in 0..SEEDS {
@@ -138,7 +155,7 @@ fn sun_through_a_slab() {
 /// All iterations and all shards see the same map, whatever the threads.
 #[test]
 fn threads_and_shards_change_nothing() {
-    let scene = furnace();
+    let scene = furnace(40.0);
     let base = Settings { photon_memory: 20_000 * PHOTON_BYTES, ..settings(50_000, 3) };
     let all = |settings: &Settings, threads: usize| -> Vec<DVec3> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
