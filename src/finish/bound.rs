@@ -10,6 +10,7 @@
 //! (`docs/theory.md`). The result stays between zero and the brightest estimate around; how often it had to be kept
 //! there is counted.
 
+use super::Estimate;
 use super::window::{Size, window};
 use rayon::prelude::*;
 
@@ -21,19 +22,38 @@ pub const REACH: usize = 3;
 const RANK: f32 = 0.8;
 
 /// The larger of each pixel's standard error and the one of rank `RANK` around it, by channel; not finite ones count as
-/// unknown, larger than all.
-pub fn spread(deviation: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
+/// unknown, larger than all. Zero where a pixel is exact.
+///
+/// A pixel takes over the standard errors of those around it alone whose estimate its own may be another sample of:
+/// beside a bright light its own samples say that it does not show the light.
+pub fn spread(estimate: &Estimate) -> Vec<[f32; 3]> {
+    let Estimate { size, mean, deviation, .. } = estimate;
+    let known = |value: f32| if value.is_finite() { value.max(0.0) } else { f32::INFINITY };
     let of_pixel = |ranked: &mut Vec<f32>, index: usize| {
+        if estimate.is_exact(index) {
+            return [0.0; 3];
+        }
         std::array::from_fn(|c| {
-            let known = |value: f32| if value.is_finite() { value.max(0.0) } else { f32::INFINITY };
+            let error_of = |other: usize| {
+                let error = known(deviation[other][c]);
+                let apart = mean[other][c] - mean[index][c];
+                if apart > LIMIT * error { 0.0 } else { error }
+            };
             ranked.clear();
-            ranked.extend(window(size, index, REACH).map(|other| known(deviation[other][c])));
+            ranked.extend(window(*size, index, REACH).map(error_of));
             let rank = (RANK * (ranked.len() - 1) as f32).round() as usize;
             let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
             known(deviation[index][c]).max(*around)
         })
     };
-    (0..deviation.len()).into_par_iter().map_init(Vec::new, of_pixel).collect()
+    (0..mean.len()).into_par_iter().map_init(Vec::new, of_pixel).collect()
+}
+
+/// The largest estimates within [`REACH`] of a pixel that are numbers; zero where there are none.
+pub fn brightest(mean: &[[f32; 3]], size: Size, index: usize) -> [f32; 3] {
+    window(size, index, REACH).fold([0.0; 3], |most, other| {
+        std::array::from_fn(|c| if mean[other][c].is_finite() { most[c].max(mean[other][c]) } else { most[c] })
+    })
 }
 
 /// Pixels with a channel that was kept within the range.
@@ -73,12 +93,7 @@ pub fn bounded_and_counted(
         }
     };
     let of_pixel = |index: usize| {
-        let mut brightest = [0f32; 3];
-        for other in window(size, index, REACH) {
-            for (most, value) in brightest.iter_mut().zip(mean[other]) {
-                *most = most.max(if value.is_finite() { value } else { 0.0 });
-            }
-        }
+        let brightest = brightest(mean, size, index);
         let free: [f32; 3] = std::array::from_fn(|c| displaced(index, c));
         let clamped = [(0..3).any(|c| free[c] < 0.0), (0..3).any(|c| free[c] > brightest[c])];
         (std::array::from_fn(|c| free[c].min(brightest[c]).max(0.0)), clamped)
@@ -103,13 +118,17 @@ mod tests {
         (0..SIZE.pixels()).map(|index| [of(index), 2.0 * of(index), 0.5 * of(index)]).collect()
     }
 
+    fn estimate(mean: &[[f32; 3]], deviation: Vec<[f32; 3]>) -> Estimate {
+        Estimate { size: SIZE, mean: mean.to_vec(), deviation, albedo: None, normal: None, alpha: None }
+    }
+
     /// A denoiser that returns nonsense moves no pixel by more than the bound, and what it returns where it is not a
     /// number is not used.
     #[test]
     fn nonsense_is_bounded() {
         let mean = plane(|index| 1.0 + 0.1 * noise(1, index));
         let deviation = plane(|index| 0.01 + 0.01 * noise(2, index));
-        let spread = spread(&deviation, SIZE);
+        let spread = spread(&estimate(&mean, deviation));
         for nonsense in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e30, 1e30, 0.0] {
             let out = bounded(&mean, &plane(|_| nonsense), &spread, SIZE);
             for (index, out) in out.iter().enumerate() {
@@ -132,7 +151,7 @@ mod tests {
             let deviation = plane(|_| n.sqrt().recip());
             // Uniform noise of that deviation.
             let mean = plane(|index| 3.0 + (12f32 / n).sqrt() * (noise(n as u64, index) - 0.5));
-            let out = bounded(&mean, &wrong, &spread(&deviation, SIZE), SIZE);
+            let out = bounded(&mean, &wrong, &spread(&estimate(&mean, deviation)), SIZE);
             out.iter().map(|out| f64::from((out[0] - 3.0).powi(2))).sum::<f64>() / SIZE.pixels() as f64
         };
         let slope = (error(1e5).ln() - error(1e3).ln()) / 100f64.ln();
@@ -147,7 +166,7 @@ mod tests {
         let mean = plane(|index| if index == at { 100.0 } else { 1.0 });
         let deviation = plane(|index| if index == at { 100.0 } else { 0.1 });
         let smeared = plane(|_| 5.0);
-        let out = bounded(&mean, &smeared, &spread(&deviation, SIZE), SIZE);
+        let out = bounded(&mean, &smeared, &spread(&estimate(&mean, deviation)), SIZE);
         assert_eq!(out[at][0], 5.0);
         assert!(out.iter().enumerate().all(|(index, out)| index == at || out[0] < 1.31));
         // Nor is anything brighter than what was estimated around.
@@ -177,7 +196,37 @@ mod tests {
         for (width, height) in [(0, 0), (1, 1), (1, 50), (50, 1), (3, 2)] {
             let size = Size { width, height };
             let values = vec![[1.0; 3]; size.pixels()];
-            assert_eq!(bounded(&values, &values, &spread(&values, size), size), values);
+            let estimate = Estimate { size, ..estimate(&values, values.clone()) };
+            assert_eq!(bounded(&values, &values, &spread(&estimate), size), values);
+        }
+    }
+
+    /// Beside a light of a million a wall whose samples were all equal stays as it is, and so does one with little
+    /// noise, because its samples are none of the light's.
+    #[test]
+    fn a_bright_light_leaves_no_halo() {
+        let lit = |index: usize| index % SIZE.width < 10;
+        for error in [0.0, 0.01] {
+            let mean = plane(|index| if lit(index) { 1e6 } else { 0.2 });
+            let deviation = plane(|index| if lit(index) { 1e5 } else { error });
+            let spread = spread(&estimate(&mean, deviation));
+            let out = bounded(&mean, &plane(|_| 1.5), &spread, SIZE);
+            let wall = out.iter().enumerate().filter(|(index, _)| !lit(*index));
+            assert!(wall.map(|(_, out)| out[0]).all(|value| (value - 0.2).abs() <= LIMIT * error * 1.0001));
+        }
+    }
+
+    /// A pixel that shows nothing stays black; a black surface may have missed the light of those around.
+    #[test]
+    fn nothing_is_seen_where_alpha_is_zero() {
+        let covered = |index: usize| index % SIZE.width < 20;
+        let mean = plane(|index| if index % 2 == 0 && covered(index) { 1.0 } else { 0.0 });
+        let alpha = (0..SIZE.pixels()).map(|index| f32::from(u8::from(covered(index)))).collect();
+        let noisy = Estimate { alpha: Some(alpha), ..estimate(&mean, mean.clone()) };
+        let spread = spread(&noisy);
+        let inside = |index: usize| index % SIZE.width + REACH < 20;
+        for (index, spread) in spread.iter().enumerate().filter(|(index, _)| inside(*index) || !covered(*index)) {
+            assert!(if covered(index) { spread[0] == 1.0 } else { *spread == [0.0; 3] }, "pixel {index}: {spread:?}");
         }
     }
 

@@ -3,7 +3,8 @@
 //! 1. The estimate `M`: the usual single-bandwidth image, or what equation (6) of the 2021 paper combines from levels
 //!    where its network was asked for.
 //! 2. A denoiser's picture `D` of it ([`denoiser`]).
-//! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent whatever `D` is.
+//! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent whatever `D` is; and the light of the picture
+//!    as a whole is kept ([`conserve`]).
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
 //! 5. The error of the result, told by independent quarters of the iterations ([`Verdict`]).
 //!
@@ -11,6 +12,7 @@
 //! fresh one is.
 
 pub mod bound;
+mod conserve;
 pub mod denoiser;
 pub mod parts;
 pub mod statistical;
@@ -18,7 +20,7 @@ pub mod told;
 mod verdict;
 mod window;
 
-pub use denoiser::{Denoiser, DenoiserChoice, Quality};
+pub use denoiser::{Denoiser, DenoiserChoice, Quality, least_scratch};
 pub use verdict::{Errors, USUAL, Verdict};
 pub use window::{Size, Windows, window};
 
@@ -31,10 +33,17 @@ use parts::Part;
 use rayon::prelude::*;
 use verdict::Trial;
 
+/// A standard error over its estimate that is the rounding of single precision sums.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+/// Bytes that a finish takes for a pixel beside its layers, without parts: the estimate by all and by half of the
+/// iterations, their pictures, the quarters, and what the error is worked out in.
+pub const BYTES_PER_PIXEL: u64 = 384;
+/// The same for each part.
+pub const BYTES_PER_PIXEL_OF_PART: u64 = 36;
 /// The layer of the picture's error.
 pub const ERROR: &str = "Error";
 /// The additive parts of our layers, the last one the one that light of no part goes to.
-const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
+pub const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
 /// Layers of ours that the picture is finished from, and that the network reads, by the beginnings of their names.
 const PICTURE: [&str; 6] = ["Noisy", "Level", "Variance", "albedo", "normal", "depth"];
 
@@ -72,6 +81,8 @@ pub struct Estimate {
     pub albedo: Option<Vec<[f32; 3]>>,
     /// Normal there, world space.
     pub normal: Option<Vec<[f32; 3]>>,
+    /// Share of a pixel that shows anything, where that is known.
+    pub alpha: Option<Vec<f32>>,
 }
 
 /// The number of the level that is the method's own image: the second largest.
@@ -116,7 +127,17 @@ impl Estimate {
             }
         };
         let guide = |role| set.find(role).filter(|layer| layer.planes.len() >= 3).map(Layer::triples);
-        Ok(Estimate { size, mean, deviation, albedo: guide(Role::Albedo), normal: guide(Role::Normal) })
+        let (albedo, normal, alpha) = (guide(Role::Albedo), guide(Role::Normal), alpha(set));
+        Ok(Estimate { size, mean, deviation, albedo, normal, alpha })
+    }
+
+    /// Whether all samples of a pixel have shown the same: a light without noise, or nothing at all. A black surface is
+    /// none of these, because its light may be rare.
+    pub(crate) fn is_exact(&self, index: usize) -> bool {
+        let (mean, error) = (self.mean[index], self.deviation[index]);
+        let most = mean.into_iter().fold(0.0, f32::max);
+        let shows_nothing = most == 0.0 && self.alpha.as_ref().is_some_and(|alpha| alpha[index] == 0.0);
+        (most > 0.0 || shows_nothing) && error.into_iter().all(|error| error <= ROUNDING * most)
     }
 
     /// The estimate by the first two quarters alone.
@@ -128,10 +149,15 @@ impl Estimate {
     /// The estimate by some of the iterations, whose mean is given; all are `fewer` times as many.
     #[must_use]
     pub fn of_some(&self, mean: Vec<[f32; 3]>, fewer: f32) -> Estimate {
-        let Estimate { size, albedo, normal, .. } = self;
         let deviation = self.deviation.iter().map(|s| s.map(|s| s * fewer.sqrt())).collect();
-        Estimate { size: *size, mean, deviation, albedo: albedo.clone(), normal: normal.clone() }
+        let (albedo, normal, alpha) = (self.albedo.clone(), self.normal.clone(), self.alpha.clone());
+        Estimate { size: self.size, mean, deviation, albedo, normal, alpha }
     }
+}
+
+/// The share of each pixel that shows anything; `None` where the picture does not tell.
+fn alpha(set: &LayerSet) -> Option<Vec<f32>> {
+    set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone())
 }
 
 /// The pictures of the four quarters of the iterations; `None` where one is missing or black.
@@ -170,6 +196,13 @@ impl Finish {
         Finish { denoiser, quality: Quality::High, network }
     }
 
+    /// The finish by which auto's pilots are compared: our own denoiser's where the render has any. The choice is the
+    /// same for a whole render and for each of its shards then, with and without the library of another denoiser.
+    pub fn of_pilots(choice: DenoiserChoice) -> Finish {
+        let none = choice == DenoiserChoice::None;
+        Finish::new(if none { Denoiser::None } else { Denoiser::Own }, None)
+    }
+
     /// The denoiser's name.
     pub fn denoiser(&self) -> String {
         self.denoiser.name()
@@ -183,7 +216,7 @@ impl Finish {
     pub fn rehearse(&mut self, size: Size, quality: Quality) -> Result<()> {
         let plane = || vec![[0.5; 3]; size.pixels()];
         let (albedo, normal) = (Some(plane()), Some(plane()));
-        let estimate = Estimate { size, mean: plane(), deviation: plane(), albedo, normal };
+        let estimate = Estimate { size, mean: plane(), deviation: plane(), albedo, normal, alpha: None };
         self.denoiser.run(&estimate, quality).map(|_| ())
     }
 
@@ -203,8 +236,9 @@ impl Finish {
     /// The finished picture, and the spread that bounds it; and what was clamped.
     fn with_spread(&mut self, estimate: &Estimate) -> Result<([Vec<[f32; 3]>; 2], Clamped)> {
         let denoised = self.denoiser.run(estimate, self.quality)?;
-        let spread = bound::spread(&estimate.deviation, estimate.size);
-        let (picture, clamped) = bound::bounded_and_counted(&estimate.mean, &denoised, &spread, estimate.size);
+        let spread = bound::spread(estimate);
+        let (mut picture, clamped) = bound::bounded_and_counted(&estimate.mean, &denoised, &spread, estimate.size);
+        conserve::give_back(&mut picture, (&estimate.mean, &denoised), (estimate, &spread));
         Ok(([picture, spread], clamped))
     }
 
@@ -227,7 +261,7 @@ impl Finish {
         let (verdict, errors) = self.judged(set, &estimate, wanted(ERROR))?.unzip();
         let errors = errors.flatten();
         let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
-        let alpha = set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone());
+        let alpha = alpha(set);
         set.layers.retain(|layer| layer.name != "Combined");
         set.push(match alpha {
             Some(alpha) => {
@@ -342,7 +376,7 @@ impl Finish {
             names.push(name);
             estimates.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
         }
-        let finished = parts::shared(&estimates, whole, spread, estimate.size);
+        let finished = parts::shared(&estimates, whole, (estimate, spread));
         Ok(names.into_iter().zip(finished).collect())
     }
 }
@@ -367,4 +401,18 @@ fn with_rest(mut groups: Vec<(String, Vec<[f32; 3]>)>, whole: &[[f32; 3]]) -> Ve
         groups.insert(0, (String::new(), rest));
     }
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Shards know nothing of each other, and have to choose as one render does.
+    #[test]
+    fn pilots_are_judged_alike_whatever_denoises_the_picture() {
+        for choice in [DenoiserChoice::Auto, DenoiserChoice::Oidn, DenoiserChoice::Own] {
+            assert_eq!(Finish::of_pilots(choice).denoiser(), "own");
+        }
+        assert_eq!(Finish::of_pilots(DenoiserChoice::None).denoiser(), "none");
+    }
 }

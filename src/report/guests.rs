@@ -68,6 +68,7 @@ impl Denoising {
             deviation: vec![[0.0; 3]; picture.len()],
             albedo: self.albedo.clone(),
             normal: self.normal.clone(),
+            alpha: None,
         };
         let mut spent = Spent::default();
         let denoised = spent.during(|| self.denoiser.run(&estimate, Quality::High))?;

@@ -12,13 +12,13 @@ fn estimate(size: Size, of: impl Fn(usize) -> f32) -> Estimate {
     let mean: Vec<[f32; 3]> = (0..size.pixels()).map(|i| [of(i), 0.5 * of(i), of(i) * (0.9 + 0.2 * draw(i))]).collect();
     let deviation = mean.iter().map(|rgb| rgb.map(|value| 0.1 * value)).collect();
     let (albedo, normal) = (vec![[0.5; 3]; size.pixels()], vec![[0.0, 0.0, 1.0]; size.pixels()]);
-    Estimate { size, mean, deviation, albedo: Some(albedo), normal: Some(normal) }
+    Estimate { size, mean, deviation, albedo: Some(albedo), normal: Some(normal), alpha: None }
 }
 
 /// Pixels of a picture that break a bound: each channel is a number, between zero and the brightest estimate around,
 /// and no further from its own estimate than the limit, where there is one.
 fn outside(estimate: &Estimate, picture: &[[f32; 3]]) -> Vec<usize> {
-    let (size, spread) = (estimate.size, spread(&estimate.deviation, estimate.size));
+    let (size, spread) = (estimate.size, spread(estimate));
     let breaks = |index: usize, c: usize| {
         let around = window(size, index, REACH).map(|other| estimate.mean[other][c]).filter(|value| value.is_finite());
         let (value, mean) = (picture[index][c], estimate.mean[index][c]);
