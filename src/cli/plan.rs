@@ -51,7 +51,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     check::media(&job.scene.path, &settings, &scene)?;
     let make = |way| job.allowed(way, camera.size());
     let choice = if job.method == Method::Auto {
-        let mut finish = job.pilot_finish()?;
+        let mut finish = job.pilot_finish();
         let tried = || choose((&scene, &camera), &mut finish, make, || false);
         Form::beside(args.json).during("choosing a method", tried)
     } else {
@@ -65,7 +65,7 @@ fn report(args: &PlanArgs) -> Result<()> {
         Some(error) => {
             let settings = choice.as_ref().map_or(&settings, |choice| &choice.settings);
             let settings = sized(settings.clone(), job.photons, camera.size());
-            let mut finish = job.pilot_finish()?;
+            let mut finish = job.outlook_finish()?;
             let tried = || outlook((&scene, &camera), &settings, &mut finish, error);
             Some((error, Form::beside(args.json).during("trying how the error falls", tried)?))
         }

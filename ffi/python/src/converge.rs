@@ -237,7 +237,7 @@ impl Comparison {
             if approach.method.is_none() {
                 let limits = Common { time: self.time(), ..self.common };
                 let make = |way| approach.allowed(&limits, way, camera.size());
-                choice = choose((built, camera), &mut approach.pilot_finish(None)?, make, || told.caller.stops());
+                choice = choose((built, camera), &mut approach.pilot_finish(), make, || told.caller.stops());
             }
             if let Some(choice) = &choice {
                 (settings, decided) = (choice.settings.clone(), choice.spent);

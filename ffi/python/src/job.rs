@@ -6,7 +6,7 @@ use caustique::camera::{Filter, WIDEST};
 use caustique::error::Error;
 use caustique::estimator::InitialBandwidth;
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
-use caustique::finish::{Denoiser, DenoiserChoice, Finish};
+use caustique::finish::{DenoiserChoice, Finish};
 use caustique::pipeline::{finish, sized};
 use caustique::plan::Switches;
 use caustique::render::{DEFAULT_ITERATIONS, Levels, Method, RadiusRule, Settings, Shard, Strategy};
@@ -160,17 +160,9 @@ impl Approach {
         Some(finish::Order { denoiser, model })
     }
 
-    /// What auto's pilots are finished with: as the render, but for a network, and of a shard by our own denoiser,
-    /// whose pictures are the same on all machines.
-    ///
-    /// # Errors
-    /// A library that was asked for by name is missing.
-    pub fn pilot_finish(&self, shard: Option<Shard>) -> caustique::error::Result<Finish> {
-        let choice = match self.finish.as_ref().map_or(DenoiserChoice::None, |(denoiser, _)| *denoiser) {
-            DenoiserChoice::Auto | DenoiserChoice::Oidn if shard.is_some() => DenoiserChoice::Own,
-            asked => asked,
-        };
-        Ok(Finish::new(Denoiser::open(choice)?.0, None))
+    /// The finish of auto's pilots.
+    pub fn pilot_finish(&self) -> Finish {
+        Finish::of_pilots(self.finish.as_ref().map_or(DenoiserChoice::None, |(denoiser, _)| *denoiser))
     }
 
     fn plus(&self) -> bool {

@@ -186,7 +186,7 @@ impl Scene {
         let done = work(py, threads, |caller| {
             let allowed = |way, size| approach.allowed(&common, way, size);
             let auto = match approach.method {
-                None => Some(Auto { allowed: &allowed, finish: approach.pilot_finish(shard)? }),
+                None => Some(Auto { allowed: &allowed, finish: approach.pilot_finish() }),
                 Some(_) => None,
             };
             let order = Order {
@@ -247,7 +247,7 @@ impl Scene {
                 Some(_) => None,
                 None => {
                     let make = |way| approach.allowed(&common, way, camera.size());
-                    choose((scene, &camera), &mut approach.pilot_finish(None)?, make, || caller.stops())
+                    choose((scene, &camera), &mut approach.pilot_finish(), make, || caller.stops())
                 }
             };
             let Common { max_depth, switches, .. } = common;

@@ -153,7 +153,7 @@ fn choose_all(
         if run.args.method != Method::Auto {
             return Ok(None);
         }
-        let mut finish = run.args.pilot_finish()?;
+        let mut finish = run.args.pilot_finish();
         let tried = || choose((scene, camera), &mut finish, make, || interrupt.asked());
         let Some(chosen) = args.progress.during("choosing a method", tried) else { return Ok(None) };
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));

@@ -483,18 +483,22 @@ impl Job {
         Strategy { method: self.method.chosen(), guided: self.guide == Some(Switch::On), indirect }
     }
 
-    /// What auto's pilots are finished with: as the render, but for a network, and on one of several machines by our
-    /// own denoiser, whose pictures are the same on all.
+    /// What denoises the picture.
+    fn denoiser(&self) -> DenoiserChoice {
+        if self.no_combine { DenoiserChoice::None } else { self.finish.denoise.into() }
+    }
+
+    /// The finish of auto's pilots.
+    pub fn pilot_finish(&self) -> Finish {
+        Finish::of_pilots(self.denoiser())
+    }
+
+    /// The finish of a pilot that tells the error of the render: as the render's, but for a network.
     ///
     /// # Errors
     /// A library that was asked for by name is missing.
-    pub fn pilot_finish(&self) -> Result<Finish> {
-        let choice = match self.finish.denoise.into() {
-            _ if self.no_combine => DenoiserChoice::None,
-            DenoiserChoice::Auto | DenoiserChoice::Oidn if self.shard.is_some() => DenoiserChoice::Own,
-            asked => asked,
-        };
-        Ok(Finish::new(Denoiser::open(choice)?.0, None))
+    pub fn outlook_finish(&self) -> Result<Finish> {
+        Ok(Finish::new(Denoiser::open(self.denoiser())?.0, None))
     }
 
     /// Settings of a way that auto may choose, for a picture of that size; `None` where the options rule it out.

@@ -67,9 +67,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
 
 fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<()> {
     let allowed = |way, size| args.job.allowed(way, size);
-    let auto = (args.job.method == Method::Auto)
-        .then(|| args.job.pilot_finish().map(|finish| Auto { allowed: &allowed, finish }))
-        .transpose()?;
+    let auto = (args.job.method == Method::Auto).then(|| Auto { allowed: &allowed, finish: args.job.pilot_finish() });
     let order = Order {
         scene: args.job.scene.order(),
         view: args.job.view()?,
