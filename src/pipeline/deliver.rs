@@ -1,9 +1,9 @@
 //! From pixels to what is written: layers, finished, and the header that tells of all.
 
-use super::Ready;
 use super::facts::Facts;
 use super::layers;
 use super::worst::{Seen, Worst};
+use super::{Ready, Watch};
 use crate::error::{Error, Result};
 use crate::estimator::Pixel;
 use crate::film::{LayerSet, Naming, Selection};
@@ -50,11 +50,12 @@ pub(super) struct Writing<'a> {
     pub more: Map<String, Value>,
 }
 
-/// Makes the layers that were asked for, and finishes them. Returns the pixels, if they are to be kept.
+/// Makes the layers that were asked for, and finishes them; `watch` sees them before that. Returns the pixels, if they
+/// are to be kept.
 pub(super) fn deliver(
     writing: Writing<'_>,
     mut rendered: Rendered,
-    ready: Option<&mut Ready>,
+    (ready, watch): (Option<&mut Ready>, Option<&mut dyn Watch>),
     keep: bool,
 ) -> Result<(Delivery, Vec<Pixel>)> {
     let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
@@ -72,6 +73,23 @@ pub(super) fn deliver(
     let seen = if finishes { Seen::of(&rendered.pixels, &facts.named) } else { Seen::default() };
     // The pixels are most of the memory, and all that is wanted of them is in the layers.
     let pixels = if keep { rendered.pixels } else { Vec::new() };
+    header.insert("plan".into(), plan.clone());
+    header.insert("arguments".into(), arguments.clone());
+    let rejected = rejections.sentence().filter(|_| rejections.are_many());
+    let warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
+    header.insert("warnings".into(), json!(warnings));
+    if let Some(number) = facts.made_for.frame {
+        header.insert("frame".into(), number.into());
+    }
+    if let Some(rate) = facts.made_for.frame_rate {
+        header.insert("frame_rate".into(), json!(rate));
+    }
+    header.insert("error_of".into(), "Noisy".into());
+    if let (Some(watch), true) = (watch, finishes) {
+        let mut attributes = attributes.clone();
+        attributes.insert(exr::ATTRIBUTE, &header)?;
+        watch.estimated(&set, &attributes);
+    }
     let applied = ready.map(|ready| {
         let account = ready.finish().apply(&mut set, |name| name == ERROR || selection.wants(name))?;
         Ok((ready.name(), ready.facts(&account), account))
@@ -93,18 +111,6 @@ pub(super) fn deliver(
     } else if refusal.is_none() {
         set = selection.apply(set)?;
     }
-    header.insert("plan".into(), plan.clone());
-    header.insert("arguments".into(), arguments.clone());
-    let rejected = rejections.sentence().filter(|_| rejections.are_many());
-    let warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
-    header.insert("warnings".into(), json!(warnings));
-    if let Some(number) = facts.made_for.frame {
-        header.insert("frame".into(), number.into());
-    }
-    if let Some(rate) = facts.made_for.frame_rate {
-        header.insert("frame_rate".into(), json!(rate));
-    }
-    header.insert("error_of".into(), "Noisy".into());
     if let Some(reached) = &of_finished {
         reached.tell(&mut header, reproducible);
     }

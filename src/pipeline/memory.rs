@@ -4,6 +4,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
 use crate::estimator::Pixel;
 use crate::estimator::rule::{adaptive, chi_squared, local};
+use crate::finish::{self, BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, least_scratch};
 use crate::memory;
 use crate::photon;
 use crate::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
@@ -60,10 +61,17 @@ fn needed(
     pixels * per_pixel + photons
 }
 
-/// What a finish takes beside the layers, whose pixels are gone by then: the library of the denoiser, its network, and
-/// what it works in. A bound found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`), for
-/// pictures of 320 to 640 pixels across.
+/// What a finish takes whatever the picture: the library of the denoiser and its network. A bound found by lowering
+/// `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const FINISH_BYTES: u64 = 192 << 20;
+
+/// What a finish takes beside pixels and layers; the denoiser works in tiles where there is no more.
+fn finish_bytes((width, height): (u32, u32), groups: usize) -> u64 {
+    let pixels = u64::from(width) * u64::from(height);
+    // Parts by effect, and those of light groups and their caustics.
+    let parts = (finish::PARTS.len() + 2 * groups) as u64;
+    FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + least_scratch(pixels)
+}
 
 /// Fewer light paths than this make no picture: a cap below is refused.
 const LEAST_PHOTONS: u32 = 1000;
@@ -143,7 +151,7 @@ pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize, fin
     let size = stage.1.size();
     let groups = stage.0.lights.groups().names.len();
     let needed = needed(size, (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
-    let needed = needed + if finishes { FINISH_BYTES } else { 0 };
+    let needed = needed + if finishes { finish_bytes(size, groups) } else { 0 };
     let paths = if settings.method.counts_photons() {
         let each = if settings.method == Method::Pm { "" } else { " an iteration" };
         format!(" and {} light paths{each}", settings.photons)
@@ -176,6 +184,15 @@ fn refuse(needed: u64, what: impl Display, fewer: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A finish takes what its pixels and parts take; the denoiser works in tiles.
+    #[test]
+    fn a_finish_is_counted_by_its_pixels_and_parts() {
+        let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0) - FINISH_BYTES);
+        assert!(large > 20 * small && large < 36 * small, "{small} {large}");
+        assert_eq!(finish_bytes((320, 180), 3), finish_bytes((320, 180), 0) + 320 * 180 * 6 * BYTES_PER_PIXEL_OF_PART);
+        assert!(finish_bytes((1 << 16, 1 << 16), 1000) > 1 << 40);
+    }
 
     #[test]
     fn the_largest_picture_does_not_overflow() {

@@ -150,7 +150,7 @@ impl Shards {
         let mut rendered = part.rendered(pixels);
         rendered.close_history();
         watch(Step::Finishes(&rendered, ready.as_ref().and_then(|ready| ready.missing.as_ref())));
-        deliver(writing, rendered, ready.as_mut(), false).map(|(delivery, _)| delivery)
+        deliver(writing, rendered, (ready.as_mut(), None), false).map(|(delivery, _)| delivery)
     }
 }
 

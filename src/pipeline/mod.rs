@@ -150,6 +150,11 @@ pub trait Watch {
     }
     /// All are; the pixels are still there.
     fn rendered(&mut self, rendered: &Rendered);
+    /// The finish begins: the estimate with all that the finish reads. A file of it is what is left if the process is
+    /// ended meanwhile.
+    fn estimated(&mut self, set: &LayerSet, attributes: &exr::Attributes) {
+        let _ = (set, attributes);
+    }
 }
 
 /// Renders. All that can be wrong is found before the first light path, but for a finish that fails, which loses no
@@ -277,7 +282,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         more: Map::new(),
     };
     let part = rendered.settings.is_shard().then(|| rendered.part());
-    let delivered = deliver(writing, rendered, ready.as_mut(), part.is_some());
+    let delivered = deliver(writing, rendered, (ready.as_mut(), Some(watch)), part.is_some());
     watch.waits(None);
     let (delivery, pixels) = delivered?;
     let tail = part.map(|part| Tail { head, facts, part, pixels });

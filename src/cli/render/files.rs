@@ -35,6 +35,15 @@ pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: O
     })
 }
 
+/// Writes the EXR before its picture is finished, for the case that the finish does not end. What fails now fails again
+/// when the finished picture is written.
+pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) {
+    if !output::is_stdout(&args.output) {
+        let options = args.picture.exr_options(args.exr_naming.into());
+        let _ = exr::write_followed(&args.output, set, attributes, options, |_| Ok(()));
+    }
+}
+
 /// Checks that the layer of USD can be written, and has a file to tell of.
 ///
 /// # Errors

@@ -34,6 +34,9 @@ use serde_json::json;
 use std::path::Path;
 pub use summary::{Summary, place, tell_finish, tell_picture};
 
+/// A render of so many seconds is not to be lost while its picture is finished.
+const WORTH_KEEPING: f64 = 60.0;
+
 /// Renders a scene, or frames of it.
 pub fn run(args: &RenderArgs) -> Result<()> {
     if !args.has_output() {
@@ -94,6 +97,7 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
         preview: None,
         why: None,
         summary: None,
+        seconds: 0.0,
         reason_if_black: String::new(),
         made_for: Picture::default(),
     };
@@ -112,6 +116,8 @@ struct Telling<'a> {
     /// Why auto has chosen what it has.
     why: Option<String>,
     summary: Option<Summary>,
+    /// Seconds that the render has taken.
+    seconds: f64,
     /// Why the picture is black, should it be.
     reason_if_black: String,
     /// The picture that the scene was made for.
@@ -189,6 +195,13 @@ impl Watch for Telling<'_> {
             reporter.finish();
         }
         self.summary = Some(Summary::of(rendered));
+        self.seconds = rendered.seconds;
+    }
+
+    fn estimated(&mut self, set: &LayerSet, attributes: &exr::Attributes) {
+        if self.seconds >= WORTH_KEEPING {
+            files::write_estimate(self.args, set, attributes);
+        }
     }
 }
 
