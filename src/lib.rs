@@ -13,6 +13,8 @@ pub mod memory;
 
 pub mod stop;
 
+pub mod temporary;
+
 pub mod math;
 
 pub mod random;

@@ -36,7 +36,31 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Errors: the reason, with a remedy.
 pub fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
+    match fs::symlink_metadata(&target) {
+        Err(cause) if cause.kind() != io::ErrorKind::NotFound => return Err(failure(path, &cause)),
+        Ok(file) if is_kept(&target, &file) => {
+            let error = Error::new(Kind::Io, path.display(), "belongs to another user, whose files are kept there");
+            return Err(error.hint("choose another name, or another folder"));
+        }
+        _ => {}
+    }
     beside(&target).map(drop).map_err(|cause| failure(path, &cause))
+}
+
+/// Whether the folder of a file, such as `/tmp`, lets its owner alone replace it, and that is somebody else.
+#[cfg(unix)]
+fn is_kept(target: &Path, file: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    /// The bit of a mode that says so.
+    const STICKY: u32 = 0o1000;
+    let user = rustix::process::geteuid().as_raw();
+    let folder = fs::metadata(folder(target));
+    folder.is_ok_and(|folder| folder.mode() & STICKY != 0 && ![0, file.uid(), folder.uid()].contains(&user))
+}
+
+#[cfg(not(unix))]
+fn is_kept(_: &Path, _: &fs::Metadata) -> bool {
+    false
 }
 
 /// An error of the file system while writing `path`, with a remedy where there is one.
@@ -49,22 +73,35 @@ pub(crate) fn failure(path: &Path, cause: &io::Error) -> Error {
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             error.hint("choose a folder that you may write to")
         }
+        io::ErrorKind::InvalidFilename => error.hint("choose a shorter name"),
         _ => error,
     }
 }
 
-/// Where the bytes go: links followed, so that a link stays a link.
+/// Where the bytes go: links followed, so that a link stays a link, also one to a file that is not there yet.
 fn resolve(path: &Path) -> Result<PathBuf> {
     let error = |cause: &str| Error::new(Kind::Io, path.display(), cause);
     if path.file_name().is_none() || path.is_dir() {
         return Err(error("is a folder").hint("name a file in it"));
     }
-    let folder = folder(path);
+    let mut target = path.to_owned();
+    let mut links = 0;
+    while let Ok(next) = fs::read_link(&target) {
+        target = folder(&target).join(next);
+        links += 1;
+        if links > MAX_LINKS {
+            return Err(error("is a link that leads back to itself").hint("name a file"));
+        }
+    }
+    let folder = folder(&target);
     if !folder.is_dir() {
         return Err(error("its folder does not exist").hint(format!("mkdir -p {}", folder.display())));
     }
-    Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()))
+    Ok(fs::canonicalize(&target).unwrap_or(target))
 }
+
+/// Most links one after the other, as Linux has it.
+const MAX_LINKS: usize = 40;
 
 fn folder(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
@@ -120,7 +157,9 @@ fn remove_stale(folder: &Path, prefix: &OsStr) {
             && name.ends_with(SUFFIX.as_bytes())
     };
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    for entry in entries.filter(|entry| ours(&entry.file_name())) {
+    // To open a pipe would wait for its writer.
+    let is_file = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
+    for entry in entries.filter(|entry| ours(&entry.file_name()) && is_file(entry)) {
         // The lock is held while the file goes, so that nobody writes it.
         let free = File::open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
         if free.is_some() {
@@ -150,6 +189,43 @@ fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A link stays a link, wherever it leads; one that leads nowhere is no file to be written.
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir(path("disk")).expect("a folder");
+        for (target, link) in [("disk/a.exr", "a.exr"), ("a.exr", "b.exr"), ("gone/c.exr", "c.exr"), ("d.exr", "d.exr")]
+        {
+            symlink(target, path(link)).expect("a link");
+        }
+        for name in ["a.exr", "b.exr"] {
+            check_writable(&path(name)).expect("it can be written");
+            write_bytes(&path(name), name.as_bytes()).expect("it can be written");
+            assert!(path(name).is_symlink());
+            assert_eq!(fs::read(path("disk/a.exr")).expect("it is there"), name.as_bytes());
+        }
+        let cause = |name: &str| check_writable(&path(name)).expect_err("it leads nowhere").cause;
+        assert_eq!(cause("c.exr"), "its folder does not exist");
+        assert_eq!(cause("d.exr"), "is a link that leads back to itself");
+        let long = check_writable(&path(&"x".repeat(256))).expect_err("the name is too long");
+        assert_eq!(long.hint.as_deref(), Some("choose a shorter name"), "{long}");
+    }
+
+    /// A pipe that is called as a stale file is not waited for.
+    #[cfg(unix)]
+    #[test]
+    fn pipes_are_not_opened() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join(".caustique-a.exr-aaaaaa.part");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs");
+        assert!(made.success());
+        write_bytes(&folder.path().join("a.exr"), b"whole").expect("it can be written");
+        assert!(pipe.exists());
+    }
 
     /// What a killed process has left of a file goes at the next write; what is still written, or of another file, stays.
     #[test]

@@ -5,6 +5,7 @@ use super::python::Interpreter;
 use super::{Peer, Renderer};
 use crate::error::{Error, Kind, Result};
 use crate::image::exr;
+use crate::temporary;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -106,8 +107,7 @@ impl Drivers {
         threads: usize,
     ) -> Result<Drivers> {
         let interpreters = renderers.iter().map(|&of| Ok((of, Interpreter::find(of)?))).collect::<Result<Vec<_>>>()?;
-        let folder = tempfile::Builder::new().prefix("caustique-peers-").tempdir();
-        let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))?;
+        let folder = temporary::folder("caustique-peers-")?;
         for (name, source) in SOURCES {
             let path = folder.path().join(name);
             let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);

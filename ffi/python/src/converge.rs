@@ -188,7 +188,7 @@ impl Comparison {
             seeds: (0..self.seeds).map(|i| seed.wrapping_add(i)).collect(),
         };
         // Where pictures of the race are kept meanwhile.
-        let folder = tempfile::tempdir().map_err(|cause| caustique::error::Error::io(&std::env::temp_dir(), &cause))?;
+        let folder = caustique::temporary::folder("caustique-")?;
         let stage = (built, camera);
         let field = Field { entries: &entries, finishes: &mut finishes, guests: None };
         let mut outcome = race(stage, field, &rules, &reference, folder.path(), |step| {

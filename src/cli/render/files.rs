@@ -9,6 +9,7 @@ use caustique::image::exr::{self, Attributes};
 use caustique::image::usd_layer;
 use caustique::pipeline::shard::Tail;
 use std::ffi::OsStr;
+use caustique::temporary;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -73,8 +74,7 @@ struct Kept {
 
 impl Kept {
     fn write(name: &OsStr, into: impl Fn(&Path) -> Result<()>) -> Result<Kept> {
-        let folder = tempfile::Builder::new().prefix("caustique-").tempdir();
-        let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))?;
+        let folder = temporary::folder("caustique-")?;
         let path = folder.path().join(name);
         into(&path)?;
         Ok(Kept { folder, path })

@@ -11,6 +11,7 @@ use super::description::Description;
 use super::gltf::{self, Frame, ReadOptions};
 use crate::error::{Error, Kind, Result};
 use crate::memory;
+use crate::temporary;
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -106,8 +107,7 @@ impl<'p> Converter<'p> {
         std::fs::File::open(stage)
             .map_err(|e| Error::io(stage, &e).hint("check the path of the scene file and your right to read it"))?;
         let interpreter = Interpreter::find()?;
-        let folder = tempfile::Builder::new().prefix("caustique-usd-").tempdir();
-        let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))?;
+        let folder = temporary::folder("caustique-usd-")?;
         for (name, source) in SOURCES {
             let path = folder.path().join(name);
             std::fs::write(&path, source).map_err(|cause| Error::io(&path, &cause))?;
