@@ -137,7 +137,7 @@ impl Lights {
     /// The group of a light.
     #[inline]
     pub fn group(&self, light: u32) -> Group {
-        let Groups { names, instances, others, environment } = &self.groups;
+        let Groups { names, instances, others, environment, .. } = &self.groups;
         if names.is_empty() {
             return Group::NONE;
         }

@@ -21,7 +21,7 @@ pub use cone::Cone;
 pub use emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
 pub use emitter::{Emitter, Sky, SpotEdge};
 pub use environment::{Environment, ImageEnvironment};
-pub use group::{Group, Groups, MAX_GROUPS};
+pub use group::{Group, Groups, MAX_GROUP_NAME, MAX_GROUPS};
 pub use guide::Guide;
 pub use lights::Lights;
 pub use receiver::Receiver;

@@ -3,9 +3,9 @@
 use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
-use crate::film::output::Shape;
-use crate::film::{CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Naming, Selection, describe, output as film};
-use crate::finish::finished_part;
+use crate::film::output::{self, Shape};
+use crate::film::{self, CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Naming, Plane, Sample, Selection, describe};
+use crate::finish::{PARTS, finished_part};
 use crate::image::exr::Attributes;
 use crate::render::Rendered;
 use crate::scene::Scene;
@@ -22,7 +22,7 @@ fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
 
 /// Names of the layers that a render of this shape can have, finished or not.
 fn names(shape: &Shape, finished: bool) -> Vec<String> {
-    let mut names = film::names(shape);
+    let mut names = output::names(shape);
     if finished {
         names.extend(names.iter().filter_map(|name| finished_part(name)).collect::<Vec<_>>());
     }
@@ -41,9 +41,44 @@ pub fn channels(shape: &Shape) -> usize {
 /// There is no such layer.
 pub fn selection(asked: &str, shape: &Shape, finished: bool) -> Result<Selection> {
     let selection = Selection::parse(asked)?;
-    let layers = names(shape, finished).into_iter().map(|name| Layer { name, planes: vec![] }).collect();
+    let all = names(shape, finished).into_iter().chain(dark(&selection, shape, finished));
+    let layers = all.map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers })?;
     Ok(selection)
+}
+
+/// Parts of the light that are asked for by name and that this render has none of: their layers are black.
+pub fn dark(selection: &Selection, shape: &Shape, finished: bool) -> Vec<String> {
+    let Selection::List(asked) = selection else { return Vec::new() };
+    let there = names(shape, finished);
+    let mut dark: Vec<String> = PARTS.iter().map(|part| String::from(*part)).collect();
+    if finished {
+        dark.extend(PARTS.iter().filter_map(|part| finished_part(part)));
+    }
+    dark.retain(|name| asked.contains(name) && !there.contains(name));
+    dark
+}
+
+/// Adds them to a picture.
+pub(super) fn add_dark(selection: &Selection, shape: &Shape, finished: bool, set: &mut LayerSet) -> Result<()> {
+    let black = vec![[0.0; 3]; set.width * set.height];
+    dark(selection, shape, finished)
+        .into_iter()
+        .try_for_each(|name| set.push(Layer::interleaved(name, "RGB", black.iter().copied())))
+}
+
+/// Checks that a file can hold the names of the layers that are wanted of a render of this shape.
+///
+/// # Errors
+/// The first channel whose name other programs do not read.
+pub fn check_names(selection: &Selection, shape: &Shape, finished: bool, naming: Naming) -> Result<()> {
+    let plane = |c: char| Plane { component: c.into(), sample: Sample::Float, values: vec![] };
+    let layer = |name: String| {
+        let components = describe(&name).map_or("", |layer| layer.components);
+        Layer { planes: components.chars().map(plane).collect(), name }
+    };
+    let wanted = names(shape, finished).into_iter().filter(|name| selection.wants(name));
+    film::check(&LayerSet { width: 0, height: 0, layers: wanted.map(layer).collect() }, naming)
 }
 
 /// Groups of lights that are asked for by the names of their layers.

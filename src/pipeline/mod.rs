@@ -338,7 +338,9 @@ fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Set
     check::media(&order.scene.path, &order.settings, scene)?;
     check::bandwidth(&order.scene.path, &order.settings, scene)?;
     let settings = sized(order.settings.clone(), order.photons, camera.size());
-    let selection = layers::selection(&order.layers, &shape(&settings, scene), order.finish.is_some())?;
+    let (shape, finishes) = (shape(&settings, scene), order.finish.is_some());
+    let selection = layers::selection(&order.layers, &shape, finishes)?;
+    layers::check_names(&selection, &shape, finishes, order.naming)?;
     // Before anything is tried, which takes time.
     fitted(order, (scene, camera), settings.clone())?;
     Ok((settings, selection))

@@ -4,7 +4,7 @@ use super::description::{self, Description, EnvironmentSource, PunctualKind, Pun
 use super::{Contacts, Nestings, Scene, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
-use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUPS, Sky};
+use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS, Sky};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::trace::{CAMERA, MeetsTest, Tracer};
@@ -113,7 +113,12 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
         description.lights.iter().filter(|light| !light.is_sphere()).map(|light| of(&light.light_group)).collect();
     let environment =
         description.environment.as_ref().map_or(Group::NONE, |_| of(&description.environment_light_group));
-    Groups { instances, others, environment, ..groups }
+    let renamed = groups.renamed().map(|(label, name)| {
+        format!("light group \"{label}\": its layers are called {name}: names are at most {MAX_GROUP_NAME} letters and all different")
+    });
+    warnings.extend(renamed);
+    (groups.instances, groups.others, groups.environment) = (instances, others, environment);
+    groups
 }
 
 /// Adds what is to be said of lights that give none; `punctual` is the number of lamps that the file has.

@@ -27,6 +27,19 @@ pub fn write_under(path: &Path, sky: &str) {
     std::fs::write(path, bytes(None, &json!({"environment": {"file": sky}}))).expect("the scene can be written");
 }
 
+/// The same with three lamps in as many groups.
+pub fn write_grouped(path: &Path, groups: [&str; 3]) {
+    let extras = json!({"light_units": "radiometric"});
+    let (mut document, binary) = parts(Some(LAMP), &extras);
+    for (i, group) in groups.into_iter().enumerate() {
+        document["nodes"][5 + i] = document["nodes"][2].clone();
+        document["nodes"][5 + i]["translation"][0] = json!(i);
+        document["nodes"][5 + i]["extras"] = json!({"caustique": {"light_group": group}});
+    }
+    document["scenes"][0]["nodes"] = json!([0, 1, 3, 4, 5, 6, 7]);
+    std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
+}
+
 /// So many nodes, each of which places one triangle 2^16 times (EXT_mesh_gpu_instancing), all by the same numbers.
 pub fn write_copies(path: &Path, nodes: usize) {
     const COPIES: usize = 1 << 16;
@@ -53,8 +66,14 @@ pub fn write_copies(path: &Path, nodes: usize) {
 /// Intensity of the lamp, and its height.
 const LAMP: (f64, f64) = (20.0, 3.0);
 
-/// Quads as positions and indices: the floor looks up, the mirror along +Z.
+/// The whole file.
 fn bytes(lamp: Option<(f64, f64)>, extras: &Value) -> Vec<u8> {
+    let (document, binary) = parts(lamp, extras);
+    chunks(&document, &binary)
+}
+
+/// Quads as positions and indices: the floor looks up, the mirror along +Z.
+fn parts(lamp: Option<(f64, f64)>, extras: &Value) -> (Value, Vec<u8>) {
     let (intensity, height) = lamp.unwrap_or(LAMP);
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
     let mirror: [[f32; 3]; 4] = [[-1.0, 0.1, -1.5], [1.0, 0.1, -1.5], [1.0, 2.0, -1.5], [-1.0, 2.0, -1.5]];
@@ -100,7 +119,7 @@ fn bytes(lamp: Option<(f64, f64)>, extras: &Value) -> Vec<u8> {
         ],
         "buffers": [{"byteLength": 108}],
     });
-    chunks(&document, &binary)
+    (document, binary)
 }
 
 /// A document and its binary chunk as a file.
