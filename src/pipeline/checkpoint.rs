@@ -17,6 +17,8 @@ use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
 pub const MAGIC: &[u8; 23] = b"caustique checkpoint 3\n";
+/// What checkpoints of all versions begin with.
+const KIND: &[u8] = b"caustique checkpoint ";
 /// Pixels packed together.
 pub(super) const BLOCK: usize = 2048;
 /// Options that may be others when a render goes on: when it stops, and how its files are written.
@@ -34,7 +36,7 @@ pub struct Saving {
 }
 
 /// What render a checkpoint belongs to, and what has been decided about it.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Head {
     /// Of the program.
     pub version: String,
@@ -46,6 +48,9 @@ pub struct Head {
     pub way: Option<Strategy>,
     /// The plan, for the header.
     pub plan: Value,
+    /// The render was done when this was saved, and its picture was about to be written.
+    #[serde(default)]
+    pub finished: bool,
 }
 
 /// Saves a state; the file is replaced at once, or stays as it was.
@@ -65,6 +70,32 @@ pub fn write(path: &Path, head: &Head, state: State<&[Pixel]>) -> Result<()> {
             .and_then(|()| records::end(file));
         written.map_err(|cause| atomic::failure(path, &cause))
     })
+}
+
+/// Checks that a render that starts anew may save itself to `path`; `remedy` says how one goes on, or
+/// overwrites.
+///
+/// # Errors
+/// The file there is no checkpoint, or, unless `overwrite`, that of a render that was not finished.
+pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<()> {
+    // A device takes anything, and keeps nothing.
+    if !path.is_file() {
+        return Ok(());
+    }
+    let mut file = BufReader::new(File::open(path).map_err(|cause| Error::io(path, &cause))?);
+    let mut magic = [0; MAGIC.len()];
+    let length = file.by_ref().take(MAGIC.len() as u64).read(&mut magic).map_err(|cause| Error::io(path, &cause))?;
+    if length > 0 && !magic.starts_with(KIND) {
+        let error = Error::new(Kind::Usage, path.display(), "is no checkpoint, so it is not replaced by one");
+        return Err(error.hint("name another file with --checkpoint, or move this one"));
+    }
+    let head = Record::read(&mut file).ok().flatten().and_then(|record| record.unpack().ok());
+    let head = head.and_then(|head| serde_json::from_slice::<Head>(&head).ok());
+    if length == 0 || overwrite || head.is_some_and(|head| head.finished) {
+        return Ok(());
+    }
+    let error = Error::new(Kind::Usage, path.display(), "is the checkpoint of a render that was not finished");
+    Err(error.hint(remedy))
 }
 
 /// Reads a checkpoint.
@@ -128,7 +159,7 @@ pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(
     })
 }
 
-/// A hash of a scene's files: the file itself, and those that it (in its folder, unless they may lie outside) or the
+/// A hash of all that was read of a scene: its files, or what a converter has made of them, and the environment that the
 /// command line names. `None` of a scene that comes through a pipe, and is gone.
 ///
 /// # Errors

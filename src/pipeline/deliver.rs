@@ -11,6 +11,7 @@ use crate::finish::{Account, ERROR, reads};
 use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
+use std::path::PathBuf;
 
 /// What an error is of, where it is not the estimate's (the header's `error_of`).
 pub const FINISHED_PICTURE: &str = "finished picture";
@@ -35,6 +36,8 @@ pub struct Delivery {
     pub refusal: Option<Error>,
     /// What other shards are joined with, where this is one.
     pub tail: Option<super::shard::Tail>,
+    /// Checkpoint that is no longer needed once the picture is written.
+    pub spent_checkpoint: Option<PathBuf>,
 }
 
 /// How a picture is written, and what is told of it.
@@ -125,7 +128,10 @@ pub(super) fn deliver(
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let finished = finished.map(|(name, _, account)| (name, account));
     let reached = of_finished;
-    Ok((Delivery { set, attributes, techniques, finished, reached, worst, finishing, refusal, tail: None }, pixels))
+    let (tail, spent_checkpoint) = (None, None);
+    let delivery =
+        Delivery { set, attributes, techniques, finished, reached, worst, finishing, refusal, tail, spent_checkpoint };
+    Ok((delivery, pixels))
 }
 
 /// How far a render has come.

@@ -239,8 +239,10 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         arguments: order.arguments.clone(),
         way,
         plan: told,
+        finished: false,
     };
-    let mut saver = saving.map(|saving| Saver::new(saving, &head, order.resume.as_deref() == Some(&*saving.path)));
+    let mut saver =
+        saving.map(|saving| Saver::new(saving, head.clone(), order.resume.as_deref() == Some(&*saving.path)));
     let mut judging = None;
     let stop = drive(&mut session, |progress, session| {
         let accuracy = match judge::judge(session, ready.as_mut(), target) {
@@ -266,9 +268,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         // There is as much to write as before its beginning.
         watch.chosen(None)?;
     }
-    if let Some(saver) = &mut saver {
-        saver.finish(&session, stop, watch);
-    }
+    let spent_checkpoint = saver.and_then(|saver| saver.finish(&session, stop, watch));
     let rendered = session.finish(stop);
     watch.rendered(&rendered);
     watch.waits(Some(Wait::Finishing));
@@ -286,7 +286,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     watch.waits(None);
     let (delivery, pixels) = delivered?;
     let tail = part.map(|part| Tail { head, facts, part, pixels });
-    Ok(Delivery { tail, ..delivery })
+    Ok(Delivery { tail, spent_checkpoint, ..delivery })
 }
 
 impl Order<'_> {

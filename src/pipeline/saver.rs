@@ -4,11 +4,12 @@ use super::Watch;
 use super::checkpoint::{self, Head, Saving};
 use crate::error::{Error, Kind, Result};
 use crate::render::{Clock, Session, Spent, StopReason};
+use std::path::PathBuf;
 
 /// Saves a render every so often.
 pub(super) struct Saver<'a> {
     saving: &'a Saving,
-    head: &'a Head,
+    head: Head,
     clock: Clock,
     /// When it is due (seconds).
     next: f64,
@@ -20,7 +21,7 @@ pub(super) struct Saver<'a> {
 
 impl<'a> Saver<'a> {
     /// `written`: the file is there already, for the render goes on from it.
-    pub fn new(saving: &'a Saving, head: &'a Head, written: bool) -> Saver<'a> {
+    pub fn new(saving: &'a Saving, head: Head, written: bool) -> Saver<'a> {
         Saver { saving, head, clock: Clock::start(), next: saving.every, failed: false, written }
     }
 
@@ -35,14 +36,15 @@ impl<'a> Saver<'a> {
         self.next = self.clock.seconds() + self.saving.every;
     }
 
-    /// After the last iteration: what was interrupted, or is to be kept, is saved as it is; of what is done nothing stays.
-    pub fn finish(&mut self, session: &Session<'_>, stop: StopReason, watch: &mut dyn Watch) {
-        if self.saving.keep || stop == StopReason::Interrupted {
+    /// After the last iteration: saves what was interrupted or is to be kept. Returns the file of a render that is
+    /// done, which is no longer needed once the picture is written.
+    pub fn finish(mut self, session: &Session<'_>, stop: StopReason, watch: &mut dyn Watch) -> Option<PathBuf> {
+        self.head.finished = stop != StopReason::Interrupted;
+        if self.saving.keep || !self.head.finished {
             self.save(session, watch);
-        } else if self.written {
-            // Nobody misses a file that is not there.
-            let _ = std::fs::remove_file(&self.saving.path);
+            return None;
         }
+        self.written.then(|| self.saving.path.clone())
     }
 
     fn save(&mut self, session: &Session<'_>, watch: &mut dyn Watch) {
@@ -57,6 +59,6 @@ impl<'a> Saver<'a> {
     fn write(&self, session: &Session<'_>) -> Result<()> {
         let path = &self.saving.path;
         let state = session.state().map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
-        checkpoint::write(path, self.head, state)
+        checkpoint::write(path, &self.head, state)
     }
 }

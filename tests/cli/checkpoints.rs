@@ -111,3 +111,51 @@ fn what_does_not_belong_is_refused_by_name() {
     std::fs::write(folder.path("scene.glb"), scene).expect("it can be written");
     refused("--method path --resume state", "another scene");
 }
+
+/// What a render that was stopped has saved is not lost to one that begins anew, unless that is asked for; and no other
+/// file is taken for a checkpoint.
+#[test]
+fn the_state_of_a_stopped_render_is_not_replaced() {
+    let folder = Folder::new();
+    let state = folder.path("a.exr.checkpoint");
+    let render = format!("{COMMON} --method path -o a.exr");
+    killed(&folder, &format!("{render} --iterations 1000000 --checkpoint-every 0.001"), &state, Duration::ZERO);
+    let saved = bytes(&folder, "a.exr.checkpoint");
+    let anew = folder.run(&format!("{render} --iterations 2"));
+    let error = "a.exr.checkpoint: is the checkpoint of a render that was not finished\n\
+                 hint: go on with --resume a.exr.checkpoint, or start anew with --overwrite\n";
+    assert_eq!((anew.code, anew.stderr.as_str()), (Some(2), error));
+    assert!(bytes(&folder, "a.exr.checkpoint") == saved && !folder.path("a.exr").exists());
+    // It is not in the way of others, and goes where it is to go.
+    assert_eq!(folder.run(&format!("{render} --iterations 2 --no-checkpoint")).code, Some(0));
+    assert!(bytes(&folder, "a.exr.checkpoint") == saved);
+    let anew = folder.run(&format!("{render} --iterations 2 --overwrite --checkpoint a.exr.checkpoint"));
+    assert_eq!(anew.code, Some(0), "{}", anew.stderr);
+    // That of a render that was done is its last state, which another may replace.
+    let again = folder.run(&format!("{render} --iterations 2 --checkpoint a.exr.checkpoint"));
+    assert_eq!(again.code, Some(0), "{}", again.stderr);
+    for overwrite in ["", "--overwrite"] {
+        let other = folder.run(&format!("{render} --iterations 2 --checkpoint scene.glb {overwrite}"));
+        let error = "scene.glb: is no checkpoint, so it is not replaced by one\n\
+                     hint: name another file with --checkpoint, or move this one\n";
+        assert_eq!((other.code, other.stderr.as_str()), (Some(2), error));
+    }
+}
+
+/// The state stays until the picture is written.
+#[test]
+fn a_picture_that_cannot_be_written_leaves_the_state() {
+    let folder = Folder::new();
+    let state = folder.path("a.exr.checkpoint");
+    let render = format!("{COMMON} --method path -o a.exr");
+    killed(&folder, &format!("{render} --iterations 1000000 --checkpoint-every 0.001"), &state, Duration::ZERO);
+    let (_, done) = state_of(&folder, "a.exr.checkpoint");
+    let resume = format!("{render} --iterations {} --resume a.exr.checkpoint --png full.png", done + 3);
+    std::os::unix::fs::symlink("/dev/full", folder.path("full.png")).expect("a link");
+    let failed = folder.run(&resume);
+    assert_eq!(failed.code, Some(1), "{}", failed.stderr);
+    assert!(state.exists());
+    std::fs::remove_file(folder.path("full.png")).expect("it can be removed");
+    assert_eq!(folder.run(&resume).code, Some(0));
+    assert!(!state.exists());
+}

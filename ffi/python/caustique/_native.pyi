@@ -133,6 +133,7 @@ class Scene:
         shard: tuple[int, int] | None = None,
         checkpoint: str | os.PathLike[str] | None = None,
         checkpoint_every: float = 300.0,
+        overwrite: bool = False,
         resume: str | os.PathLike[str] | None = None,
         threads: int = 0,
         progress: Callable[[Progress], object] | None = None,

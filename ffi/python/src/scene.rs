@@ -12,7 +12,7 @@ use caustique::error::{Error, Result};
 use caustique::film::Naming;
 use caustique::image::atomic;
 use caustique::pipeline::load::{self, Environment, load, load_bytes};
-use caustique::pipeline::{self, Auto, Delivery, Loaded, Order, Saving, Wait, Watch, check};
+use caustique::pipeline::{self, Auto, Delivery, Loaded, Order, Saving, Wait, Watch, check, checkpoint};
 use caustique::plan::{Plan, Switches};
 use caustique::render::auto::{Choice, choose};
 use caustique::render::{Rendered, Settings};
@@ -145,6 +145,7 @@ impl Scene {
     /// shard                     (index, count): every count-th iteration alone; `merge` joins what the shards save
     /// checkpoint                a file that the state is saved to; it stays, so that the render can be extended
     /// checkpoint_every          seconds between two saves
+    /// overwrite                 start anew although the checkpoint of a render that was stopped is there
     /// resume                    a checkpoint to go on from: the same options, but for when to stop
     /// threads                   0 takes all cores
     /// progress                  called with a Progress after every iteration, in the calling thread; False ends it
@@ -157,8 +158,8 @@ impl Scene {
             height=None, camera=None, crop=None, filter=None, seed=0, max_depth=None, photons=None, levels=None, \
             alpha=None, initial_bandwidth=None, knn=None, guide=None, cppm_grid=None, cppm_k=None, cppm_beta=None, \
             cppm_significance=None, cppm_plus=False, finish=None, denoise=None, model=None, layers='all', \
-            reproducible=False, shard=None, checkpoint=None, checkpoint_every=300.0, resume=None, threads=0, \
-            progress=None)"
+            reproducible=False, shard=None, checkpoint=None, checkpoint_every=300.0, overwrite=False, \
+            resume=None, threads=0, progress=None)"
     )]
     fn render(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Image> {
         let mut keywords = Keywords::of(py, "render", options);
@@ -168,6 +169,11 @@ impl Scene {
         let view = job::view(&mut keywords)?;
         let saving = saving(&mut keywords)?;
         let resume: Option<PathBuf> = keywords.take("resume")?;
+        let overwrite = keywords.take("overwrite")?.unwrap_or(false);
+        if let Some(Saving { path, .. }) = saving.as_ref().filter(|saving| resume.as_ref() != Some(&saving.path)) {
+            let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
+            checkpoint::check_replaceable(path, overwrite, &remedy).map_err(raised)?;
+        }
         let layers = keywords.take("layers")?.unwrap_or_else(|| "all".to_string());
         let reproducible = keywords.take("reproducible")?.unwrap_or(false);
         let threads = keywords.take("threads")?.unwrap_or(0);
@@ -308,7 +314,7 @@ impl Scene {
 
     /// What was asked for, for the header, by the names of the command line.
     fn arguments(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Value> {
-        let own = ["progress", "threads", "checkpoint", "checkpoint_every", "resume"];
+        let own = ["progress", "threads", "checkpoint", "checkpoint_every", "overwrite", "resume"];
         let mut arguments = said(py, options, &own)?;
         if let (Value::Object(arguments), Value::Object(of_scene)) = (&mut arguments, &self.said.options) {
             arguments.extend(of_scene.clone());

@@ -6,10 +6,11 @@ use crate::cli::{output, print_file};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
 use caustique::image::exr::{self, Attributes};
-use caustique::image::usd_layer;
+use caustique::image::{atomic, usd_layer};
+use caustique::pipeline::checkpoint;
 use caustique::pipeline::shard::Tail;
-use std::ffi::OsStr;
 use caustique::temporary;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -43,6 +44,21 @@ pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes
         let options = args.picture.exr_options(args.exr_naming.into());
         let _ = exr::write_followed(&args.output, set, attributes, options, |_| Ok(()));
     }
+}
+
+/// Checks that the state can be saved where it was asked for, and that no other render's is lost.
+///
+/// # Errors
+/// See [`atomic::check_writable`] and [`checkpoint::check_replaceable`].
+pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
+    args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
+    let Some(path) = args.saving().map(|saving| saving.path).filter(|path| args.resume.as_ref() != Some(path)) else {
+        return Ok(());
+    };
+    let of_frames = args.job.scene.frames.is_some();
+    let going_on = if of_frames { "--skip-existing".into() } else { format!("--resume {}", path.display()) };
+    let remedy = format!("go on with {going_on}, or start anew with --overwrite");
+    checkpoint::check_replaceable(&path, args.overwrite, &remedy)
 }
 
 /// Checks that the layer of USD can be written, and has a file to tell of.

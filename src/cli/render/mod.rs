@@ -17,7 +17,6 @@ use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
-use caustique::image::atomic;
 use caustique::image::exr;
 use caustique::pipeline::memory::Cap;
 use caustique::pipeline::plan::why;
@@ -63,7 +62,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     args.picture.check()?;
     files::check_usd_layer(args)?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
-    args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
+    files::check_checkpoint(args)?;
     techniques::prepare(args)?;
     render(args, turn, settings)
 }
@@ -234,6 +233,8 @@ impl Telling<'_> {
         described?;
         pictured?;
         debugged?;
+        // The picture is safe, and nobody misses a file that is not there.
+        let _ = delivery.spent_checkpoint.as_deref().map(std::fs::remove_file);
         if talk {
             Summary::tell_files(args, set, techniques.len());
         }

@@ -74,6 +74,10 @@ pub struct RenderArgs {
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
     pub no_checkpoint: bool,
+    /// Start anew although the checkpoint of a render that was stopped is there, and replace it
+    #[arg(long, help_heading = "Running")]
+    #[serde(skip)]
+    pub overwrite: bool,
     /// Go on from a checkpoint: the same options, and more --iterations or --time (both count from the start)
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     #[serde(skip)]
