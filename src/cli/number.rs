@@ -59,11 +59,6 @@ pub fn positive(text: &str) -> Result<f64, String> {
     between(Excluded(0.0), Unbounded)(text)
 }
 
-/// A finite number not below zero.
-pub fn not_negative(text: &str) -> Result<f64, String> {
-    between(Included(0.0), Unbounded)(text)
-}
-
 /// A whole number of a range.
 pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
@@ -85,14 +80,23 @@ pub fn threads(text: &str) -> Result<usize, String> {
     whole(0..=1024)(text)
 }
 
-/// Three finite numbers not below zero, separated by commas; `None` when the text is no list of numbers at all.
+/// What a channel of a colour may be: beyond it sums of the light of several pixels would be no single precision.
+const RADIANCES: RangeInclusive<f64> = 0.0..=1e30;
+
+/// A factor on radiance.
+pub fn strength(text: &str) -> Result<f64, String> {
+    let factor = finite(text)?;
+    if RADIANCES.contains(&factor) { Ok(factor) } else { Err(format!("it must be from 0 to {:e}", RADIANCES.end())) }
+}
+
+/// Three numbers that a colour may have, separated by commas; `None` when the text is no list of numbers at all.
 pub fn rgb(text: &str) -> Option<Result<[f32; 3], String>> {
     let values: Vec<f64> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
     let color: Result<[f64; 3], _> = values.try_into();
     Some(match color {
         Err(values) => Err(format!("a colour has three numbers R,G,B, not {}", values.len())),
-        Ok(color) if color.iter().all(|c| c.is_finite() && *c >= 0.0) => Ok(color.map(|c| c as f32)),
-        Ok(_) => Err("a colour has three finite numbers of at least 0".into()),
+        Ok(color) if color.iter().all(|c| RADIANCES.contains(c)) => Ok(color.map(|c| c as f32)),
+        Ok(_) => Err(format!("a colour has three numbers from 0 to {:e}", RADIANCES.end())),
     })
 }
 
@@ -106,7 +110,7 @@ mod tests {
         assert_eq!(alpha("1"), Ok(1.0));
         assert_eq!(alpha("0"), Err("it must be in (0, 1]".into()));
         assert_eq!(positive("0"), Err("it must be above 0".into()));
-        assert_eq!(not_negative("-1"), Err("it must be at least 0".into()));
+        assert_eq!(strength("-1"), Err("it must be from 0 to 1e30".into()));
         assert_eq!(finite("nan"), Err("it is not a finite number".into()));
         assert_eq!(finite("1e999"), Err("it is not a finite number".into()));
         assert_eq!(finite("one"), Err("it is not a number".into()));
@@ -121,6 +125,8 @@ mod tests {
         assert_eq!(rgb("1,0.5,0"), Some(Ok([1.0, 0.5, 0.0])));
         assert_eq!(rgb("sky,1.exr"), None);
         assert!(rgb("1,2").is_some_and(|r| r.is_err()));
-        assert!(rgb("1,2,-3").is_some_and(|r| r.is_err()));
+        for wrong in ["1,2,-3", "1e39,0,0", "inf,0,0", "nan,0,0"] {
+            assert!(rgb(wrong).is_some_and(|r| r.is_err()), "{wrong}");
+        }
     }
 }

@@ -41,7 +41,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true)]
     pub env_rotation: Option<f64>,
     /// Make the environment so many times as bright
-    #[arg(long, value_name = "S", value_parser = not_negative)]
+    #[arg(long, value_name = "S", value_parser = strength)]
     pub env_strength: Option<f64>,
     /// Units of lamps: 'photometric' is what Blender's exporter writes unless told otherwise, 683 lumen to the watt
     #[arg(long, value_enum, default_value_t = LightUnits::Auto)]

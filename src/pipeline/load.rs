@@ -14,6 +14,9 @@ use std::path::PathBuf;
 const START_BYTES: u64 = 256 << 20;
 const THREAD_BYTES: u64 = 16 << 20;
 
+/// Most radiance of an environment: sums of the light of many pixels have to be single precision.
+const MAX_RADIANCE: f32 = 1e30;
+
 /// A scene file and how it is read.
 pub struct Order {
     /// The file.
@@ -78,7 +81,7 @@ fn build(mut description: Description, order: &Order, threads: usize) -> Result<
     Ok(Loaded { scene: Scene::build(description, threads)?, removed })
 }
 
-/// A turn and a strength also act on the scene's own environment.
+/// The environment that is asked for, in place of the scene's own.
 fn environment(description: &mut Description, order: &Order) -> Result<()> {
     if let Some(choice) = &order.environment {
         let source = match choice {
@@ -90,6 +93,21 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
         description.environment_hidden_from_camera = false;
         description.world_unsaid = false;
     }
+    set_turn_and_strength(description, order)?;
+    let Some(environment) = &description.environment else { return Ok(()) };
+    let brightest = match &environment.source {
+        EnvironmentSource::Color(color) => color.max_element(),
+        EnvironmentSource::Image { texels, .. } => texels.as_flattened().iter().copied().fold(0.0, f32::max),
+    };
+    if brightest * environment.strength <= MAX_RADIANCE {
+        return Ok(());
+    }
+    let cause = format!("its environment is brighter than {MAX_RADIANCE:e} W/(sr m^2)");
+    Err(Error::new(Kind::Scene, order.path.display(), cause).hint("lower --env or --env-strength"))
+}
+
+/// A turn and a strength also act on the scene's own environment.
+fn set_turn_and_strength(description: &mut Description, order: &Order) -> Result<()> {
     let given = [("--env-rotation", order.rotation), ("--env-strength", order.strength)];
     let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
     let Some(environment) = &mut description.environment else {
