@@ -62,6 +62,9 @@ pub struct MergeArgs {
 pub fn run(args: &MergeArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
+    for output in std::iter::once(&args.output).chain(&args.picture.png) {
+        output::check_inputs(output, args.inputs.iter().map(PathBuf::as_path))?;
+    }
     let shards = args.inputs.iter().map(|path| is_shard(path)).collect::<Result<Vec<bool>>>()?;
     super::pool(args.threads)?.install(|| if shards.contains(&true) { join(args) } else { average(args) })
 }

@@ -8,8 +8,10 @@ use caustique::image::tonemap::ToneMap;
 use caustique::image::{atomic, exr};
 use caustique::scene::description::{Picture, ToneCurve};
 use clap::ValueEnum;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
+use std::fs;
 use std::io::IsTerminal;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// From scene-linear light to the PNG's colours.
@@ -151,6 +153,27 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
         });
     }
     atomic::check_writable(path)
+}
+
+/// Writes a path to a header: what is not UTF-8 in it is replaced there.
+pub fn lossy<S: Serializer>(path: &Path, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
+}
+
+/// Checks that an output is none of the inputs, which would be lost.
+///
+/// # Errors
+/// It is, by whatever name.
+pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path>) -> Result<()> {
+    let file = |path: &Path| fs::metadata(path).ok().filter(fs::Metadata::is_file).map(|data| (data.dev(), data.ino()));
+    let Some(own) = file(output) else { return Ok(()) };
+    match inputs.find(|input| file(input) == Some(own)) {
+        None => Ok(()),
+        Some(input) => {
+            let cause = format!("{} is an input, which is not overwritten", input.display());
+            Err(Error::new(Kind::Usage, output.display(), cause).hint("name another output"))
+        }
+    }
 }
 
 /// Whether a name stands for standard output.

@@ -1,7 +1,8 @@
 //! From a scene file and the options about it to a scene, with its warnings told.
 
 use super::frames::{Frames, numbered};
-use super::number::{finite, not_negative, positive, rgb};
+use super::number::{finite, positive, rgb, strength};
+use super::output::lossy;
 use super::progress::{Form, Waiting};
 use super::say;
 use caustique::error::{Error, Kind, Result};
@@ -21,7 +22,7 @@ use std::str::FromStr;
 pub struct SceneArgs {
     /// Scene: .glb or .gltf, as Blender exports it, or a stage of USD (.usd, .usda, .usdc, .usdz)
     #[arg(value_name = "SCENE", help_heading = None::<&str>)]
-    #[serde(rename = "scene")]
+    #[serde(rename = "scene", serialize_with = "lossy")]
     pub path: PathBuf,
     /// Frames of the scene's animation, such as 5, 1-100 or 1-100,2. In the names of files, also in that of the scene,
     /// '####' stands for the frame's number [default: the moment of the first key]
@@ -95,7 +96,7 @@ pub enum EnvironmentChoice {
     /// One radiance from everywhere.
     Color([f32; 3]),
     /// An image.
-    File(PathBuf),
+    File(#[serde(serialize_with = "lossy")] PathBuf),
 }
 
 impl FromStr for EnvironmentChoice {

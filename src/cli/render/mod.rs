@@ -14,6 +14,7 @@ pub use options::RenderArgs;
 use super::finish::tell_missing;
 use super::progress::{Reporter, Turn, Waiting};
 use super::signals::Interrupt;
+use super::scene::EnvironmentChoice;
 use super::{output, say, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
@@ -61,6 +62,9 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;
+    if let Some(EnvironmentChoice::File(sky)) = &args.job.scene.env {
+        output::check_inputs(&args.output, std::iter::once(sky.as_path()))?;
+    }
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     files::check_checkpoint(args)?;
     techniques::prepare(args)?;
