@@ -164,16 +164,19 @@ pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(
 ///
 /// # Errors
 /// The scene cannot be read.
-pub fn hash(scene: &Path, environment: Option<&Path>, allow_outside: bool) -> Result<Option<String>> {
+pub fn hash(
+    scene: &Path,
+    converted: Option<&str>,
+    environment: Option<&Path>,
+    allow_outside: bool,
+) -> Result<Option<String>> {
     if !scene.is_file() {
         return Ok(None);
     }
-    let bytes = std::fs::read(scene).map_err(|cause| Error::io(scene, &cause))?;
+    let scene = converted.map_or_else(|| gltf::hash(scene, allow_outside), |hash| Ok(hash.to_owned()))?;
     let mut hasher = blake3::Hasher::new();
-    hasher.update(&bytes);
-    let beside = gltf::files(&bytes, scene, allow_outside);
-    let named: Vec<PathBuf> = environment.map(Path::to_owned).into_iter().chain(beside).collect();
-    for bytes in named.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
+    hasher.update(scene.as_bytes());
+    if let Some(bytes) = environment.filter(|path| path.is_file()).and_then(|path| std::fs::read(path).ok()) {
         hasher.update(&bytes);
     }
     Ok(Some(hasher.finalize().to_hex().to_string()))

@@ -181,7 +181,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     let stage = (scene, &camera);
     let (settings, selection) = checked(&order, stage)?;
     let kept = order.saving.is_some() || order.resume.is_some() || settings.is_shard();
-    let identity = if kept { order.hash()? } else { None };
+    let identity = if kept { order.hash(scene)? } else { None };
     let saved = order.resume.as_deref().map(checkpoint::read).transpose()?;
     if let (Some(path), Some((head, _))) = (&order.resume, &saved) {
         checkpoint::check(path, head, identity.as_deref(), &order.arguments)?;
@@ -291,12 +291,13 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
 
 impl Order<'_> {
     /// A hash of the files that it reads.
-    fn hash(&self) -> Result<Option<String>> {
+    fn hash(&self, scene: &Scene) -> Result<Option<String>> {
         let environment = match &self.scene.environment {
             Some(load::Environment::File(path)) => Some(path.as_path()),
             _ => None,
         };
-        checkpoint::hash(&self.scene.path, environment, self.scene.options.allow_outside)
+        let converted = scene.converted.as_deref();
+        checkpoint::hash(&self.scene.path, converted, environment, self.scene.options.allow_outside)
     }
 }
 

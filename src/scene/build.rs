@@ -68,6 +68,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     Ok(Scene {
         source: description.source,
+        converted: description.converted,
         origin,
         shapes,
         materials,
@@ -183,6 +184,7 @@ pub(super) fn dress(
     let lights = Lights::new(&shapes, &materials, lamps.collect(), sky).grouped(scene.lights.groups().clone());
     Ok(Scene {
         source: scene.source.clone(),
+        converted: scene.converted.clone(),
         origin: scene.origin,
         objects: scene.objects.clone(),
         first_lamp: scene.first_lamp,

@@ -13,6 +13,8 @@ use std::path::PathBuf;
 pub struct Description {
     /// The file it was read from.
     pub source: PathBuf,
+    /// Hash of what a converter has made of it and of all files that it names.
+    pub converted: Option<String>,
     /// Meshes in local space, each once however often it stands in the scene.
     pub meshes: Vec<Mesh>,
     /// Where they stand.

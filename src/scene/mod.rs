@@ -33,6 +33,8 @@ use std::sync::Arc;
 pub struct Scene {
     /// The file it came from.
     pub source: PathBuf,
+    /// Hash of what a converter has made of it, see [`Description::converted`].
+    pub converted: Option<String>,
     /// What was subtracted from all world positions: not zero only for scenes far from the origin.
     pub origin: DVec3,
     /// Meshes and instances.

@@ -2,9 +2,26 @@
 
 use super::container;
 use super::uri;
+use crate::error::{Error, Result};
 use crate::scene::folder::Folder;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// A hash of the scene file at `scene` and of the files that it names and that are there, in its folder unless they may
+/// lie outside.
+///
+/// # Errors
+/// The scene file cannot be read.
+pub fn hash(scene: &Path, allow_outside: bool) -> Result<String> {
+    let bytes = std::fs::read(scene).map_err(|cause| Error::io(scene, &cause))?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&bytes);
+    let beside = files(&bytes, scene, allow_outside);
+    for bytes in beside.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
+        hasher.update(&bytes);
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}
 
 /// The files that the bytes of a scene file at `scene` name, in its folder unless they may lie outside; whether they
 /// are there is not looked at. None of what is no glTF.

@@ -30,7 +30,7 @@ mod topology;
 mod transform;
 mod uri;
 
-pub use files::files;
+pub use files::{files, hash};
 
 use super::Description;
 use crate::error::{Error, Kind, Result};

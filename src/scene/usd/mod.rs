@@ -67,6 +67,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
         error
     })?;
     description.source = path.to_owned();
+    // Layers, textures and all else that the stage is composed of are in what became of it.
+    description.converted = Some(gltf::hash(&glb, false)?);
     Ok(description)
 }
 

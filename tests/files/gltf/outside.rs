@@ -119,7 +119,7 @@ fn hashes_are_of_the_files_in_the_folder() {
     std::fs::write(&scene, document.to_string()).expect("it can be written");
     let hash = |place: &str, bytes: &str, allow_outside: bool| {
         std::fs::write(folder.join(place), bytes).expect("it can be written");
-        checkpoint::hash(&scene, None, allow_outside).expect("it can be read")
+        checkpoint::hash(&scene, None, None, allow_outside).expect("it can be read")
     };
     let first = hash("scene/a b.bin", "1", false);
     assert!(first.is_some());
