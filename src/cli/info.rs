@@ -3,7 +3,7 @@
 use super::progress::{Form, duration, percent};
 use super::render::place;
 use super::scene::SceneArgs;
-use super::{plot, print, print_json, scene};
+use super::{plot, print, print_json, printable, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
@@ -36,14 +36,32 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     let path = &args.file;
     if is_exr(path)? {
         let (set, attributes) = exr::read(path)?;
-        let object = image_object(&set, attributes.object());
-        return if args.json { print_json(&Value::Object(object)) } else { print(&image_text(path, &set, &object)) };
+        let mut object = Value::Object(image_object(&set, attributes.object()));
+        if args.json {
+            return print_json(&object);
+        }
+        escape(&mut object);
+        return print(&image_text(path, &set, &object));
     }
     let asked = SceneArgs::of(path, args.allow_outside);
     let scene =
         super::pool(0)?.install(|| scene::read(&asked, Form::beside(args.json), rayon::current_num_threads()))?.scene;
-    let object = scene_object(path, &scene);
-    if args.json { print_json(&object) } else { print(&scene_text(path, &object)) }
+    let mut object = scene_object(path, &scene);
+    if args.json {
+        return print_json(&object);
+    }
+    escape(&mut object);
+    print(&scene_text(path, &object))
+}
+
+/// Makes all texts in a value printable.
+fn escape(value: &mut Value) {
+    match value {
+        Value::String(text) => *text = printable(text),
+        Value::Array(values) => values.iter_mut().for_each(escape),
+        Value::Object(object) => object.values_mut().for_each(escape),
+        _ => {}
+    }
 }
 
 fn is_exr(path: &Path) -> Result<bool> {
@@ -73,15 +91,17 @@ fn image_object(set: &LayerSet, header: Option<Value>) -> Map<String, Value> {
     object
 }
 
-fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> String {
-    let mut text = format!("{}: {} x {} pixels, {} layers\n", path.display(), set.width, set.height, set.layers.len());
+fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
+    let name = printable(&path.display().to_string());
+    let mut text = format!("{name}: {} x {} pixels, {} layers\n", set.width, set.height, set.layers.len());
     for layer in &set.layers {
         let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
         let name = if layer.name.is_empty() { "(beauty)" } else { &layer.name };
         // Blender's names that are ours behind the view layer's.
         let plain = layer.name.strip_prefix("ViewLayer.").unwrap_or(&layer.name);
         let known = describe(plain).map(|known| format!("{} [{}]", known.meaning, known.unit));
-        text += format!("  {name:<18} {:<8} {}", components.concat(), known.unwrap_or_default()).trim_end();
+        let [name, components] = [name, &components.concat()].map(printable);
+        text += format!("  {name:<18} {components:<8} {}", known.unwrap_or_default()).trim_end();
         text.push('\n');
     }
     let number = |key: &str| object.get(key).and_then(Value::as_f64);
@@ -126,7 +146,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Map<String, Value>) -> Strin
 }
 
 /// How sure the error is, and where it is.
-fn accuracy_text(object: &Map<String, Value>) -> String {
+fn accuracy_text(object: &Value) -> String {
     let accuracy = object.get("accuracy");
     let number = |value: &Value, key: &str| value.get(key).and_then(Value::as_f64);
     let mut text = String::new();
@@ -208,7 +228,7 @@ fn scene_text(path: &Path, object: &Value) -> String {
             n => format!("{n}: {} and {} more (all of them with --json)", names[..SHOWN].join(", "), n - SHOWN),
         }
     };
-    let mut text = format!("{}\n", path.display());
+    let mut text = format!("{}\n", printable(&path.display().to_string()));
     text += &format!(
         "  triangles  {} in {} meshes, placed {} times\n",
         object["triangles"], object["meshes"], object["instances"]

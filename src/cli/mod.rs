@@ -146,8 +146,19 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 /// on.
 fn say(line: &str) {
     progress::beside_the_bar(|| {
-        let _ = writeln!(std::io::stderr().lock(), "{line}");
+        let _ = writeln!(std::io::stderr().lock(), "{}", printable(line));
     });
+}
+
+/// One line of text in which names of a scene cannot act on a terminal or begin a line of their own: what is not shown
+/// but acted on (control characters, changes of direction) is shown as an escape such as `\u{1b}`.
+fn printable(text: &str) -> String {
+    text.chars().map(|c| if commands(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
+}
+
+/// Whether a terminal does something for a character other than to show it.
+fn commands(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200e}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Prints data to stdout. A reader that has closed the pipe wants no more: that is no error.
@@ -166,7 +177,8 @@ fn print_file(path: &Path) -> std::io::Result<()> {
     std::io::copy(&mut File::open(path)?, &mut out).map(drop)
 }
 
-/// Prints a JSON object to stdout, indented.
+/// Prints a JSON object to stdout, indented. What a terminal would act on stands in strings alone, as escapes.
 fn print_json(value: &serde_json::Value) -> Result<()> {
-    print(&format!("{value:#}\n"))
+    let escape = |c: char| if c != '\n' && commands(c) { format!("\\u{:04x}", c as u32) } else { c.to_string() };
+    print(&format!("{value:#}\n").chars().map(escape).collect::<String>())
 }

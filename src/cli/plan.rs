@@ -4,7 +4,7 @@ use super::number::threads;
 use super::progress::{Form, duration, percent};
 use super::render::{Job, Method};
 use super::scene::SceneArgs;
-use super::{print, print_json, scene};
+use super::{print, print_json, printable, scene};
 use caustique::error::Result;
 use caustique::pipeline::{Loaded, Outlook, check, outlook, plan, sized};
 use caustique::plan::{EffectPlan, Plan};
@@ -145,18 +145,18 @@ fn carrier(e: &EffectPlan) -> String {
 fn text(plan: &Plan) -> String {
     let columns = columns(plan);
     let cells = |row: &dyn Fn(&Column) -> String| columns.iter().map(row).collect::<Vec<String>>();
-    let mut rows = vec![(cells(&|column| column.0.into()), vec!["because"])];
+    let mut rows = vec![(cells(&|column| column.0.into()), vec!["because".to_string()])];
     for effect in &plan.effects {
-        let because: Vec<&str> = match &effect.because[..] {
-            [] => vec!["nothing in the scene calls for it"],
-            because => because.iter().map(String::as_str).collect(),
+        let because: Vec<String> = match &effect.because[..] {
+            [] => vec!["nothing in the scene calls for it".into()],
+            because => because.iter().map(|reason| printable(reason)).collect(),
         };
         rows.push((cells(&|column| (column.1)(effect)), because));
     }
     let width = |column: usize| rows.iter().map(|(cells, _)| cells[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns.len()).map(width).collect();
     let indent = 2 + widths.iter().map(|width| width + 2).sum::<usize>();
-    let mut text = format!("{}: {}, {}\n", plan.scene, plan.method, plan.because);
+    let mut text = format!("{}: {}, {}\n", printable(&plan.scene), plan.method, printable(&plan.because));
     for (cells, because) in rows {
         text += "  ";
         for (cell, width) in cells.iter().zip(&widths) {
@@ -172,7 +172,7 @@ fn text(plan: &Plan) -> String {
         None => "light is left out that the scene calls for (nothing bounds the error by it)\n".into(),
     };
     for warning in &plan.warnings {
-        text += &format!("warning: {warning}\n");
+        text += &format!("warning: {}\n", printable(warning));
     }
     text
 }

@@ -1,6 +1,6 @@
 //! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
 
-use super::say;
+use super::{printable, say};
 use caustique::pipeline::FINISHED_PICTURE;
 pub use caustique::pipeline::plan::percent;
 use caustique::render::{Progress, Settings};
@@ -115,7 +115,7 @@ impl Waiting {
     /// Begins to wait for `what`.
     pub fn begin(form: Form, what: &str) -> Waiting {
         let (over, end) = channel::<()>();
-        let (form, what) = (form.settled(), what.to_string());
+        let (form, what) = (form.settled(), printable(what));
         let tell = move || {
             if end.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
                 return;

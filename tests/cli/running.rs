@@ -28,6 +28,30 @@ fn progress_for_programs() {
     assert_eq!(folder.render("-o out.exr --iterations 2 --no-combine --progress none").stderr, "");
 }
 
+/// Names of a scene are shown, and act on nothing: neither on a terminal nor on a farm.
+#[test]
+fn names_of_a_scene_give_no_orders() {
+    let folder = Folder::new();
+    let name = "\u{1b}]0;title\u{7}\nopenjd_fail: forged\r\u{9b}2J\u{202e}";
+    crate::support::glb::write_grouped(&folder.path("scene.glb"), [name, "a-b", "a b"]);
+    let acts = |text: &str| text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}'));
+    for progress in ["plain", "openjd", "json"] {
+        let outcome =
+            folder.render(&format!("-o out.exr --iterations 2 --method path --no-combine --progress {progress}"));
+        assert!(outcome.stderr.contains("\\u{1b}]0;title\\u{7}\\nopenjd_fail: forged"), "{}", outcome.stderr);
+        assert!(!outcome.stderr.contains("\nopenjd_fail") && !acts(&outcome.stderr), "{progress}");
+    }
+    for command in ["info scene.glb", "plan scene.glb", "info out.exr"] {
+        let [text, json] = ["", " --json"].map(|form| folder.run(&format!("{command}{form}")).stdout);
+        assert!(!text.contains("\nopenjd_fail") && !acts(&text) && !acts(&json), "{command}");
+        let json: Value = serde_json::from_str(&json).expect("it is JSON");
+        let told = json["warnings"]
+            .as_array()
+            .is_some_and(|all| all.iter().any(|one| one.as_str().is_some_and(|one| one.contains(name))));
+        assert!(told, "{command}: {json}");
+    }
+}
+
 #[test]
 fn stop_conditions() {
     let folder = Folder::new();
