@@ -1,5 +1,6 @@
 //! `caustique render`: a scene in, an EXR and perhaps a PNG out.
 
+mod claim;
 mod files;
 mod job;
 mod options;

@@ -1,5 +1,6 @@
 //! `--frames`: one frame after the other, each a render of its own.
 
+use super::claim::{Claim, Claimed};
 use super::options::RenderArgs;
 use crate::cli::frames::{Frames, is_pattern, numbered};
 use crate::cli::progress::Turn;
@@ -15,12 +16,25 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
         let mut one = args.at(frame);
-        // What a run that was stopped has left of it.
-        let left = one.saving().map(|saving| saving.path).filter(|path| args.skip_existing && path.is_file());
-        if args.skip_existing && left.is_none() && is_there(&one) {
+        let pass_over = |why: String| {
             if args.progress.for_people() {
-                say(&format!("frame {frame}: {} is there", one.output.display()));
+                say(&format!("frame {frame}: {} {why}", one.output.display()));
             }
+        };
+        // Held until the frame is written. What another machine renders meanwhile is not ours.
+        let _claim = match args.skip_existing.then(|| Claim::of(&one.output)).transpose()? {
+            Some(Claimed::Elsewhere(owner)) => {
+                pass_over(format!("is rendered by {owner}"));
+                continue;
+            }
+            Some(Claimed::Here(claim)) => Some(claim),
+            None => None,
+        };
+        // What a run that was stopped has left of it.
+        let left = one.saving().map(|saving| saving.path);
+        let left = left.filter(|path| args.skip_existing && !args.overwrite && path.is_file());
+        if args.skip_existing && left.is_none() && is_there(&one) {
+            pass_over("is there".into());
             continue;
         }
         if Interrupt::came() {
