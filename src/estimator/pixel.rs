@@ -109,9 +109,7 @@ impl Pixel {
     /// A pixel of an image of so many levels before its first iteration. Sums of light scale exactly with it by powers
     /// of two if `exponent`, that of the scene's light, does ([`Grids::new`]).
     pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> Pixel {
-        // The others, and a difference.
-        let others = if levels > 1 { levels } else { 0 };
-        let others = vec![Moments::default(); others].into_boxed_slice();
+        let others = vec![Moments::default(); Pixel::others(levels)].into_boxed_slice();
         Pixel { grids: Grids::new(exponent), others, bandwidths, ..Pixel::default() }
     }
 
@@ -123,13 +121,22 @@ impl Pixel {
 
     /// Bytes of a pixel with so many levels and groups.
     pub fn bytes(levels: usize, groups: usize) -> usize {
-        let others = if levels > 1 { levels } else { 0 };
-        size_of::<Pixel>() + others * size_of::<Moments>() + groups * size_of::<[Sum<DVec3>; 2]>()
+        size_of::<Pixel>() + Pixel::others(levels) * size_of::<Moments>() + groups * size_of::<[Sum<DVec3>; 2]>()
     }
 
     /// Bytes of this one.
     pub fn size(&self) -> usize {
         Pixel::bytes(self.levels(), self.groups.len())
+    }
+
+    /// Whether there are sums of so many levels and groups of lights.
+    pub fn holds(&self, levels: usize, groups: usize) -> bool {
+        self.others.len() == Pixel::others(levels) && self.groups.len() == groups
+    }
+
+    /// Sums of other levels beside the own image's: theirs, and a difference.
+    fn others(levels: usize) -> usize {
+        if levels > 1 { levels } else { 0 }
     }
 
     /// Number of levels.

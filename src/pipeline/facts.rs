@@ -3,10 +3,11 @@
 use super::layers;
 use crate::film::output::Shape;
 use crate::image::exr;
-use crate::render::Settings;
+use crate::light::MAX_GROUPS;
 use crate::render::output::shape;
+use crate::render::{Part, Settings};
 use crate::scene::description::Picture;
-use crate::scene::{Scene, View};
+use crate::scene::{MAX_SIZE, Scene, View};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
@@ -43,5 +44,18 @@ impl Facts {
             warnings: scene.warnings.clone(),
             made_for: scene.picture,
         })
+    }
+
+    /// Whether they can be of a picture that is made of this part: a file can say anything.
+    pub(super) fn are_sound(&self, part: &Part) -> bool {
+        let Settings { method, levels, .. } = &part.settings;
+        let Shape { levels: count, own, compared, groups, .. } = &self.shape;
+        let [width, height] = self.frame.display;
+        let [x, y] = self.frame.corner;
+        let inside = |corner: u32, size: u32, whole: u32| corner.checked_add(size).is_some_and(|end| end <= whole);
+        (*count, *own, *compared) == (levels.count, levels.own(), part.settings.compared_levels())
+            && (groups.is_empty() || method.has_techniques() && groups.len() <= MAX_GROUPS)
+            && inside(x, part.size.0, width.min(MAX_SIZE))
+            && inside(y, part.size.1, height.min(MAX_SIZE))
     }
 }

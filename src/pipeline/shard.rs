@@ -80,7 +80,8 @@ impl Open {
         }
         let (facts, part): (Facts, Part) =
             postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
-        if !part.is_sound() {
+        let arguments = head.arguments.is_object();
+        if !(part.is_sound() && facts.are_sound(&part) && arguments) {
             return Err(damaged());
         }
         Ok(Some(Open { head, facts, part, file }))
@@ -91,12 +92,12 @@ impl Open {
     /// # Errors
     /// The file is damaged, or there are not as many as the picture has.
     pub fn pixels(&mut self, path: &Path, mut each: impl FnMut(Vec<Pixel>)) -> Result<()> {
-        let levels = self.part.settings.levels.count;
+        let (levels, groups) = (self.part.settings.levels.count, self.facts.shape.groups.len());
         let (width, height) = self.part.size;
         let (whole, mut count) = (width as usize * height as usize, 0);
         let read = records::read_blocks(&mut self.file, |block: Vec<Pixel>| {
             count += block.len();
-            if count > whole || block.iter().any(|pixel| pixel.levels() != levels) {
+            if count > whole || !block.iter().all(|pixel| pixel.holds(levels, groups)) {
                 return Err(io::ErrorKind::InvalidData.into());
             }
             each(block);

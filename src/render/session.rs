@@ -116,9 +116,9 @@ impl<'a> Session<'a> {
         let State { pixels, rest } = state;
         let Rest { next, done, light_paths, photons, rejected, next_record, history, .. } = rest;
         let Rest { phases, spent, pilot_seconds, passes, .. } = rest;
-        let levels = stage.settings.levels.count;
+        let (levels, groups) = (stage.settings.levels.count, stage.settings.light_groups(stage.scene));
         let fits = pixels.len() == session.pixels.len()
-            && pixels.iter().all(|pixel| pixel.levels() == levels)
+            && pixels.iter().all(|pixel| pixel.holds(levels, groups))
             && session.passes.restore(&passes);
         fits.then(|| Session {
             pixels,

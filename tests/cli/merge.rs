@@ -221,3 +221,67 @@ fn renders_of_other_seeds_give_their_mean() {
         outcome.stderr
     );
 }
+
+/// No input is overwritten, by whatever name it is called.
+#[test]
+fn inputs_are_not_overwritten() {
+    let folder = Folder::new();
+    for seed in [1, 2] {
+        let outcome = folder.run(&format!(
+            "render scene.glb --width 8 --height 8 --progress none --iterations 2 --method path --seed {seed} -o {seed}.exr"
+        ));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    }
+    std::os::unix::fs::symlink("2.exr", folder.path("link.exr")).expect("a link");
+    std::fs::hard_link(folder.path("2.exr"), folder.path("again.exr")).expect("a link");
+    let before = std::fs::read(folder.path("2.exr")).expect("it is there");
+    for output in ["2.exr", "./2.exr", "link.exr", "again.exr"] {
+        let outcome = folder.run(&format!("merge 1.exr 2.exr -o {output}"));
+        let error = format!("{output}: 2.exr is an input, which is not overwritten\nhint: name another output\n");
+        assert_eq!((outcome.code, outcome.stderr), (Some(2), error));
+    }
+    assert!(std::fs::read(folder.path("2.exr")).expect("it is there") == before);
+    assert_eq!(folder.run("merge 1.exr 2.exr -o both.exr").code, Some(0));
+    let sky = folder.run("render scene.glb -o 1.exr --env 1.exr");
+    assert_eq!((sky.code, folder.read("1.exr").1["seed"].clone()), (Some(2), 1.into()), "{}", sky.stderr);
+}
+
+/// A shard whose sums are not those that its facts promise, its checks put right, is damaged, and ends no program.
+#[test]
+fn forged_shards_are_refused() {
+    use caustique::pipeline::shard::{Open, Tail};
+    let folder = Folder::new();
+    let names = shards(&folder, "--method vcm --iterations 4 --no-combine", 2);
+    let open = || Open::of(&folder.path(&names[0])).expect("it can be read").expect("it is a shard");
+    let forged = |change: &dyn Fn(&mut Tail)| {
+        let mut pixels = Vec::new();
+        let mut whole = open();
+        whole.pixels(&folder.path(&names[0]), |block| pixels.extend(block)).expect("it is whole");
+        let Open { head, facts, part, .. } = whole;
+        let mut tail = Tail { head, facts, part, pixels };
+        change(&mut tail);
+        let mut file = std::fs::File::create(folder.path("forged.exr")).expect("it can be made");
+        tail.write(&mut file).expect("it can be written");
+        folder.run("merge --partial forged.exr -o merged.exr --no-combine --layers all")
+    };
+    let few = || caustique::estimator::Pixel::new(1, 0, [0.0; 2]);
+    let many = || caustique::estimator::Pixel::new(5, 0, [0.0; 2]).with_groups(3);
+    let changes: [&dyn Fn(&mut Tail); 10] = [
+        &|tail| tail.facts.shape.levels = 67,
+        &|tail| tail.facts.shape.own = 66,
+        &|tail| tail.facts.shape.compared = 9,
+        &|tail| tail.facts.shape.groups = vec!["a".into()],
+        &|tail| tail.facts.frame.corner = [u32::MAX, 7],
+        &|tail| tail.facts.frame.display = [0, 0],
+        &|tail| tail.head.arguments = serde_json::json!([1]),
+        &|tail| tail.pixels[7] = few(),
+        &|tail| tail.pixels[7] = many(),
+        &|tail| tail.part.settings.levels.count = 3,
+    ];
+    for (i, change) in changes.into_iter().enumerate() {
+        let outcome = forged(change);
+        let error = "forged.exr: the sums behind its picture are damaged\nhint: render this shard again\n";
+        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), error), "change {i}");
+    }
+    assert_eq!(forged(&|_| {}).code, Some(0));
+}
