@@ -108,6 +108,7 @@ pub(super) fn deliver(
         let squared: Vec<[f32; 3]> = errors.squared().collect();
         Worst::of(&squared, &errors.weight, &set, &seen)
     });
+    layers::add_dark(selection, &facts.shape, finishes, &mut set)?;
     // A render that is still to be finished keeps what that reads, and a shard has what it can have.
     if keep {
         set.layers.retain(|layer| selection.wants(&layer.name));

@@ -202,6 +202,8 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     let mut plan = plan::plan(&asked, settings.method, stage, removed);
     plan.warnings.extend(less);
     plan.warnings.extend(ungrouped(scene, &settings));
+    let dark = layers::dark(&selection, &shape(&settings, scene), order.finish.is_some());
+    plan.warnings.extend(dark.iter().map(|name| format!("layer \"{name}\" is black: the render has no such light")));
     let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
     // The error that is asked for is that of the picture that is delivered.
     let (target, settings) = match (&ready, settings.target_error) {

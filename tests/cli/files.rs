@@ -378,3 +378,58 @@ fn one_iteration_says_that_its_variance_is_unknown() {
     assert!(set.layers.iter().flat_map(|l| &l.planes).all(|plane| plane.values.iter().all(|v| v.is_finite())));
     assert!(values(&set, "Error") == values(&set, "Noisy"));
 }
+
+/// Names of light groups are the scene's: whatever they are, each group has layers of its own that can be written.
+#[test]
+fn light_groups_of_any_names_have_layers() {
+    let folder = Folder::new();
+    let long = "k".repeat(43);
+    for (groups, expected, naming) in [
+        (["key light", "key-light", long.as_str()], ["key_light", "key_light_2", &long[..32]], "plain"),
+        (["\u{4e3b}\u{5149}", "\u{9006}\u{5149}", &long[..33]], ["__", "___2", &long[..32]], "blender"),
+    ] {
+        support::glb::write_grouped(&folder.path("scene.glb"), groups);
+        let outcome = folder.render(&format!("-o out.exr --iterations 4 --method path --exr-naming {naming}"));
+        let (set, _) = folder.read("out.exr");
+        for name in expected {
+            let of_naming = if naming == "blender" { "ViewLayer." } else { "" };
+            for prefix in ["LightGroup_", "CombinedLightGroup_"] {
+                assert!(set.get(&format!("{of_naming}{prefix}{name}")).is_some(), "{name} in {}", outcome.stderr);
+            }
+        }
+        for (group, name) in groups.into_iter().zip(expected).skip(1) {
+            let warning = format!("light group \"{group}\": its layers are called {name}: ");
+            assert!(outcome.stderr.contains(&warning), "{warning} in {}", outcome.stderr);
+        }
+    }
+}
+
+/// A part of the light that a scene has none of is black where it is asked for by name: shots keep their layers.
+#[test]
+fn a_part_without_light_is_black() {
+    let folder = Folder::new();
+    let outcome = folder.render("-o out.exr --iterations 4 --method path --layers beauty,Volume,CombinedVolume");
+    assert!(outcome.stderr.contains("layer \"Volume\" is black: the render has no such light"), "{}", outcome.stderr);
+    let (set, _) = folder.read("out.exr");
+    for layer in ["Volume", "CombinedVolume"] {
+        assert!(values(&set, layer).as_flattened().iter().all(|value| *value == 0.0), "{layer}");
+    }
+    assert!(values(&set, "").as_flattened().iter().any(|value| *value > 0.0));
+}
+
+/// A scene and an environment may have names that are not UTF-8.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_not_utf8() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = Folder::new();
+    let name = std::ffi::OsStr::from_bytes(b"sc\xffne.glb");
+    std::fs::rename(folder.path("scene.glb"), folder.path("").join(name)).expect("it can be renamed");
+    for command in ["render -o out.exr --width 8 --iterations 1 --method path --progress none", "plan", "info"] {
+        let mut command = folder.command(command);
+        command.arg(name);
+        let outcome = crate::Outcome::of(command);
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    }
+    assert_eq!(folder.read("out.exr").1["arguments"]["scene"], "sc\u{fffd}ne.glb");
+}
