@@ -23,7 +23,7 @@ struct Finding {
     name: &'static str,
     key: &'static str,
     needed_for: &'static str,
-    /// Scenes in glTF do without.
+    /// Renders of scenes in glTF do without.
     optional: bool,
     found: std::result::Result<Found, (String, Option<String>)>,
 }
@@ -76,7 +76,7 @@ fn onnxruntime() -> Finding {
         }
         Err(error) => Err((error.to_string(), error.hint)),
     };
-    Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", optional: false, found }
+    Finding { name: "ONNX Runtime", key: "onnxruntime", needed_for: "combine", optional: true, found }
 }
 
 fn oidn() -> Finding {
@@ -84,7 +84,7 @@ fn oidn() -> Finding {
         Ok(library) => Ok(Found(library.version().to_string(), show(library.path()), denoiser::origin(&library))),
         Err(error) => Err((error.to_string(), error.hint())),
     };
-    Finding { name: "Open Image Denoise", key: "oidn", needed_for: "denoise", optional: false, found }
+    Finding { name: "Open Image Denoise", key: "oidn", needed_for: "denoise", optional: true, found }
 }
 
 fn usd() -> Finding {

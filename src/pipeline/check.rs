@@ -26,10 +26,11 @@ pub fn media(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
     Err(Error::new(Kind::Usage, path.display(), cause).hint(hint))
 }
 
-/// Whether photons can be found within the bandwidth that was asked for.
+/// Whether photons within the bandwidth that was asked for tell of the light there.
 ///
 /// # Errors
-/// It is smaller than positions in this scene can be told apart.
+/// It is smaller than positions in this scene can be told apart, or larger than the scene: what is found is then spread
+/// over an area of which the scene is nothing.
 pub fn bandwidth(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
     let radius = scene.lights.sky().radius;
     let least = LEAST_ASKED * radius;
@@ -40,6 +41,11 @@ pub fn bandwidth(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> 
             );
             let error = Error::new(Kind::Usage, path.display(), cause);
             Err(error.hint(format!("ask for {least:.1e} at least, or leave --initial-bandwidth out")))
+        }
+        InitialBandwidth::Fixed(asked) if asked > radius => {
+            let cause = format!("--initial-bandwidth {asked}: the scene has a radius of {radius:.3}");
+            let error = Error::new(Kind::Usage, path.display(), cause);
+            Err(error.hint(format!("ask for {radius:.3} at most, or leave --initial-bandwidth out")))
         }
         _ => Ok(()),
     }

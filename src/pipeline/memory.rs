@@ -158,7 +158,13 @@ pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize, fin
     } else {
         format!(" with --method {}", settings.method.name())
     };
-    refuse(needed, format_args!("{} x {} pixels{paths}", size.0, size.1), "fewer --photons")
+    let method = settings.method;
+    let fewer = match (method.counts_photons(), method.has_levels()) {
+        (true, _) => "fewer --photons",
+        (false, true) => "fewer --levels",
+        (false, false) => "--crop for a part of the picture",
+    };
+    refuse(needed, format_args!("{} x {} pixels{paths}", size.0, size.1), fewer)
 }
 
 /// Channels of the layers that the combiner reads.
