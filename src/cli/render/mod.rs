@@ -14,8 +14,8 @@ pub use options::RenderArgs;
 
 use super::finish::tell_missing;
 use super::progress::{Reporter, Turn, Waiting};
-use super::signals::Interrupt;
 use super::scene::EnvironmentChoice;
+use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
