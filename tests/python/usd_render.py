@@ -105,6 +105,23 @@ class Program(usd_support.Stages):
             self.assertIn("environment 1", done.stdout)
         self.assertIn("emission", self.run_on("plan", *QUICK[:4], "--method", "path", "--no-combine").stdout)
 
+    def test_a_checkpoint_is_of_all_layers(self):
+        self.save()
+        root = Sdf.Layer.CreateNew(str(self.dir / "root.usda"))
+        root.subLayerPaths.append(f"./{self.path.name}")
+        root.Save()
+        state = self.dir / "state"
+
+        def render(*options, check):
+            words = ["render", self.dir / "root.usda", "-o", self.out, *QUICK, *options]
+            return support.run(words, check=check)
+
+        render("--checkpoint", state, check=0)
+        render("--resume", state, "--no-checkpoint", check=0)
+        UsdGeom.Xformable.Get(self.stage, "/Floor").AddTranslateOp().Set((0, -0.1, 0))
+        self.save()
+        self.assertIn("is of another scene", render("--resume", state, "--no-checkpoint", check=2).stderr)
+
     def test_frames(self):
         floor = UsdGeom.Xformable.Get(self.stage, "/Floor")
         floor.AddTranslateOp().Set((0, 0, 0), 1)
