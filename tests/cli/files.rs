@@ -379,6 +379,13 @@ fn one_iteration_says_that_its_variance_is_unknown() {
     assert!(values(&set, "Error") == values(&set, "Noisy"));
 }
 
+/// A few pixels by `path`.
+pub fn small(folder: &Folder, options: &str) -> crate::Outcome {
+    let outcome = folder.run(&format!("render scene.glb -o out.exr --width 8 --height 8 --method path {options}"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    outcome
+}
+
 /// Names of light groups are the scene's: whatever they are, each group has layers of its own that can be written.
 #[test]
 fn light_groups_of_any_names_have_layers() {
@@ -389,7 +396,7 @@ fn light_groups_of_any_names_have_layers() {
         (["\u{4e3b}\u{5149}", "\u{9006}\u{5149}", &long[..33]], ["__", "___2", &long[..32]], "blender"),
     ] {
         support::glb::write_grouped(&folder.path("scene.glb"), groups);
-        let outcome = folder.render(&format!("-o out.exr --iterations 4 --method path --exr-naming {naming}"));
+        let outcome = small(&folder, &format!("--iterations 4 --exr-naming {naming}"));
         let (set, _) = folder.read("out.exr");
         for name in expected {
             let of_naming = if naming == "blender" { "ViewLayer." } else { "" };
@@ -408,7 +415,7 @@ fn light_groups_of_any_names_have_layers() {
 #[test]
 fn a_part_without_light_is_black() {
     let folder = Folder::new();
-    let outcome = folder.render("-o out.exr --iterations 4 --method path --layers beauty,Volume,CombinedVolume");
+    let outcome = small(&folder, "--iterations 4 --layers beauty,Volume,CombinedVolume");
     assert!(outcome.stderr.contains("layer \"Volume\" is black: the render has no such light"), "{}", outcome.stderr);
     let (set, _) = folder.read("out.exr");
     for layer in ["Volume", "CombinedVolume"] {

@@ -281,7 +281,7 @@ fn forged_shards_are_refused() {
     for (i, change) in changes.into_iter().enumerate() {
         let outcome = forged(change);
         let error = "forged.exr: the sums behind its picture are damaged\nhint: render this shard again\n";
-        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), error), "change {i}");
+        assert!(outcome.code == Some(1) && outcome.stderr.ends_with(error), "change {i}: {}", outcome.stderr);
     }
     assert_eq!(forged(&|_| {}).code, Some(0));
 }

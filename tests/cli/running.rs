@@ -36,8 +36,7 @@ fn names_of_a_scene_give_no_orders() {
     crate::support::glb::write_grouped(&folder.path("scene.glb"), [name, "a-b", "a b"]);
     let acts = |text: &str| text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}'));
     for progress in ["plain", "openjd", "json"] {
-        let outcome =
-            folder.render(&format!("-o out.exr --iterations 2 --method path --no-combine --progress {progress}"));
+        let outcome = crate::files::small(&folder, &format!("--iterations 2 --no-combine --progress {progress}"));
         assert!(outcome.stderr.contains("\\u{1b}]0;title\\u{7}\\nopenjd_fail: forged"), "{}", outcome.stderr);
         assert!(!outcome.stderr.contains("\nopenjd_fail") && !acts(&outcome.stderr), "{progress}");
     }

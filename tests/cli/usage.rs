@@ -530,7 +530,7 @@ fn a_picture_larger_than_memory() {
     assert_eq!((outcome.code, folder.files()), (Some(1), vec![]));
     for (method, remedy) in [("path", "--crop for a part of the picture"), ("vcm", "fewer --levels")] {
         let outcome = folder
-            .run(&format!("render scene.glb -o out.exr --width 65536 --height 65536 --no-combine --method {method}"));
+            .run(&format!("render scene.glb -o out.exr --width 32768 --height 32768 --no-combine --method {method}"));
         let hint = format!("hint: use a smaller --width and --height, or {remedy}\n");
         assert!(outcome.stderr.ends_with(&hint), "{}", outcome.stderr);
     }

@@ -32,9 +32,10 @@ pub fn write_grouped(path: &Path, groups: [&str; 3]) {
     let extras = json!({"light_units": "radiometric"});
     let (mut document, binary) = parts(Some(LAMP), &extras);
     for (i, group) in groups.into_iter().enumerate() {
-        document["nodes"][5 + i] = document["nodes"][2].clone();
-        document["nodes"][5 + i]["translation"][0] = json!(i);
-        document["nodes"][5 + i]["extras"] = json!({"caustique": {"light_group": group}});
+        let mut lamp = document["nodes"][2].clone();
+        lamp["translation"][0] = json!(i);
+        lamp["extras"] = json!({"caustique": {"light_group": group}});
+        document["nodes"].as_array_mut().expect("a list").push(lamp);
     }
     document["scenes"][0]["nodes"] = json!([0, 1, 3, 4, 5, 6, 7]);
     std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
