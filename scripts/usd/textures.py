@@ -8,7 +8,7 @@ import tempfile
 
 import numpy
 import OpenEXR
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from faults import Fault
 
@@ -211,6 +211,9 @@ def _decode(data, name, where):
         texels = numpy.asarray(image)
     except MemoryError:
         raise
+    except UnidentifiedImageError:
+        raise Fault(where, f"the image {os.path.basename(name)} cannot be read: it is none of {', '.join(_FORMATS)}",
+                    "save it as PNG, JPEG or OpenEXR")
     except Exception as error:  # whatever Pillow raises about bytes that come from anywhere
         raise Fault(where, f"the image {os.path.basename(name)} cannot be read: {error}",
                     "save it as PNG, JPEG or OpenEXR")

@@ -285,7 +285,7 @@ fn lamps() -> Cases {
         ("no generator", json!({"/asset": {"version": "2.0"}})),
         ("a generator", json!({"/asset/generator": "chisel"})),
         ("an old exporter", json!({"/asset/generator": "Khronos glTF Blender I/O v3.3.27"})),
-        ("too dark for lumens", json!({format!("{lamp}/intensity"): 1, "/animations": [], "/scenes/0/extras": {}})),
+        ("too dark for lumens", json!({format!("{lamp}/intensity"): 10, "/animations": [], "/scenes/0/extras": {}})),
         (
             "light beyond numbers",
             json!({format!("{lamp}/color"): [1e30, 0, 0], "/animations": [], format!("{lamp}/intensity"): 1e30}),
