@@ -12,8 +12,8 @@ use support::stats::Check;
 
 /// A floor under a point light in a medium that fills all space; with `far`, an object lies many mean free paths away.
 fn foggy(far: bool) -> Scene {
-    let mut description = Description::default();
-    description.medium = Some(MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::ONE, g: 0.0 });
+    let medium = MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::ONE, g: 0.0 };
+    let mut description = Description { medium: Some(medium), ..Description::default() };
     add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, 1.0), 2.0 * Vec3::X, -2.0 * Vec3::Z), matte(0.5, 0.0));
     if far {
         add(&mut description, "far", quad(Vec3::splat(300.0), 0.1 * Vec3::X, 0.1 * Vec3::Z), matte(0.5, 0.0));
