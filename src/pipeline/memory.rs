@@ -51,8 +51,8 @@ fn needed(
         _ => 0,
     };
     let apart = if method == Method::Cppm && settings.chi_squared.plus { 3 } else { 1 };
-    // At most: a scene may have photons of one kind alone.
-    let own = (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
+    // At most: a scene may have photons of one kind alone. Twice, because an iteration that is given up takes them back.
+    let own = 2 * (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
     let per_pixel = own
         + pictures
         + (Pixel::bytes(settings.levels.count, groups) + bytes_of_measures(settings)) as u64

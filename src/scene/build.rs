@@ -1,6 +1,7 @@
 //! From a description to a scene: places and bakes meshes, makes lights, commits to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
+use super::nesting::ranks;
 use super::{Contacts, Nestings, Scene, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
@@ -66,6 +67,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         ));
     }
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
+    let ranks = ranks(&shapes, &materials).into();
     Ok(Scene {
         source: description.source,
         converted: description.converted,
@@ -86,6 +88,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         scattering,
         survey,
         contacts,
+        ranks,
         nestings: Nestings::default(),
         warnings,
     })
@@ -199,6 +202,7 @@ pub(super) fn dress(
         scattering: scene.scattering.again(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
         contacts,
+        ranks: Arc::clone(&scene.ranks),
         nestings: Nestings::default(),
         warnings: Vec::new(),
         shapes,

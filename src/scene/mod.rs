@@ -69,6 +69,8 @@ pub struct Scene {
     pub survey: Survey,
     /// Triangles that others may lie on.
     pub contacts: Arc<Contacts>,
+    /// Ranks of the instances' solids, where several of one priority overlap: the highest fills the space.
+    pub ranks: Arc<[u32]>,
     /// Deep stacks of solids that paths have been in.
     pub nestings: Nestings,
     /// Whatever was ignored or approximated, from the reader and from building.

@@ -4,7 +4,9 @@
 //! path needs one number for any of them. What number depends on the threads, what it stands for does not. Few scenes
 //! have such stacks, so that a lock is no cost.
 
-use std::collections::HashMap;
+use crate::geometry::{Mesh, Shapes};
+use crate::material::Materials;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{PoisonError, RwLock};
 
 /// The empty stack.
@@ -22,6 +24,34 @@ pub struct Stack {
     pub last: u32,
     /// The one of them that fills the space.
     pub host: u32,
+}
+
+/// Ranks of the instances' solids: of two that overlap and have the same priority the one of higher rank fills the space,
+/// whichever was entered first. It is the smaller one, which may lie within the other but not around it; all instances of
+/// an object are one solid.
+pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
+    let mut of_mesh = HashMap::new();
+    let mut volumes = BTreeMap::<u32, f64>::new();
+    for instance in shapes.instances.iter().filter(|i| materials.list[i.material as usize].is_solid_glass()) {
+        let own = of_mesh.entry(instance.mesh).or_insert_with(|| volume(&shapes.meshes[instance.mesh as usize]));
+        let scale = instance.to_world.as_ref().map_or(1.0, |placement| placement.points.matrix3.determinant());
+        *volumes.entry(instance.object).or_default() += *own * f64::from(scale.abs());
+    }
+    let mut order: Vec<(f64, u32)> = volumes.into_iter().map(|(object, volume)| (volume.abs(), object)).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let rank: HashMap<u32, u32> = (0..).zip(order).map(|(rank, (_, object))| (object, rank)).collect();
+    shapes.instances.iter().map(|instance| rank.get(&instance.object).copied().unwrap_or(0)).collect()
+}
+
+/// Volume within a closed mesh, in its own space.
+fn volume(mesh: &Mesh) -> f64 {
+    let Some(&[first, ..]) = mesh.triangles.first() else { return 0.0 };
+    let origin = mesh.positions[first as usize];
+    let of = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|i| (mesh.positions[i as usize] - origin).as_dvec3());
+        a.dot(b.cross(c)) / 6.0
+    };
+    mesh.triangles.iter().map(of).sum()
 }
 
 /// The stacks that have been met in a scene.

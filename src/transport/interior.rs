@@ -1,10 +1,11 @@
 //! Nested dielectrics: which solids a path is inside of.
 //!
 //! The rule: a path keeps the solids it has entered and not left. Where several overlap, the one of highest priority
-//! (`extras.caustique.priority`, 0 by default) fills the space, and among equals the one entered last. A surface is a
-//! boundary only if what fills the space differs on its two sides; otherwise, and where both sides are of one material,
-//! it is no bounce at all \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path that
-//! leaves a solid it never entered (the eye or a lamp was inside) is taken to have been in it.
+//! (`extras.caustique.priority`, 0 by default) fills the space, and among equals the smaller one ([`Scene::ranks`]):
+//! paths of both directions must agree. A surface is a boundary only if what fills the space differs on its two sides;
+//! otherwise, and where both sides are of one material, it is no bounce at all \[Schmidt and Budge 2002, "Simple Nested
+//! Dielectrics in Ray Traced Images"\]. A path that leaves a solid it never entered (the eye or a lamp was inside) is
+//! taken to have been in it.
 
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
@@ -180,8 +181,8 @@ impl Interior {
     /// The instance whose material fills the space here; `None` is the open space.
     #[inline]
     pub fn host(&self, scene: &Scene) -> Option<u32> {
-        // `max_by_key` keeps the last of equals: the one entered last.
-        let inner = self.entries().iter().copied().max_by_key(|&instance| priority(scene, instance));
+        // `max_by_key` keeps the last of equals, which belong to one object.
+        let inner = self.entries().iter().copied().max_by_key(|&instance| strength(scene, instance));
         if self.outer == OPEN { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
     }
 
@@ -214,9 +215,11 @@ impl Interior {
     }
 }
 
+/// Priority and rank: the larger fills the space.
 #[inline]
-fn priority(scene: &Scene, instance: u32) -> i32 {
-    scene.materials.list[scene.shapes.instances[instance as usize].material as usize].priority
+fn strength(scene: &Scene, instance: u32) -> (i32, u32) {
+    let material = scene.shapes.instances[instance as usize].material;
+    (scene.materials.list[material as usize].priority, scene.ranks[instance as usize])
 }
 
 /// Which fills the space: the host of a stack or `inner`, which was entered later.
@@ -225,7 +228,7 @@ fn stronger(scene: &Scene, stack: u32, inner: u32) -> u32 {
         return inner;
     }
     let outer = scene.nestings.get(stack).host;
-    if priority(scene, outer) > priority(scene, inner) { outer } else { inner }
+    if strength(scene, outer) > strength(scene, inner) { outer } else { inner }
 }
 
 /// A stack with one more solid.

@@ -5,7 +5,8 @@ use crate::support;
 use caustique::geometry::Mesh;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::plan::ClassSet;
+use caustique::pipeline::plan::{Asked, plan};
+use caustique::plan::{ClassSet, Switches};
 use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, Projection};
@@ -157,5 +158,36 @@ fn rays_start_where_the_film_is() {
         let start = eye.start((index % 16, index / 16), Stream::new(0, 1, Domain::Test, u64::from(index)));
         let wet = start.interior.material(&scene).is_some();
         assert_eq!(wet, start.origin.y < 0.0, "{}", start.origin);
+    }
+}
+
+/// Two solids that overlap, of one priority, are filled alike whichever is entered first, and by the inner one where one
+/// lies within the other; a plan names the pair that does, and no pair that is ordered.
+#[test]
+fn overlaps_do_not_depend_on_the_direction() {
+    let boxes = |higher: i32| {
+        let mut description = Description::default();
+        let water = Material { name: "water".into(), ..glass(1.33) };
+        let jar = Material { name: "jar".into(), priority: higher, ..glass(1.5) };
+        add(&mut description, "water", cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 1.0), false), water);
+        add(&mut description, "jar", cuboid(Vec3::new(-0.2, -0.1, 0.3), Vec3::new(0.6, 0.4, 0.7), false), jar);
+        add(&mut description, "pebble", cuboid(Vec3::splat(0.8), Vec3::splat(0.9), false), glass(1.6));
+        description.cameras.push(look_at(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, 40.0));
+        build(description)
+    };
+    for (higher, host) in [(0, 1), (1, 1), (-1, 0)] {
+        let scene = boxes(higher);
+        let in_turn = |order: [u32; 2]| {
+            let enter = |interior: Interior, solid: u32| interior.crossing(&scene, solid, true).interior;
+            order.into_iter().fold(Interior::default(), enter).host(&scene)
+        };
+        assert_eq!([in_turn([0, 1]), in_turn([1, 0])], [Some(host); 2], "priority {higher}");
+        assert_eq!([in_turn([0, 2]), in_turn([2, 0])], [Some(2); 2]);
+        let camera = scene.camera(&square(8)).expect("a camera");
+        let asked = Asked { choice: None, max_depth: None, switches: Switches::default() };
+        let plan = plan(&asked, Method::Path, (&scene, &camera), &Default::default());
+        let named = |warning: &&String| warning.starts_with("objects \"water\" and \"jar\" overlap");
+        assert_eq!(plan.warnings.iter().filter(named).count(), usize::from(higher == 0), "{:?}", plan.warnings);
+        assert!(!plan.warnings.iter().any(|warning| warning.contains("pebble") && warning.contains("overlap")));
     }
 }

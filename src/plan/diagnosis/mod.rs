@@ -7,6 +7,7 @@
 pub(super) mod black;
 mod glass;
 mod lamps;
+mod overlap;
 mod rays;
 
 use super::Asked;
@@ -18,6 +19,7 @@ pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<Str
     let mut warnings = glass::thin(scene);
     warnings.extend(glass::wide(scene));
     warnings.extend(glass::faded(scene));
+    warnings.extend(overlap::unordered(scene));
     warnings.extend(lamps::units(scene));
     warnings.extend(lamps::no_environment(scene, asked));
     if !scene.lights.is_empty() {
