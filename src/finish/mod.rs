@@ -4,7 +4,7 @@
 //!    where its network was asked for.
 //! 2. A denoiser's picture `D` of it ([`denoiser`]).
 //! 3. `out = M + clip(D - M, -c s, c s)` ([`mod@bound`]), which is consistent whatever `D` is; and the light of the picture
-//!    as a whole is kept ([`conserve`]).
+//!    as a whole is kept (`conserve.rs`).
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
 //! 5. The error of the result, told by independent quarters of the iterations ([`Verdict`]).
 //!
