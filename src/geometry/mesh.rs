@@ -76,6 +76,8 @@ pub struct Placement {
     pub normals: Mat3A,
     /// `points` with the absolute value of each number: bounds all terms of a transformed coordinate.
     absolute: Affine3A,
+    /// -1 for a mirroring transform, which turns the handedness of tangents over; 1 for others.
+    handedness: f32,
 }
 
 impl Placement {
@@ -83,7 +85,8 @@ impl Placement {
     pub fn new(points: Affine3A) -> Placement {
         let normals = points.matrix3.inverse().transpose();
         let absolute = Affine3A { matrix3: points.matrix3.abs(), translation: points.translation.abs() };
-        Placement { points, normals, absolute }
+        let handedness = points.matrix3.determinant().signum();
+        Placement { points, normals, absolute, handedness }
     }
 }
 
@@ -120,12 +123,12 @@ impl Instance {
         }
     }
 
-    /// A direction (tangent) of the mesh in world space, not normalised.
+    /// A tangent of the mesh with its handedness in world space, not normalised.
     #[inline]
-    pub fn direction(&self, v: Vec3) -> Vec3 {
+    pub(super) fn tangent(&self, t: Vec4) -> Vec4 {
         match &self.to_world {
-            None => v,
-            Some(placement) => placement.points.transform_vector3(v),
+            None => t,
+            Some(placement) => placement.points.transform_vector3(t.truncate()).extend(t.w * placement.handedness),
         }
     }
 

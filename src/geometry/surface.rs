@@ -71,7 +71,7 @@ impl Surface {
         let mut tangent = Vec4::ZERO;
         if !mesh.tangents.is_empty() {
             let t = mesh.tangents[i0] * b0 + mesh.tangents[i1] * b1 + mesh.tangents[i2] * b2;
-            tangent = instance.direction(t.truncate()).extend(if t.w < 0.0 { -1.0 } else { 1.0 });
+            tangent = instance.tangent(t.truncate().extend(if t.w < 0.0 { -1.0 } else { 1.0 }));
         }
         let largest = c0.p.abs().max(c1.p.abs()).max(c2.p.abs());
         Some(Surface {

@@ -250,7 +250,8 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
     Shapes::new(meshes, instances)
 }
 
-/// Moves a mesh to world space. A mirroring transform turns the winding, so that the front stays the front.
+/// Moves a mesh to world space. A mirroring transform turns the winding, so that the front stays the front, and the
+/// handedness of tangents.
 fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     let normals = to_world.matrix3.inverse().transpose();
     for p in &mut mesh.positions {
@@ -261,9 +262,9 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
     for t in &mut mesh.tangents {
         let d = to_world.transform_vector3(t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
-        *t = d.extend(t.w);
+        *t = d.extend(if mirrored { -t.w } else { t.w });
     }
-    if to_world.matrix3.determinant() < 0.0 {
+    if mirrored {
         for triangle in &mut mesh.triangles {
             triangle.swap(1, 2);
         }
@@ -275,6 +276,7 @@ fn asks(material: &Material) -> (Alpha, bool) {
     (material.alpha, material.null_bsdf)
 }
 
+    let mirrored = to_world.matrix3.determinant() < 0.0;
 /// Commits shapes to Embree, with what rays pass of them: what has a body, and what glows without one, if anything
 /// does.
 fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {

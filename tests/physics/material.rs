@@ -5,10 +5,12 @@ use crate::support;
 use caustique::bsdf::{EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;
 use caustique::material::Material;
-use caustique::math::{Frame, Rgb, Vec2, Vec3, Vec4};
+use caustique::math::{DAffine3, DMat3, DVec3, Frame, Rgb, Vec2, Vec3, Vec4};
 use caustique::random::mix;
+use caustique::scene::Description;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 use rayon::prelude::*;
+use support::scenes::{add_at, build, quad};
 use support::stats::{mean_and_error, t_critical};
 
 const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -128,6 +130,45 @@ fn normal_maps_turn_the_frame_and_stay_on_the_side() {
     // Without tangents there is no frame to read it in.
     let bare = Surface { tangent: Vec4::ZERO, ..surface() };
     assert_eq!(with(0).shading_frame(&bare, &textures).n, Vec3::Z);
+}
+
+/// What a mirrored node shows is the mirror image: the frame that a normal map and anisotropy make, through random
+/// turns with and without a reflection, for a mesh in one place and for one that two nodes share.
+#[test]
+fn frames_of_mirrored_nodes_are_mirror_images() {
+    let material = Material {
+        normal_texture: reference(0).map(|r| (r, 1.0)),
+        anisotropy: 0.5,
+        anisotropy_rotation: 0.7,
+        ..Material::default()
+    };
+    let textures = || vec![texel([0.6, 0.8, 0.9, 1.0])];
+    let mut mesh = quad(Vec3::ZERO, Vec3::X, Vec3::Y);
+    mesh.normals = vec![Vec3::new(0.1, -0.2, 1.0).normalize(); 4];
+    for (seed, handedness) in (0..32).flat_map(|seed| [(seed, 1.0), (seed, -1.0)]) {
+        mesh.tangents = vec![Vec4::new(0.8, 0.6, 0.0, handedness); 4];
+        let angle = |k: u64| (mix(7 * seed + k) % 1000) as f64 * 0.00628;
+        let turn = DMat3::from_euler(glam::EulerRot::XYZ, angle(0), angle(1), angle(2));
+        let mirrored = seed % 2 == 1;
+        let flip = DMat3::from_diagonal(DVec3::new(if mirrored { -1.0 } else { 1.0 }, 1.0, 1.0));
+        let to_world = DAffine3::from_mat3(turn * flip * DMat3::from_euler(glam::EulerRot::XYZ, angle(3), 0.4, 1.1));
+        for shared in [false, true] {
+            let mut description = Description { textures: textures(), ..Description::default() };
+            add_at(&mut description, "mapped", mesh.clone(), material.clone(), to_world);
+            if shared {
+                description.instances.push(description.instances[0].clone());
+            }
+            let scene = build(description);
+            let own = Surface { uv: [Vec2::ZERO; 2], ns: mesh.normals[0], tangent: mesh.tangents[0], ..surface() };
+            let expected = material.shading_frame(&own, &textures());
+            let seen = scene.shapes.surface(0, 0, [0.3, 0.3]).expect("a surface");
+            let frame = scene.materials.list[0].shading_frame(&seen, &scene.materials.textures);
+            for (found, expected) in [(frame.n, expected.n), (frame.t, expected.t)] {
+                let expected = to_world.transform_vector3(expected.as_dvec3()).as_vec3();
+                assert!((found - expected).length() < 1e-4, "{seed}, {shared}: {found} is not {expected}");
+            }
+        }
+    }
 }
 
 /// Of thirty glasses of one roughness nothing is tabulated before two of them meet; then the two rows around that

@@ -233,7 +233,8 @@ fn place_vertex(mesh: &mut Mesh, i: usize, matrix: &DAffine3) {
         *n = (cofactors(&matrix.matrix3) * n.as_dvec3()).normalize_or_zero().as_vec3();
     }
     if let Some(t) = mesh.tangents.get_mut(i) {
-        *t = (matrix.matrix3 * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(t.w);
+        let w = if matrix.matrix3.determinant() < 0.0 { -t.w } else { t.w };
+        *t = (matrix.matrix3 * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(w);
     }
 }
 
