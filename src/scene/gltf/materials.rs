@@ -8,6 +8,7 @@ use super::{Glass, counted};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
+use crate::texture::TextureRef;
 use std::collections::HashMap;
 
 /// Loads materials as meshes call for them.
@@ -117,9 +118,10 @@ fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &m
     }
 }
 
-/// The texture coordinates along which a material wants tangents.
-pub(super) fn tangent_set(material: &Material) -> Option<usize> {
-    let normal = material.normal_texture.map(|(t, _)| t.set);
-    let anisotropy = material.anisotropy_texture.map_or(0, |t| t.set);
-    normal.or((material.anisotropy > 0.0).then_some(anisotropy)).map(usize::from)
+/// The set of texture coordinates along which a material wants tangents, and their transform: a normal map that is
+/// turned turns its relief (specification, section 3.9.3).
+pub(super) fn tangent_coordinates(material: &Material) -> Option<TextureRef> {
+    let set = material.anisotropy_texture.map_or(0, |t| t.set);
+    let plain = TextureRef { texture: 0, set, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+    material.normal_texture.map(|(t, _)| t).or((material.anisotropy > 0.0).then_some(plain))
 }

@@ -5,7 +5,7 @@ use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::flat::flattened;
-use super::materials::{Library, tangent_set};
+use super::materials::{Library, tangent_coordinates};
 use super::mesh::FARTHEST;
 use super::transform::{Worlds, can_be_inverted, compose, finite, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
@@ -395,9 +395,9 @@ impl Reader<'_> {
                 ));
             }
             if mesh.tangents.is_empty()
-                && let Some(set) = tangent_set(worn)
+                && let Some(coordinates) = tangent_coordinates(worn)
             {
-                shading_frame::make_tangents(&mut mesh, set);
+                shading_frame::make_tangents(&mut mesh, &coordinates);
             }
             parts.push(Part { mesh: self.out.meshes.len() as u32, material });
             let points = || mesh.positions.iter().map(|p| p.as_dvec3());

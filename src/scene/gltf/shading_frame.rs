@@ -2,6 +2,7 @@
 
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3, Vec4};
+use crate::texture::TextureRef;
 
 /// Gives zero normals the direction of the faces around them (weighted by area); their number.
 pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
@@ -21,19 +22,21 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     repaired
 }
 
-/// Makes tangents along growing u of texture coordinates `set`: the mean over the faces around a vertex, weighted by
+/// Makes tangents along growing u of `coordinates`: the mean over the faces around a vertex, weighted by
 /// the corners' angles, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF
 /// names, faces that are mirrored in the texture do not mix with others: a vertex between both kinds becomes two.
-pub(super) fn make_tangents(mesh: &mut Mesh, set: usize) {
+pub(super) fn make_tangents(mesh: &mut Mesh, coordinates: &TextureRef) {
+    let set = usize::from(coordinates.set);
     if mesh.uvs[set].is_empty() {
         return;
     }
+    let uv_of = |mesh: &Mesh, i: u32| coordinates.coordinates([mesh.uvs[set][i as usize]; 2]);
     let mut twin: Vec<Option<u32>> = vec![None; mesh.positions.len()];
     // Handedness of the first face at each vertex.
     let mut side: Vec<Option<bool>> = vec![None; mesh.positions.len()];
     let mut triangles = std::mem::take(&mut mesh.triangles);
     for t in &mut triangles {
-        let mirrored = area(t.map(|i| mesh.uvs[set][i as usize])) < 0.0;
+        let mirrored = area(t.map(|i| uv_of(mesh, i))) < 0.0;
         for i in t {
             let first = *side[*i as usize].get_or_insert(mirrored);
             if first != mirrored {
@@ -45,7 +48,7 @@ pub(super) fn make_tangents(mesh: &mut Mesh, set: usize) {
     let mut signs = vec![1.0; mesh.positions.len()];
     for t in &triangles {
         let p = t.map(|i| mesh.positions[i as usize]);
-        let uv = t.map(|i| mesh.uvs[set][i as usize]);
+        let uv = t.map(|i| uv_of(mesh, i));
         let (e1, e2, d1, d2) = (p[1] - p[0], p[2] - p[0], uv[1] - uv[0], uv[2] - uv[0]);
         let sign = if area(uv) < 0.0 { -1.0 } else { 1.0 };
         let Some(along_u) = ((e1 * d2.y - e2 * d1.y) * sign).try_normalize() else { continue };

@@ -273,3 +273,32 @@ fn tangents_for_normal_maps() {
     }
     assert_eq!(scene.materials[0].normal_texture.map(|(_, scale)| scale), Some(0.5));
 }
+
+/// A normal map that its transform turns by a quarter and stretches turns its relief along; so does one that it
+/// mirrors.
+#[test]
+fn tangents_follow_the_transform_of_the_normal_map() {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    for (transform, tangent) in [
+        (json!({"rotation": quarter, "scale": [3, 0.5]}), Vec4::new(0.0, 1.0, 0.0, 1.0)),
+        (json!({"rotation": 2.0 * quarter}), Vec4::new(-1.0, 0.0, 0.0, 1.0)),
+        (json!({"scale": [-1, 1]}), Vec4::new(-1.0, 0.0, 0.0, -1.0)),
+    ] {
+        let mut file = Glb::new();
+        let texture = file.png(1, &[[128, 128, 255, 255]]);
+        let info = json!({"index": texture, "extensions": {"KHR_texture_transform": transform}});
+        let material = file.push("materials", json!({"normalTexture": info}));
+        let p = file.floats(&QUAD);
+        let n = file.floats(&[[0.0, 0.0, 1.0]; 4]);
+        let uv = file.floats(&[[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
+        let i = file.indices(&[0, 1, 2, 0, 2, 3]);
+        let attributes = json!({"POSITION": p, "NORMAL": n, "TEXCOORD_0": uv});
+        let primitive = json!({"attributes": attributes, "indices": i, "material": material});
+        let mesh = file.push("meshes", json!({"primitives": [primitive]}));
+        file.node(json!({"mesh": mesh}));
+        file.json["extensionsUsed"] = json!(["KHR_texture_transform"]);
+        for found in &read(&file).meshes[0].tangents {
+            assert!((*found - tangent).length() < 1e-6, "{transform}: {found} is not {tangent}");
+        }
+    }
+}
