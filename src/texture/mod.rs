@@ -41,14 +41,14 @@ pub enum Integers {
 }
 
 /// What integers of texels stand for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Encoding {
     /// Numbers from 0 to 1.
     Linear,
     /// Colours encoded by sRGB; alpha is linear.
     Srgb,
-    /// Glossiness in the alpha channel, 8 bits of it: G becomes the roughness, R 0, B and A 1.
-    Glossiness,
+    /// Glossiness in the alpha channel, 8 bits of it, times a factor: G becomes the roughness, R 0, B and A 1.
+    Glossiness(f32),
 }
 
 /// An image with its wrap and filter modes.
@@ -135,7 +135,7 @@ impl Integers {
                 Vec4::new(table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0)
             }
             (Integers::Bytes(data), Encoding::Linear) => Vec4::from(rgba(&data[range], 255).map(f32::from)) / 255.0,
-            (Integers::Bytes(data), Encoding::Glossiness) => roughness(rgba(&data[range], 255)[3]),
+            (Integers::Bytes(data), Encoding::Glossiness(factor)) => roughness(rgba(&data[range], 255)[3], factor),
             (Integers::Words(data), Encoding::Srgb) => {
                 let grey = channels < 3;
                 let ([r, g, b, a], table) = (rgba(&data[range], u16::MAX), &SRGB_WORDS[usize::from(grey)]);
@@ -144,16 +144,16 @@ impl Integers {
             (Integers::Words(data), Encoding::Linear) => {
                 Vec4::from(rgba(&data[range], u16::MAX).map(|x| unit_word(x, channels < 3)))
             }
-            (Integers::Words(data), Encoding::Glossiness) => {
+            (Integers::Words(data), Encoding::Glossiness(factor)) => {
                 let gloss = (u32::from(rgba(&data[range], u16::MAX)[3]) + 128) / 257;
-                roughness(gloss as u8)
+                roughness(gloss as u8, factor)
             }
         }
     }
 }
 
-fn roughness(gloss: u8) -> Vec4 {
-    Vec4::new(0.0, f32::from(255 - gloss) / 255.0, 1.0, 1.0)
+fn roughness(gloss: u8, factor: f32) -> Vec4 {
+    Vec4::new(0.0, 1.0 - factor * f32::from(gloss) / 255.0, 1.0, 1.0)
 }
 
 impl Texels {

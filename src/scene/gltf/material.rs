@@ -214,12 +214,9 @@ impl Reader<'_> {
         if let Some(info) = old.specular_glossiness_texture {
             let name = "specularGlossinessTexture";
             material.specular_color_texture = self.texture(Some(info.clone()), Use::Color, name)?;
-            if glossiness == 1.0 {
-                material.roughness = 1.0;
-                material.metallic_roughness_texture = self.texture(Some(info), Use::Glossiness, name)?;
-            } else {
-                self.warnings.push(format!("{}: the glossiness texture is ignored beside its factor", self.place));
-            }
+            material.roughness = 1.0;
+            let usage = Use::Glossiness(glossiness.to_bits());
+            material.metallic_roughness_texture = self.texture(Some(info), usage, name)?;
         }
         Ok(())
     }

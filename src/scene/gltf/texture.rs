@@ -26,8 +26,9 @@ pub(super) enum Use {
     Color,
     /// Numbers.
     Data,
-    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness), turned into roughness in G.
-    Glossiness,
+    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness) times a factor, whose bits these are, turned
+    /// into roughness in G.
+    Glossiness(u32),
 }
 
 /// `textureInfo` of the specification (section 5.30), with a normal texture's scale.
@@ -141,7 +142,7 @@ impl Textures {
         let encoding = match usage {
             Use::Color => Encoding::Srgb,
             Use::Data => Encoding::Linear,
-            Use::Glossiness => Encoding::Glossiness,
+            Use::Glossiness(factor) => Encoding::Glossiness(f32::from_bits(factor)),
         };
         let sampler = match texture.sampler {
             Some(sampler) => get(&document.samplers, sampler.value(), "sampler")?.clone(),

@@ -120,11 +120,15 @@ fn specular_glossiness_is_translated() {
         warnings,
         ["material \"old\": KHR_materials_pbrSpecularGlossiness is translated, so highlights differ a little"]
     );
-    let scene = read(&wearing(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {
-        "specularGlossinessTexture": {"index": 0}}}})));
-    let rough = scene.materials[0].metallic_roughness_texture.unwrap();
-    let texel = scene.textures[rough.texture as usize].sample(Vec2::new(0.75, 0.5));
-    assert!((texel.y - (1.0 - 128.0 / 255.0)).abs() < 1e-6, "{texel}");
+    for factor in [1.0f32, 0.5, 0.0] {
+        let scene = read(&wearing(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {
+            "glossinessFactor": factor, "specularGlossinessTexture": {"index": 0}}}})));
+        let rough = scene.materials[0].metallic_roughness_texture.unwrap();
+        let texel = scene.textures[rough.texture as usize].sample(Vec2::new(0.75, 0.5));
+        let roughness = scene.materials[0].roughness * texel.y;
+        assert!((roughness - (1.0 - factor * 128.0 / 255.0)).abs() < 1e-6, "{roughness}");
+        assert_eq!(scene.warnings.len(), 1);
+    }
 }
 
 fn glass_on(mesh: impl Fn(&mut Glb, usize), glass: Glass, extensions: Value) -> (Vec<bool>, Vec<String>) {
