@@ -5,6 +5,7 @@ use super::fresnel::{Smooth, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
 use super::profile::{Between, Grid, NODES, Position, Profile, node, row};
 use super::sheen;
+use super::stretched::{Pairs, Stretched};
 use crate::math::{Vec2, Vec3, Vec4, sqr};
 use std::sync::OnceLock;
 
@@ -28,6 +29,8 @@ pub(super) struct SideTables {
     eta: f32,
     /// [`REFLECTED`] and [`SCATTERED`].
     albedos: Grid<2>,
+    /// [`SCATTERED`] of facets that are wider one way.
+    stretched: Pairs,
     /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of
     /// [`Smooth::grazing_weight`].
     pub average_total: f32,
@@ -75,6 +78,19 @@ pub struct EnergyTables {
     below_sheen: CoverTables,
 }
 
+/// Integrates over the facets that are seen from `wo`: `f` is given Lambda of it, a visible normal and its weight in
+/// the quadrature. `turn` is the share of the azimuth that is looked at, where the rest is its mirror image.
+fn over_facets(ggx: &Ggx, wo: Vec3, turn: f32, mut f: impl FnMut(f32, Vec3, f32)) {
+    let lambda_o = ggx.lambda(wo);
+    for k in 0..LATTICE.0 {
+        // Graded towards the steep facets, whose reflections are the ones that are lost.
+        let phi = turn * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
+        let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
+        let weight = 2.0 * rest / LATTICE.0 as f32;
+        f(lambda_o, ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest)), weight);
+    }
+}
+
 /// Tabulates a function of the cosine at node `i` of alpha: `f` is given a lobe, the direction towards the viewer, Lambda
 /// of it, a visible normal and its weight in the quadrature.
 fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3, f32)) -> [T; NODES] {
@@ -82,17 +98,8 @@ fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3
     std::array::from_fn(|j| {
         let mu = node(j);
         let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-        let lambda_o = ggx.lambda(wo);
         let mut sum = zero;
-        for k in 0..LATTICE.0 {
-            // A half of the azimuth: the rest is its mirror image. Graded towards the steep facets, whose
-            // reflections are the ones that are lost.
-            let phi = 0.5 * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
-            let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
-            let weight = 2.0 * rest / LATTICE.0 as f32;
-            let h = ggx.sample_visible(wo, Vec2::new(phi, 1.0 - rest * rest));
-            f(&mut sum, &ggx, wo, lambda_o, h, weight);
-        }
+        over_facets(&ggx, wo, 0.5, |lambda_o, h, weight| f(&mut sum, &ggx, wo, lambda_o, h, weight));
         sum
     })
 }
@@ -101,6 +108,27 @@ fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3
 fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
     let wi = reflect(wo, h);
     (wi, if wi.z > 0.0 { g2_reflection(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 })
+}
+
+/// Adds a facet's share of: total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and
+/// weighted.
+fn add_albedos(sums: &mut [f32; 5], smooth: &Smooth, ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3, weight: f32) {
+    let cos = wo.dot(h).clamp(0.0, 1.0);
+    let r = weight * reflected_share(ggx, wo, lambda_o, h).1;
+    let Some((grazing, cos_t)) = smooth.grazing_weight(cos) else {
+        sums[0] += r;
+        return;
+    };
+    let wi = refract(wo, h, smooth.eta, cos_t);
+    let t = if wi.z < 0.0 { weight * g2_transmission(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 };
+    for (sum, term) in sums[1..].iter_mut().zip([r, r * grazing, t, t * grazing]) {
+        *sum += term;
+    }
+}
+
+/// [`SCATTERED`] from what [`add_albedos`] has added up: transmitted is what F leaves, t (1 - F0) - tg (F90 - F0).
+fn scattered([total, r, rg, t, tg]: [f32; 5]) -> Vec4 {
+    Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0)
 }
 
 impl SideTables {
@@ -119,6 +147,7 @@ impl SideTables {
         SideTables {
             eta,
             albedos: Grid::new(),
+            stretched: Pairs::default(),
             average_total: (total / f64::from(n)) as f32,
             average_grazing: (grazing / f64::from(n)) as f32,
         }
@@ -128,26 +157,12 @@ impl SideTables {
     #[inline]
     fn albedos(&self, alpha: Position) -> Between<'_, 2> {
         self.albedos.around(alpha, |i| {
-            let (eta, smooth) = (self.eta, Smooth::new(self.eta));
-            // Total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and weighted.
+            let smooth = Smooth::new(self.eta);
             let sums = tabulate(i, [0.0f32; 5], |sums, ggx, wo, lambda_o, h, weight| {
-                let cos = wo.dot(h).clamp(0.0, 1.0);
-                let r = weight * reflected_share(ggx, wo, lambda_o, h).1;
-                let Some((grazing, cos_t)) = smooth.grazing_weight(cos) else {
-                    sums[0] += r;
-                    return;
-                };
-                let wi = refract(wo, h, eta, cos_t);
-                let t =
-                    if wi.z < 0.0 { weight * g2_transmission(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 };
-                for (sum, term) in sums[1..].iter_mut().zip([r, r * grazing, t, t * grazing]) {
-                    *sum += term;
-                }
+                add_albedos(sums, &smooth, ggx, wo, lambda_o, h, weight);
             });
             let reflected = sums.map(|[total, r, rg, ..]| Vec4::new(total + r, total, r - rg, rg));
-            // Transmitted is what F leaves: t (1 - F0) - tg (F90 - F0).
-            let scattered = sums.map(|[total, r, rg, t, tg]| Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0));
-            [row(&reflected), row(&scattered)]
+            [row(&reflected), row(&sums.map(scattered))]
         })
     }
 
@@ -174,6 +189,19 @@ impl SideTables {
     #[inline]
     pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
         Profile::new(self.albedos(alpha), SCATTERED, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
+    }
+
+    /// The same of facets that are wider one way.
+    pub fn stretched_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> Stretched {
+        let smooth = Smooth::new(self.eta);
+        self.stretched.around(alphas, 1.0, -Vec4::new(1.0, f0, f90, 0.0), |alpha_x, alpha_y, wo| {
+            let ggx = Ggx { alpha_x, alpha_y };
+            let mut sums = [0.0; 5];
+            over_facets(&ggx, wo, 1.0, |lambda_o, h, weight| {
+                add_albedos(&mut sums, &smooth, &ggx, wo, lambda_o, h, weight);
+            });
+            scattered(sums)
+        })
     }
 
     /// Average reflectance of the smooth interface.

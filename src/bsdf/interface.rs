@@ -6,8 +6,9 @@ use super::energy::{Covering, EnergyTables, SideTables};
 use super::fresnel::{Smooth, is_matched, normal_incidence};
 use super::microfacet::{Ggx, class_of};
 use super::profile::{Position, Profile};
+use super::stretched::Stretched;
 use super::{DELTA_ALPHA, LobeSet, Parameters};
-use crate::math::{Rgb, sqr};
+use crate::math::{Rgb, Vec2, Vec3, sqr};
 use std::f32::consts::FRAC_1_PI;
 
 /// Reflection of light that facets of reflectance `f` scatter more than once, as a share of what a perfect reflector's
@@ -52,6 +53,8 @@ pub struct Interface {
 pub(super) struct RoughGlass {
     /// What is lost.
     pub loss: [Profile; 2],
+    /// What is lost where facets are wider one way.
+    stretched: Option<[Stretched; 2]>,
     /// Albedo of the reflecting facets.
     pub reflected: [Profile; 2],
     /// Reflected compensation: `returned[side] * loss(o) * loss(i)`.
@@ -83,9 +86,9 @@ impl Interface {
         // A lobe that is narrow along one axis only is still sampled as a lobe.
         let ggx = Ggx { alpha_x: p.alpha_x.max(DELTA_ALPHA), alpha_y: p.alpha_y.max(DELTA_ALPHA) };
         let rough = class != LobeSet::DELTA;
-        // The tables are isotropic: a stretched lobe takes what one of the same mean square slope loses. At normal
-        // incidence that is right within 3 %; at grazing angles a metal stretched fourfold is off by up to -18 % across
-        // and +6 % along.
+        // All tables but those of glass are isotropic: a stretched lobe takes what one of the same mean square slope
+        // loses. At normal incidence that is right within 3 %; at grazing angles a metal stretched fourfold is off by up
+        // to -18 % across and +6 % along.
         let mean_square = 0.5 * (sqr(ggx.alpha_x) + sqr(ggx.alpha_y));
         let alpha = Position::new(if rough { mean_square.sqrt() } else { 0.0 });
         let sides = tables.sides(p.eta);
@@ -106,9 +109,7 @@ impl Interface {
         };
         let matched = is_matched(p.eta);
         let glass = match sides {
-            Some(sides) if p.transmission > 0.0 && rough && !p.thin => {
-                Some(RoughGlass::new(alpha, sides, p.eta, f0_max, f90))
-            }
+            Some(sides) if bends && rough => Some(RoughGlass::new(&ggx, alpha, sides, p.eta, f0_max, f90)),
             _ => None,
         };
         let mut interface = Interface {
@@ -159,8 +160,14 @@ impl Interface {
 }
 
 impl RoughGlass {
-    fn new(alpha: Position, sides: [&SideTables; 2], eta: f32, f0: f32, f90: f32) -> RoughGlass {
-        let loss = sides.map(|s| s.glass_loss(alpha, f0, f90));
+    /// `alpha` is the mean one of `ggx`.
+    fn new(ggx: &Ggx, alpha: Position, sides: [&SideTables; 2], eta: f32, f0: f32, f90: f32) -> RoughGlass {
+        let alphas = [ggx.alpha_x, ggx.alpha_y].map(Position::new);
+        let stretched = (ggx.alpha_x != ggx.alpha_y).then(|| sides.map(|s| s.stretched_glass_loss(alphas, f0, f90)));
+        let loss = match &stretched {
+            Some(stretched) => stretched.each_ref().map(Stretched::mean),
+            None => sides.map(|s| s.glass_loss(alpha, f0, f90)),
+        };
         // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average
         // those of the other side; k makes no share larger than the average transmittance of the smooth interface,
         // which is in proportion to n^2 already.
@@ -173,7 +180,34 @@ impl RoughGlass {
             (1.0 - passes) * FRAC_1_PI / averages[side].max(1e-9)
         });
         let reflected = sides.map(|s| s.reflection(alpha, f0, f90));
-        RoughGlass { loss, reflected, returned, passed: k * FRAC_1_PI }
+        RoughGlass { loss, stretched, reflected, returned, passed: k * FRAC_1_PI }
+    }
+
+    /// What is lost of light along `w` on a side; `at` is the position of its cosine.
+    #[inline]
+    pub fn loss_along(&self, side: usize, at: Position, w: Vec3) -> f32 {
+        match &self.stretched {
+            None => self.loss[side].at(at),
+            Some(stretched) => stretched[side].at(at, w),
+        }
+    }
+
+    /// The same, and the density per solid angle with which [`RoughGlass::sample`] draws `w`.
+    #[inline]
+    pub fn loss_with_pdf_w(&self, side: usize, at: Position, w: Vec3) -> (f32, f32) {
+        match &self.stretched {
+            None => self.loss[side].at_with_pdf_w(at, w.z.abs()),
+            Some(stretched) => (stretched[side].at(at, w), stretched[side].pdf_w(at, w)),
+        }
+    }
+
+    /// A direction of the upper hemisphere in which light is lost on a side.
+    #[inline]
+    pub fn sample(&self, side: usize, u: Vec2) -> Option<Vec3> {
+        match &self.stretched {
+            None => self.loss[side].sample(u),
+            Some(stretched) => stretched[side].sample(u),
+        }
     }
 }
 

@@ -271,7 +271,7 @@ impl<'a> Layered<'a> {
         match self.rough_glass() {
             Some(glass) => {
                 let (side, at) = (seen.side, seen.at);
-                let loss = glass.loss[side].at(at);
+                let loss = glass.loss_along(side, at, seen.o);
                 let reflected = glass.reflected[side].at(at);
                 let transmitted = (1.0 - loss - reflected).max(0.0);
                 let smooth = n.dielectric(cos, side).0;

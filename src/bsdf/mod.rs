@@ -14,6 +14,7 @@ mod scatter;
 mod shading;
 mod sheen;
 
+mod stretched;
 pub use energy::EnergyTables;
 pub use gathering::Gathering;
 pub use interface::Interface;

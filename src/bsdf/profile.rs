@@ -89,6 +89,23 @@ impl Position {
         let i = (x as usize).min(NODES - 2);
         Position { i, t: x - i as f32 }
     }
+
+    /// Up to a factor, the fourth root of what it is the position of.
+    pub fn value(self) -> f32 {
+        self.i as f32 + self.t
+    }
+
+    /// The nodes around it, with their shares of an interpolation.
+    pub fn around(self) -> [(usize, f32); 2] {
+        [(self.i, 1.0 - self.t), (self.i + 1, self.t)]
+    }
+
+    /// Interpolated between values at the nodes.
+    #[inline]
+    pub fn between(self, nodes: &[f32; NODES]) -> f32 {
+        let (a, b) = (nodes[self.i], nodes[self.i + 1]);
+        a + (b - a) * self.t
+    }
 }
 
 /// Four functions of the cosine at one alpha.
@@ -177,6 +194,12 @@ impl Profile {
         for node in &mut nodes {
             *node = node.max(0.0);
         }
+        Profile::of(nodes)
+    }
+
+    /// From its values at the nodes.
+    #[inline]
+    pub fn of(nodes: [f32; NODES]) -> Profile {
         Profile { nodes, average: dot(&nodes, &AVERAGE), mass: dot(&nodes, &MASS) }
     }
 
@@ -186,11 +209,16 @@ impl Profile {
         &self.nodes
     }
 
+    /// What [`Profile::sample`] draws is in proportion to, summed up.
+    #[inline]
+    pub(super) fn mass(&self) -> f32 {
+        self.mass
+    }
+
     /// The value at a cosine.
     #[inline]
     pub fn at(&self, mu: Position) -> f32 {
-        let (a, b) = (self.nodes[mu.i], self.nodes[mu.i + 1]);
-        a + (b - a) * mu.t
+        mu.between(&self.nodes)
     }
 
     /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which

@@ -111,10 +111,11 @@ impl Layered<'_> {
             let (loss_i, mut density) = n.loss.at_with_pdf_w(at_i, i.z);
             separable[0] = self.returned * (seen.loss * loss_i);
             if let Some(glass) = self.rough_glass() {
-                let profile = &glass.loss[seen.side];
+                let side = seen.side;
                 let loss_i;
-                (loss_i, density) = profile.at_with_pdf_w(at_i, i.z);
-                separable[1] = Rgb::splat(self.glass * glass.returned[seen.side] * profile.at(seen.at) * loss_i);
+                (loss_i, density) = glass.loss_with_pdf_w(side, at_i, i);
+                let lost = glass.loss_along(side, seen.at, seen.o) * loss_i;
+                separable[1] = Rgb::splat(self.glass * glass.returned[side] * lost);
             }
             if PDF {
                 let visible = value * both / (seen.o.z + seen.root);
@@ -173,8 +174,8 @@ impl Layered<'_> {
                 (single, density) = self.transmitting_facets(seen, i);
                 pdf += shares.facets * density;
                 let side = seen.side;
-                let (loss_i, density) = glass.loss[1 - side].at_with_pdf_w(at_i, -i.z);
-                let scale = self.glass * glass.passed * glass.loss[side].at(seen.at) * loss_i;
+                let (loss_i, density) = glass.loss_with_pdf_w(1 - side, at_i, i);
+                let scale = self.glass * glass.passed * glass.loss_along(side, seen.at, seen.o) * loss_i;
                 separable = self.base * (scale * n.index2(1 - side));
                 pdf += shares.passed * density;
                 norm = n.cover.as_ref().map_or(1.0, |c| (c.glass_loss[0] * c.glass_loss[1]).sqrt());
@@ -239,11 +240,11 @@ impl Layered<'_> {
         } else if chosen(shares.diffuse).is_some() {
             Drawn::Lobe(warp::hemisphere_cosine(u), LobeSet::BROAD)
         } else if chosen(shares.returned).is_some() {
-            let profile = self.rough_glass().map_or(&n.loss, |glass| &glass.loss[side]);
-            Drawn::Lobe(profile.sample(u)?, n.class)
+            let drawn = self.rough_glass().map_or_else(|| n.loss.sample(u), |glass| glass.sample(side, u));
+            Drawn::Lobe(drawn?, n.class)
         } else if chosen(shares.passed).is_some() {
-            let profile = self.rough_glass().map_or(&n.loss, |glass| &glass.loss[1 - side]);
-            Drawn::Lobe(-profile.sample(u)?, n.class)
+            let drawn = self.rough_glass().map_or_else(|| n.loss.sample(u), |glass| glass.sample(1 - side, u));
+            Drawn::Lobe(-drawn?, n.class)
         } else if chosen(shares.straight).is_some() {
             Drawn::delta(-o, self.straight * self.passes(seen, -o), shares.straight)
         } else if chosen(shares.below).is_some() {

@@ -1,0 +1,128 @@
+//! What rough glass loses whose facets are wider one way than the other: it depends on the azimuth as much as on the
+//! cosine, so no isotropic profile serves.
+
+use super::profile::{NODES, Position, Profile, node};
+use crate::math::{Vec2, Vec3, Vec4};
+use std::array::from_fn;
+use std::f32::consts::{FRAC_2_PI, FRAC_PI_2};
+use std::sync::OnceLock;
+
+/// Nodes of the azimuth in a quarter turn. The other quarters are its mirror images.
+const AZIMUTHS: usize = 13;
+
+/// Three functions of the direction at a pair of alphas: constant, per F0, per F90; the fourth is unused.
+pub(super) type Row = [[Vec4; NODES]; AZIMUTHS];
+
+/// Rows at pairs of nodes of alpha, each made when it is first asked for.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pairs(OnceLock<Box<[OnceLock<Box<Row>>]>>);
+
+impl Pairs {
+    /// `constant + factors . functions`, at least zero, of facets of these alphas along x and y. `make` makes the four
+    /// functions at an alpha along x, a smaller one along y, and a direction.
+    pub fn around(
+        &self,
+        [along_x, along_y]: [Position; 2],
+        constant: f32,
+        factors: Vec4,
+        make: impl Fn(f32, f32, Vec3) -> Vec4,
+    ) -> Stretched {
+        let pairs = self.0.get_or_init(|| (0..NODES * NODES).map(|_| OnceLock::new()).collect());
+        let row = |wide: usize, narrow: usize| {
+            pairs[wide * NODES + narrow].get_or_init(|| {
+                let at = |azimuth: usize, mu: f32| {
+                    let (sin, cos) = (azimuth as f32 * FRAC_PI_2 / (AZIMUTHS - 1) as f32).sin_cos();
+                    let r = (1.0 - mu * mu).max(0.0).sqrt();
+                    make(node(wide), node(narrow), Vec3::new(r * cos, r * sin, mu))
+                };
+                Box::new(from_fn(|azimuth| from_fn(|j| at(azimuth, node(j)))))
+            })
+        };
+        let turned = along_y.value() > along_x.value();
+        let (wide, narrow) = if turned { (along_y, along_x) } else { (along_x, along_y) };
+        let mut nodes = [[constant; NODES]; AZIMUTHS];
+        for (i, wide_share) in wide.around() {
+            for (k, narrow_share) in narrow.around() {
+                let (row, factors) = (row(i, k), factors * (wide_share * narrow_share));
+                for (sums, values) in nodes.iter_mut().zip(row.iter()) {
+                    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factors.dot(*value));
+                }
+            }
+        }
+        Stretched { azimuths: nodes.map(|nodes| Profile::of(nodes.map(|x| x.max(0.0)))), turned }
+    }
+}
+
+/// A function of the direction, symmetric about x and y: linear in the azimuth between profiles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretched {
+    azimuths: [Profile; AZIMUTHS],
+    /// The wider alpha is the one along y.
+    turned: bool,
+}
+
+/// Share of the circle that belongs to a node.
+fn share(k: usize) -> f32 {
+    if k == 0 || k == AZIMUTHS - 1 { 0.5 / LAST } else { 1.0 / LAST }
+}
+
+/// The last node, at a quarter turn.
+const LAST: f32 = (AZIMUTHS - 1) as f32;
+
+impl Stretched {
+    /// The nodes around the azimuth of `w`: the first of two, and the fraction to the next.
+    #[inline]
+    fn place(&self, w: Vec3) -> (usize, f32) {
+        let (x, y) = (w.x.abs(), w.y.abs());
+        let turn = if self.turned { x.atan2(y) } else { y.atan2(x) } * (FRAC_2_PI * LAST);
+        let k = (turn as usize).min(AZIMUTHS - 2);
+        (k, turn - k as f32)
+    }
+
+    /// The value along `w`, the cosine of which has the position `mu`.
+    #[inline]
+    pub fn at(&self, mu: Position, w: Vec3) -> f32 {
+        let (k, t) = self.place(w);
+        let [low, high] = [k, k + 1].map(|k| self.azimuths[k].at(mu));
+        low + (high - low) * t
+    }
+
+    /// Density per solid angle with which [`Stretched::sample`] draws `w`.
+    #[inline]
+    pub fn pdf_w(&self, mu: Position, w: Vec3) -> f32 {
+        let (k, t) = self.place(w);
+        let [low, high] = [k, k + 1].map(|k| self.azimuths[k].at_with_pdf_w(mu, w.z.abs()).1 * self.azimuths[k].mass());
+        (low + (high - low) * t) / self.mass().max(f32::MIN_POSITIVE)
+    }
+
+    fn mass(&self) -> f32 {
+        (0..AZIMUTHS).map(|k| share(k) * self.azimuths[k].mass()).sum()
+    }
+
+    /// A direction of the upper hemisphere, as [`Profile::sample`]; `None` where there is nothing.
+    pub fn sample(&self, u: Vec2) -> Option<Vec3> {
+        let mut left = u.x * self.mass();
+        let mut chosen = 0;
+        while chosen < AZIMUTHS - 1 && left >= share(chosen) * self.azimuths[chosen].mass() {
+            left -= share(chosen) * self.azimuths[chosen].mass();
+            chosen += 1;
+        }
+        let profile = &self.azimuths[chosen];
+        let rest = left / (share(chosen) * profile.mass());
+        let mu = profile.sample(Vec2::new(rest, 0.0))?.z;
+        // One of the four mirror images, and a place under the node's hat.
+        let quarter = (4.0 * u.y) as u32;
+        let v = 2.0 * (4.0 * u.y - quarter as f32) - 1.0;
+        let hat = v.signum() * (1.0 - (1.0 - v.abs()).max(0.0).sqrt());
+        let (sin, cos) = ((chosen as f32 + hat) * FRAC_PI_2 / LAST).sin_cos();
+        let r = (1.0 - mu * mu).max(0.0).sqrt();
+        let (x, y) = if self.turned { (sin, cos) } else { (cos, sin) };
+        let sign = |bit: u32| if quarter & bit == 0 { r } else { -r };
+        Some(Vec3::new(x * sign(1), y * sign(2), mu))
+    }
+
+    /// Its mean over the azimuth.
+    pub fn mean(&self) -> Profile {
+        Profile::of(from_fn(|j| (0..AZIMUTHS).map(|k| share(k) * self.azimuths[k].nodes()[j]).sum()))
+    }
+}
