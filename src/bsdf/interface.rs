@@ -4,7 +4,7 @@
 use super::cover::Cover;
 use super::energy::{Covering, EnergyTables, SideTables};
 use super::fresnel::{Smooth, is_matched, normal_incidence};
-use super::microfacet::{Ggx, class_of};
+use super::microfacet::{Ggx, class_of, refraction_width};
 use super::profile::{Position, Profile};
 use super::stretched::Stretched;
 use super::{DELTA_ALPHA, LobeSet, Parameters};
@@ -82,7 +82,13 @@ pub(super) struct Covered {
 impl Interface {
     /// The interface that `parameters` speak of, whatever their colours.
     pub fn new(p: &Parameters, tables: &EnergyTables) -> Interface {
-        let class = class_of(p.alpha_x, p.alpha_y);
+        let bends = p.transmission * (1.0 - p.metallic) > 0.0 && !p.thin;
+        let mut class = class_of(p.alpha_x, p.alpha_y);
+        // What is let through of nearly matching indices is narrow, however rough the surface.
+        if bends && class == LobeSet::BROAD {
+            let width = refraction_width(p.eta);
+            class = class_of((p.alpha_x * width).max(DELTA_ALPHA), (p.alpha_y * width).max(DELTA_ALPHA));
+        }
         // A lobe that is narrow along one axis only is still sampled as a lobe.
         let ggx = Ggx { alpha_x: p.alpha_x.max(DELTA_ALPHA), alpha_y: p.alpha_y.max(DELTA_ALPHA) };
         let rough = class != LobeSet::DELTA;

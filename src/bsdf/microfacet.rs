@@ -21,6 +21,13 @@ pub(super) fn class_of(alpha_x: f32, alpha_y: f32) -> LobeSet {
     }
 }
 
+/// How much narrower than a reflection a rough interface of relative index `eta` refracts, against one of glass in air:
+/// facets bend light by their slope times the difference of the indices.
+#[inline]
+pub fn refraction_width(eta: f32) -> f32 {
+    (2.0 * (eta.max(1.0 / eta) - 1.0)).min(1.0)
+}
+
 /// GGX of widths `alpha_x` and `alpha_y` along the local axes. Directions given to it lie in the upper hemisphere.
 #[derive(Clone, Copy, Debug)]
 pub struct Ggx {

@@ -21,6 +21,7 @@ pub use interface::Interface;
 pub use layered::Layered;
 pub use parameters::Parameters;
 pub use shading::Shading;
+pub use microfacet::refraction_width;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use layered::Seen;
@@ -37,7 +38,8 @@ impl LobeSet {
     pub const NONE: LobeSet = LobeSet(0);
     /// Perfect mirrors and clear interfaces: a path can only continue.
     pub const DELTA: LobeSet = LobeSet(1);
-    /// Glossy lobes too narrow to gather photons well (GGX alpha below [`SHARP_ALPHA`]): an eye path continues.
+    /// Glossy lobes too narrow to gather photons well (GGX alpha below [`SHARP_ALPHA`], for solid glass as far as it
+    /// bends light): an eye path continues.
     pub const SHARP: LobeSet = LobeSet(2);
     /// Diffuse, sheen and wide glossy lobes: photons are gathered here.
     pub const BROAD: LobeSet = LobeSet(4);

@@ -1,7 +1,7 @@
 //! All materials and textures of a scene.
 
 use super::{Alpha, Material};
-use crate::bsdf::DELTA_ALPHA;
+use crate::bsdf::{DELTA_ALPHA, refraction_width};
 use crate::geometry::Surface;
 use crate::math::Rgb;
 use crate::texture::{Texture, TextureRef};
@@ -57,7 +57,8 @@ impl Material {
 
     /// Whether its base (coatings aside) reflects or bends light into narrow lobes somewhere.
     fn has_narrow_base(&self) -> bool {
-        self.roughness < WIDEST_ROUGHNESS || self.metallic_roughness_texture.is_some()
+        let width = if self.is_solid_glass() { refraction_width(self.ior) } else { 1.0 };
+        self.roughness * width.sqrt() < WIDEST_ROUGHNESS || self.metallic_roughness_texture.is_some()
     }
 
     /// Whether it shows reflections: its base, or a coating, has a narrow lobe.
@@ -72,7 +73,8 @@ impl Material {
         let lobes = [Some(base), (self.clearcoat > 0.0).then_some(coat)];
         let any =
             |of: &dyn Fn(f32) -> bool| lobes.iter().flatten().any(|&(roughness, textured)| textured || of(roughness));
-        (any(&is_perfect), any(&|roughness| !is_perfect(roughness) && roughness < WIDEST_ROUGHNESS))
+        let sharp = any(&|roughness| !is_perfect(roughness) && roughness < WIDEST_ROUGHNESS);
+        (any(&is_perfect), sharp || (self.has_narrow_base() && !is_perfect(self.roughness)))
     }
 
     /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light

@@ -483,6 +483,12 @@ fn classes_share_the_lobes_out() {
     assert_eq!(bsdf(&plastic(0.1, 1.5), &TABLES).lobes(), LobeSet::SMOOTH);
     assert_eq!(bsdf(&plastic(0.0, 1.5), &TABLES).lobes(), LobeSet::DELTA | LobeSet::BROAD);
     assert_eq!(bsdf(&glass(0.5, 1.0), &TABLES).lobes(), LobeSet::DELTA);
+    // Rough glass of nearly matching index hardly turns light.
+    assert_eq!(bsdf(&glass(0.5, 1.5), &TABLES).lobes(), LobeSet::BROAD);
+    assert_eq!(bsdf(&glass(0.5, 1.1), &TABLES).lobes(), LobeSet::SHARP);
+    assert_eq!(bsdf(&glass(0.5, 1.0 / 1.1), &TABLES).lobes(), LobeSet::SHARP);
+    assert_eq!(bsdf(&Parameters { thin: true, ..glass(0.5, 1.1) }, &TABLES).lobes(), LobeSet::BROAD);
+    assert_eq!(bsdf(&Parameters { metallic: 1.0, ..glass(0.5, 1.1) }, &TABLES).lobes(), LobeSet::BROAD);
     let black = Parameters { base_color: Rgb::ZERO, ..Parameters::default() };
     assert_eq!(bsdf(&black, &TABLES).lobes(), LobeSet::NONE);
     for (name, p) in all() {
