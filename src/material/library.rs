@@ -35,6 +35,18 @@ impl Material {
         if self.unlit { Rgb::from_slice(&self.base_color[..3]) } else { self.emission }
     }
 
+    /// How alpha acts on each ray that comes by. That of a solid decides once, where a ray enters it: a face that is
+    /// passed on the way in or out alone would leave light in glass that is not there.
+    pub fn alpha_per_hit(&self) -> Alpha {
+        if self.has_alpha_per_entry() { Alpha::Opaque } else { self.alpha }
+    }
+
+    /// Whether it fills a solid that a ray passes, or not, as a whole. One that gives light is hit or not, face by face.
+    #[inline]
+    pub fn has_alpha_per_entry(&self) -> bool {
+        self.alpha != Alpha::Opaque && self.is_solid_glass() && !self.emits()
+    }
+
     /// Probability that a ray that comes by meets the surface: 1 but for cut-outs.
     pub fn coverage(&self, surface: &Surface, textures: &[Texture]) -> f32 {
         match self.alpha {

@@ -8,6 +8,7 @@ use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS, Sky};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
+use crate::texture::Texture;
 use crate::trace::{CAMERA, MeetsTest, Tracer};
 use std::sync::Arc;
 
@@ -54,6 +55,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let others = description.lights.iter().filter(|light| !light.is_sphere());
     let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
     let lights = Lights::new(&shapes, &materials, others, sky).grouped(groups);
+    warn_of_cut_solids(&shapes, &materials, &mut warnings);
     warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
     if description.cameras.is_empty() {
         warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
@@ -123,6 +125,27 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
     warnings.extend(renamed);
     (groups.instances, groups.others, groups.environment) = (instances, others, environment);
     groups
+}
+
+/// Names solids whose alpha differs from place to place: where a ray enters them decides about its exit, too, so light
+/// and its way back may differ.
+fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
+    let mut named = vec![false; materials.list.len()];
+    for instance in &shapes.instances {
+        let material = &materials.list[instance.material as usize];
+        let colors = &shapes.meshes[instance.mesh as usize].colors;
+        let texture = material.base_color_texture.map(|t| &materials.textures[t.texture as usize]);
+        let varies = || texture.is_some_and(Texture::has_alpha) || colors.iter().any(|color| color.w < 1.0);
+        if material.has_alpha_per_entry()
+            && varies()
+            && !std::mem::replace(&mut named[instance.material as usize], true)
+        {
+            warnings.push(format!(
+                "material \"{}\": its alpha cuts holes into solid glass, and a ray that enters through one leaves through one (model the holes, or give it no thickness)",
+                material.name
+            ));
+        }
+    }
 }
 
 /// Adds what is to be said of lights that give none; `punctual` is the number of lamps that the file has.
@@ -253,6 +276,7 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
 /// Moves a mesh to world space. A mirroring transform turns the winding, so that the front stays the front, and the
 /// handedness of tangents.
 fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
+    let mirrored = to_world.matrix3.determinant() < 0.0;
     let normals = to_world.matrix3.inverse().transpose();
     for p in &mut mesh.positions {
         *p = to_world.transform_point3(p.as_dvec3()).as_vec3();
@@ -273,17 +297,16 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
 
 /// What decides about a material where rays meet it.
 fn asks(material: &Material) -> (Alpha, bool) {
-    (material.alpha, material.null_bsdf)
+    (material.alpha_per_hit(), material.null_bsdf)
 }
 
-    let mirrored = to_world.matrix3.determinant() < 0.0;
 /// Commits shapes to Embree, with what rays pass of them: what has a body, and what glows without one, if anything
 /// does.
 fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {
     let of = |instance: &Instance| &materials.list[instance.material as usize];
     let asked = |null_bsdf: bool| {
         let asked = |instance: &Instance| {
-            let asked = instance.hidden_from_camera || of(instance).alpha != Alpha::Opaque;
+            let asked = instance.hidden_from_camera || of(instance).alpha_per_hit() != Alpha::Opaque;
             (of(instance).null_bsdf == null_bsdf).then_some(asked)
         };
         shapes.instances.iter().map(asked).collect::<Vec<_>>()
@@ -295,6 +318,12 @@ fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> 
     Ok((tracer, glowing))
 }
 
+/// A random number above 0 and at most 1, the same for the same ray, instance and `key`.
+pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
+    let key = u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(key);
+    (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
+}
+
 fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> MeetsTest {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
@@ -303,15 +332,11 @@ fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> MeetsTest {
             return false;
         }
         let material = &materials.list[placed.material as usize];
-        let cutoff = match material.alpha {
+        let cutoff = match material.alpha_per_hit() {
             Alpha::Opaque => return true,
             Alpha::Mask(cutoff) => cutoff,
-            Alpha::Blend => {
-                // One number per ray and triangle, whatever the order in which Embree asks.
-                let key =
-                    u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(primitive);
-                (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
-            }
+            // One number per ray and triangle, whatever the order in which Embree asks.
+            Alpha::Blend => random_cutoff(token, instance, primitive),
         };
         let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
         material.alpha(&surface, &materials.textures) >= cutoff

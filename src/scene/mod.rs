@@ -20,7 +20,7 @@ pub use survey::Survey;
 pub use view::{Crop, MAX_SIZE, View};
 
 use crate::error::Result;
-use crate::geometry::Shapes;
+use crate::geometry::{Shapes, Surface};
 use crate::light::{Emitter, Environment, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
@@ -107,6 +107,19 @@ impl Scene {
         environment: Option<Environment>,
     ) -> Result<Scene> {
         build::dress(self, materials, medium, environment)
+    }
+
+    /// Whether a ray that enters a solid finds it there, where the solid's alpha decides about that.
+    pub fn is_there(&self, surface: &Surface, token: u32) -> bool {
+        let material = &self.materials.list[surface.material as usize];
+        let chance = material.coverage(surface, &self.materials.textures);
+        chance >= build::random_cutoff(token, surface.instance, u32::MAX)
+    }
+
+    /// Whether a camera's ray along `direction` looks through a surface: the back of one that glTF culls.
+    #[inline(always)]
+    pub fn culls(&self, surface: &Surface, direction: Vec3) -> bool {
+        self.survey.culled && self.materials.list[surface.material as usize].culled && direction.dot(surface.ng) > 0.0
     }
 
     /// A light by name, for messages: `light "Sun"`, `object "Panel"` for the triangles of one that glows.

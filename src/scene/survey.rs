@@ -13,7 +13,7 @@ pub struct Survey {
     pub hidden_from_camera: bool,
     /// Some mesh bounds a solid that light enters.
     pub solids: bool,
-    /// Rays may cross boundaries that do not scatter: index-matched solids, or solids inside others.
+    /// Rays may cross boundaries that do not scatter: index-matched solids, solids inside others or there in part.
     pub null_boundaries: bool,
     /// Something absorbs or scatters between surfaces.
     pub media: bool,
@@ -61,7 +61,7 @@ impl Survey {
                 solids += worn;
                 survey.media |= material.medium.is_some();
                 survey.scattering |= scatters(&material.medium);
-                survey.null_boundaries |= material.ior == 1.0;
+                survey.null_boundaries |= material.ior == 1.0 || material.has_alpha_per_entry();
                 survey.dispersion |= material.disperses();
             }
         }

@@ -182,6 +182,14 @@ impl Wrap {
 }
 
 impl Texture {
+    /// Whether some texel's alpha is below 1.
+    pub fn has_alpha(&self) -> bool {
+        match &self.texels {
+            Texels::Bytes { data, .. } => data.chunks_exact(4).any(|texel| texel[3] < 255),
+            Texels::Floats(texels) => texels.iter().any(|texel| texel[3] < 1.0),
+        }
+    }
+
     #[inline]
     fn texel(&self, x: i64, y: i64) -> Vec4 {
         let x = self.wrap[0].fold(x, i64::from(self.width));

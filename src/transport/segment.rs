@@ -170,7 +170,7 @@ enum Boundary {
 }
 
 #[inline(always)]
-fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3) -> Boundary {
+fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3, token: u32) -> Boundary {
     let material = &scene.materials.list[surface.material as usize];
     if !material.is_solid_glass() {
         // What covers an opaque body meets the medium around it, air or water.
@@ -179,6 +179,12 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     }
     let entering = direction.dot(surface.ng) < 0.0;
     let crossing = interior.crossing(scene, surface.instance, entering);
+    // A ray that has passed the solid's front as if it were not there is not in it, and leaves it unseen.
+    if material.has_alpha_per_entry()
+        && if entering { !scene.is_there(surface, token) } else { crossing.interior == *interior }
+    {
+        return Boundary::None(Rgb::ONE, *interior);
+    }
     // What gives light of its own is there whatever is behind it.
     if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
@@ -272,7 +278,11 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
             }
         }
         distance += t;
-        match boundary(scene, &surface, &interior, direction) {
+        if token & CAMERA != 0 && scene.culls(&surface, direction) {
+            along.pass(&surface);
+            continue;
+        }
+        match boundary(scene, &surface, &interior, direction, token) {
             Boundary::Scattering(eta, crossing) => {
                 return End::Surface(Arrival { surface, eta, crossing, interior, transmittance, distance });
             }
@@ -358,7 +368,7 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
             way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
             let Some(place) = reaching else { return way };
             for surface in &contact::before(scene, &place, direction, token) {
-                match boundary(scene, surface, &interior, direction) {
+                match boundary(scene, surface, &interior, direction, token) {
                     Boundary::Scattering(..) => return ShadowRay::BLOCKED,
                     Boundary::None(tint, behind) => (way.left, interior) = (way.left * tint, behind),
                 }
@@ -369,7 +379,12 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
             way.pass(scene, &interior, t, starts, false);
             starts = false;
         }
-        match boundary(scene, &surface, &interior, direction) {
+        // Towards the lens, so that the lens sees its other side.
+        if token & CAMERA != 0 && scene.culls(&surface, -direction) {
+            along.pass(&surface);
+            continue;
+        }
+        match boundary(scene, &surface, &interior, direction, token) {
             Boundary::Scattering(..) => return ShadowRay::BLOCKED,
             Boundary::None(tint, behind) => {
                 way.left *= tint;
