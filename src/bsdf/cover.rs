@@ -11,6 +11,30 @@ use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
 use crate::math::{Rgb, Vec2, Vec3};
 
+/// Reflectance of a smooth clear coat.
+#[inline]
+pub fn coat_reflectance(cos: f32) -> f32 {
+    dielectric(cos, COAT_ETA).0
+}
+
+/// Where the cosines of a direction lie: that with the coat's normal, and that with the normal of the sheen and the base
+/// below it.
+#[derive(Clone, Copy, Debug)]
+pub struct Angles {
+    /// With the coat's.
+    pub coat: Position,
+    /// With the base's.
+    pub base: Position,
+}
+
+impl From<Position> for Angles {
+    /// Of one normal.
+    #[inline]
+    fn from(mu: Position) -> Angles {
+        Angles { coat: mu, base: mu }
+    }
+}
+
 /// Sheen and clear coat.
 #[derive(Clone, Copy, Debug)]
 pub struct Cover {
@@ -89,32 +113,38 @@ impl Cover {
 
     /// What the coverings leave of light in one direction.
     #[inline]
-    pub fn passes(&self, mu: Position) -> f32 {
+    pub fn passes(&self, w: Angles) -> f32 {
         let [coat, sheen] = self.strengths();
-        (1.0 - coat * self.coat_albedo.at(mu)) * (1.0 - sheen * self.sheen_albedo(mu))
+        (1.0 - coat * self.coat_albedo.at(w.coat)) * (1.0 - sheen * self.sheen_albedo(w.base))
     }
 
     /// What they leave of light that facets below turn from one direction to another.
     #[inline]
-    pub fn passes_both(&self, o: Position, i: Position) -> f32 {
+    pub fn passes_both(&self, o: Angles, i: Angles) -> f32 {
         let [coat, sheen] = self.strengths();
-        (1.0 - coat * self.coat_albedo.at(o).max(self.coat_albedo.at(i)))
-            * (1.0 - sheen * self.sheen_albedo(o).max(self.sheen_albedo(i)))
+        (1.0 - coat * self.coat_albedo.at(o.coat).max(self.coat_albedo.at(i.coat)))
+            * (1.0 - sheen * self.sheen_albedo(o.base).max(self.sheen_albedo(i.base)))
     }
 
-    /// Albedos of coat and sheen.
+    /// Albedos of coat and sheen; `cos` is the cosine with the coat's normal.
     #[inline]
-    pub fn albedos(&self, cos: f32, mu: Position) -> [Rgb; 2] {
+    pub fn albedos(&self, cos: f32, w: Angles) -> [Rgb; 2] {
         let mut albedos = [Rgb::ZERO; 2];
         if self.coat > 0.0 {
             let exact = self.coat_class == LobeSet::DELTA;
-            let albedo = if exact { dielectric(cos, COAT_ETA).0 } else { self.coat_albedo.at(mu) };
-            albedos[0] = Rgb::splat(self.coat * albedo);
+            albedos[0] =
+                Rgb::splat(if exact { self.coat_reflectance(cos) } else { self.coat * self.coat_albedo.at(w.coat) });
         }
         if self.has_sheen() {
-            albedos[1] = self.sheen * (self.sheen_albedo(mu) * (1.0 - self.coat * self.coat_albedo.at(mu)));
+            albedos[1] = self.sheen * (self.sheen_albedo(w.base) * (1.0 - self.coat * self.coat_albedo.at(w.coat)));
         }
         albedos
+    }
+
+    /// Reflectance of a coat without roughness.
+    #[inline]
+    pub fn coat_reflectance(&self, cos: f32) -> f32 {
+        self.coat * coat_reflectance(cos)
     }
 
     /// The coat's lobe without cosine, and the density of its facets' reflection; not for delta coats. Both directions
@@ -124,7 +154,7 @@ impl Cover {
         let Some(h) = (o + i).try_normalize() else { return (0.0, 0.0) };
         let (lambda_o, lambda_i) = (self.coat_ggx.lambda(o), self.coat_ggx.lambda(i));
         let d = self.coat_ggx.d(h) / (4.0 * o.z);
-        let f = self.coat * dielectric(o.dot(h).clamp(0.0, 1.0), COAT_ETA).0;
+        let f = self.coat_reflectance(o.dot(h).clamp(0.0, 1.0));
         (f * d * g2_reflection(lambda_o, lambda_i) / i.z, d * g1(lambda_o))
     }
 
@@ -137,14 +167,14 @@ impl Cover {
 
     /// The sheen lobe without cosine, scaled down where its albedo would exceed 1. Both directions above.
     #[inline]
-    pub fn sheen(&self, o: Vec3, i: Vec3, at_o: Position, at_i: Position) -> Rgb {
+    pub fn sheen(&self, o: Vec3, i: Vec3, at_o: Angles, at_i: Angles) -> Rgb {
         let Some(h) = (o + i).try_normalize() else { return Rgb::ZERO };
         let coat = if self.coat > 0.0 {
-            1.0 - self.coat * self.coat_albedo.at(at_o).max(self.coat_albedo.at(at_i))
+            1.0 - self.coat * self.coat_albedo.at(at_o.coat).max(self.coat_albedo.at(at_i.coat))
         } else {
             1.0
         };
-        let excess = self.sheen_albedo.at(at_o).max(self.sheen_albedo.at(at_i)).max(1.0);
+        let excess = self.sheen_albedo.at(at_o.base).max(self.sheen_albedo.at(at_i.base)).max(1.0);
         self.sheen * (sheen::eval(o.z, i.z, h.z.min(1.0), self.sheen_alpha) * coat / excess)
     }
 }

@@ -51,7 +51,7 @@ pub struct Interface {
 /// Compensation for solid glass, by side: 0 above, 1 below.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RoughGlass {
-    /// What is lost.
+    /// What is lost: the mean over azimuths.
     pub loss: [Profile; 2],
     /// What is lost where facets are wider one way.
     stretched: Option<[Stretched; 2]>,
@@ -220,7 +220,7 @@ impl RoughGlass {
 impl Covered {
     fn new(cover: Cover, p: &Parameters, alpha: Position, below: &Interface, tables: &EnergyTables) -> Covered {
         let norm = |profile: &Profile| match profile.average {
-            average if average > 1e-9 => average / profile.average_with(|mu| cover.passes(mu)).max(1e-9),
+            average if average > 1e-9 => average / profile.average_with(|mu| cover.passes(mu.into())).max(1e-9),
             _ => 1.0,
         };
         let strengths = cover.strengths();

@@ -13,6 +13,7 @@
 //! that keeps it reciprocal \[Kulla and Conty 2017\]. The lobe belongs to the class of the lobe it completes.
 
 use super::LobeSet;
+use super::cover::Angles;
 use super::fresnel::schlick;
 use super::interface::{Interface, RoughGlass, again};
 use super::profile::Position;
@@ -51,6 +52,8 @@ pub struct Layered<'a> {
     pub(super) passed: Rgb,
     /// Average reflectance of the facets below a covering.
     pub(super) below: Rgb,
+    /// The normal of a clear coat whose reflection is left to [`super::coat::Coat`].
+    pub(super) coat_normal: Option<Vec3>,
 }
 
 /// Shares of the lobes among the directions drawn for one `wo` and one set of classes; they sum to 1.
@@ -196,7 +199,24 @@ impl<'a> Layered<'a> {
             returned,
             passed,
             below,
+            coat_normal: None,
         }
+    }
+
+    /// Cosine of a direction, as seen from `side`, with the coat's normal, and where its cosines lie; `base` is that with
+    /// the base's.
+    #[inline]
+    pub(super) fn angles(&self, side: usize, w: Vec3, base: Position) -> (f32, Angles) {
+        let Some(n) = self.coat_normal else { return (w.z.abs(), base.into()) };
+        let up = if side == 1 { -w.z } else { w.z };
+        let cos = Vec3::new(w.x, w.y, up).dot(n).abs();
+        (cos, Angles { coat: Position::new(cos), base })
+    }
+
+    /// The probability of drawing a direction from a coat that has a normal of its own.
+    #[inline]
+    pub(super) fn coat_share(&self, seen: &Seen, set: LobeSet) -> f32 {
+        self.all_shares(seen, set).normalised().map_or(0.0, |shares| shares.coat)
     }
 
     /// Compensation of solid glass, where there is any.
@@ -294,7 +314,8 @@ impl<'a> Layered<'a> {
     #[inline]
     fn cover_albedos(&self, seen: &mut Seen) {
         let Some(c) = &self.interface.cover else { return };
-        let passes = c.cover.passes(seen.at);
+        let (coat_cos, angles) = self.angles(seen.side, seen.o, seen.at);
+        let passes = c.cover.passes(angles);
         for albedo in &mut seen.albedos {
             *albedo *= passes;
         }
@@ -315,7 +336,7 @@ impl<'a> Layered<'a> {
             seen.albedos[0] += lost;
             seen.means.below = mean(lost);
         }
-        let [coat, sheen] = c.cover.albedos(seen.o.z, seen.at);
+        let [coat, sheen] = c.cover.albedos(coat_cos, angles);
         (seen.albedos[3], seen.albedos[4]) = (coat, sheen);
         (seen.means.coat, seen.means.sheen) = (mean(coat), mean(sheen));
     }
@@ -340,11 +361,20 @@ impl<'a> Layered<'a> {
         sum.min(Rgb::ONE)
     }
 
+    /// Shares of the lobes among the directions drawn here.
     #[inline]
     pub(super) fn shares(&self, seen: &Seen, set: LobeSet) -> Option<Shares> {
+        let all = self.all_shares(seen, set);
+        let coat = if self.coat_normal.is_some() { 0.0 } else { all.coat };
+        Shares { coat, ..all }.normalised()
+    }
+
+    /// Not normalised.
+    #[inline]
+    fn all_shares(&self, seen: &Seen, set: LobeSet) -> Shares {
         let [facets, diffuse, straight, coat, sheen] = self.groups(set).map(|counts| f32::from(u8::from(counts)));
         let means = &seen.means;
-        let shares = Shares {
+        Shares {
             facets: means.facets * facets,
             returned: means.returned * facets,
             passed: means.passed * facets,
@@ -353,7 +383,6 @@ impl<'a> Layered<'a> {
             straight: means.straight * straight,
             coat: means.coat * coat,
             sheen: means.sheen * sheen,
-        };
-        shares.normalised()
+        }
     }
 }

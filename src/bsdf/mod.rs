@@ -1,5 +1,6 @@
 //! The scattering model: one closed set of lobes that agrees with the glTF specification and conserves energy.
 
+mod coat;
 mod cover;
 mod energy;
 mod fresnel;
@@ -13,15 +14,16 @@ mod relief;
 mod scatter;
 mod shading;
 mod sheen;
-
 mod stretched;
+
+pub use cover::coat_reflectance;
 pub use energy::EnergyTables;
 pub use gathering::Gathering;
 pub use interface::Interface;
 pub use layered::Layered;
+pub use microfacet::refraction_width;
 pub use parameters::Parameters;
 pub use shading::Shading;
-pub use microfacet::refraction_width;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use layered::Seen;
@@ -90,6 +92,17 @@ pub enum Transport {
     Radiance,
     /// Walking from a light: the adjoint BSDF weights flux.
     Importance,
+}
+
+impl Transport {
+    /// That of a path the other way.
+    #[inline]
+    fn reversed(self) -> Transport {
+        match self {
+            Transport::Radiance => Transport::Importance,
+            Transport::Importance => Transport::Radiance,
+        }
+    }
 }
 
 /// A direction drawn from a BSDF.

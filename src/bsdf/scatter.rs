@@ -128,22 +128,23 @@ impl Layered<'_> {
         }
         let Some(c) = &n.cover else { return (single + separable[0] + separable[1] + separable[2], pdf) };
         let at_o = seen.at;
-        let passes = c.cover.passes(at_o) * c.cover.passes(at_i);
+        let [from, to] = [(seen.o, at_o), (i, at_i)].map(|(w, at)| self.angles(seen.side, w, at).1);
+        let passes = c.cover.passes(from) * c.cover.passes(to);
         let sum = separable[0] * c.loss + separable[1] * c.glass_loss[seen.side] + separable[2] * c.through;
-        let mut f = single * c.cover.passes_both(at_o, at_i) + sum * passes;
+        let mut f = single * c.cover.passes_both(from, to) + sum * passes;
         if facets {
             for (below, profile) in c.below.iter().zip(&c.profiles) {
                 f += self.below * (below * profile.at(at_o) * profile.at(at_i));
             }
             pdf += shares.below * i.z * FRAC_1_PI;
         }
-        if c.cover.has_coat() && set.has(c.cover.coat_class & LobeSet::SMOOTH) {
+        if c.cover.has_coat() && self.coat_normal.is_none() && set.has(c.cover.coat_class & LobeSet::SMOOTH) {
             let (value, density) = c.cover.coat(seen.o, i);
             f += Rgb::splat(value);
             pdf += shares.coat * density;
         }
         if c.cover.has_sheen() && set.has(LobeSet::BROAD) {
-            f += c.cover.sheen(seen.o, i, at_o, at_i);
+            f += c.cover.sheen(seen.o, i, from, to);
             pdf += shares.sheen * 0.5 * FRAC_1_PI;
         }
         (f, pdf)
@@ -184,8 +185,9 @@ impl Layered<'_> {
         let f = match &n.cover {
             None => single + separable,
             Some(c) => {
-                let passes = c.cover.passes(seen.at) * c.cover.passes(at_i);
-                single * c.cover.passes_both(seen.at, at_i) + separable * (norm * passes)
+                let [from, to] = [(seen.o, seen.at), (i, at_i)].map(|(w, at)| self.angles(seen.side, w, at).1);
+                let passes = c.cover.passes(from) * c.cover.passes(to);
+                single * c.cover.passes_both(from, to) + separable * (norm * passes)
             }
         };
         (f, pdf)
@@ -281,7 +283,10 @@ impl Layered<'_> {
     /// What a covering leaves of a delta lobe along `wi`.
     #[inline]
     fn passes(&self, seen: &Seen, wi: Vec3) -> f32 {
-        let passes = |c: &Covered| c.cover.passes_both(seen.at, Position::new(wi.z.abs()));
+        let passes = |c: &Covered| {
+            let [from, to] = [seen.o, wi].map(|w| self.angles(seen.side, w, Position::new(w.z.abs())).1);
+            c.cover.passes_both(from, to)
+        };
         self.interface.cover.as_ref().map_or(1.0, passes)
     }
 
@@ -323,7 +328,7 @@ impl Layered<'_> {
         let cover = &self.interface.cover.as_ref()?.cover;
         let i = cover.sample_coat(seen.o, u);
         if cover.coat_class == LobeSet::DELTA {
-            return Some(Drawn::delta(i, cover.albedos(seen.o.z, seen.at)[0], share));
+            return Some(Drawn::delta(i, Rgb::splat(cover.coat_reflectance(seen.o.z)), share));
         }
         (i.z > 0.0).then_some(Drawn::Lobe(i, cover.coat_class))
     }

@@ -9,10 +9,48 @@
 //! \[1997, 5.3\]. Normal maps have a relief besides (`relief.rs`): there the directions that shine would be
 //! lost to, seen from the front, are mirrored out of the surface.
 
+use super::coat::Coat;
 use super::layered::Seen;
 use super::relief::{Relief, mirrored};
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
+
+/// A shading frame on a surface, and how a viewer stands to both.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facing {
+    pub frame: Frame,
+    pub ng: Vec3,
+    /// Cosine of the viewer's direction with the geometric normal.
+    pub cos_og: f32,
+    /// The two normals disagree about its side: its opposite stands for it.
+    pub opposite: bool,
+}
+
+impl Facing {
+    /// And the direction that stands for the viewer's, in the frame.
+    #[inline(always)]
+    pub(super) fn new(frame: Frame, ng: Vec3, wo: Vec3) -> (Facing, Vec3) {
+        let local = frame.to_local(wo);
+        let cos = wo.dot(ng);
+        let opposite = local.z * cos < 0.0;
+        let cos_og = if local.z == 0.0 { 0.0 } else { cos.abs() };
+        (Facing { frame, ng, cos_og, opposite }, if opposite { -local } else { local })
+    }
+
+    /// `w`, which paths of `transport` come from, in the frame, and its cosine with the geometric normal; `None` where
+    /// the two normals disagree about the side of light, be it `w` or the viewer's direction.
+    #[inline]
+    pub(super) fn local(&self, w: Vec3, transport: Transport) -> Option<(Vec3, f32)> {
+        let local = self.frame.to_local(w);
+        let cos = w.dot(self.ng);
+        let agrees = local.z * cos > 0.0;
+        let lit = match transport {
+            Transport::Radiance => agrees,
+            Transport::Importance => !self.opposite && local.z * cos != 0.0,
+        };
+        (lit && self.cos_og > 0.0).then_some((if agrees { local } else { -local }, cos.abs()))
+    }
+}
 
 /// A BSDF standing in the world, seen along one direction.
 #[derive(Clone, Copy, Debug)]
@@ -30,24 +68,41 @@ pub struct Shading<'a> {
     opposite: bool,
     /// Under a normal map: the interpolated normal.
     pub(super) smooth: Option<Vec3>,
+    /// A clear coat above the normal map.
+    coat: Option<Coat<'a>>,
 }
 
 impl<'a> Shading<'a> {
     /// `bsdf` in `frame` on a surface with geometric normal `ng`, seen along the unit direction `wo`.
     #[inline(always)]
     pub fn new(frame: Frame, ng: Vec3, bsdf: Bsdf<'a>, wo: Vec3) -> Shading<'a> {
-        let local = frame.to_local(wo);
-        let cos = wo.dot(ng);
-        let opposite = local.z * cos < 0.0;
-        let cos_og = if local.z == 0.0 { 0.0 } else { cos.abs() };
-        let seen = bsdf.seen(if opposite { -local } else { local });
-        Shading { frame, ng, bsdf, seen, cos_og, opposite, smooth: None }
+        let (Facing { cos_og, opposite, .. }, o) = Facing::new(frame, ng, wo);
+        Shading { frame, ng, bsdf, seen: bsdf.seen(o), cos_og, opposite, smooth: None, coat: None }
     }
 
-    /// The same whose frame is that of a normal map on a surface of interpolated normal `smooth`.
+    /// The same whose frame is that of a normal map on a surface of interpolated normal `smooth`, which a clear coat
+    /// keeps.
     #[inline]
-    pub fn mapped(self, smooth: Vec3) -> Shading<'a> {
-        Shading { smooth: (smooth != self.frame.n).then_some(smooth), ..self }
+    pub fn mapped(mut self, smooth: Vec3) -> Shading<'a> {
+        if smooth == self.frame.n {
+            return self;
+        }
+        self.smooth = Some(smooth);
+        if let Bsdf::Layered(layered) = &mut self.bsdf
+            && let Some(covered) = layered.interface.cover.as_ref().filter(|covered| covered.cover.has_coat())
+        {
+            layered.coat_normal = Some(self.frame.to_local(smooth));
+            let o = self.seen.wo();
+            let wo = self.frame.to_world(if self.opposite { -o } else { o });
+            self.coat = Some(Coat::new(&covered.cover, smooth, self.ng, wo));
+            self.seen = layered.seen(o);
+        }
+        self
+    }
+
+    #[inline]
+    fn facing(&self) -> Facing {
+        Facing { frame: self.frame, ng: self.ng, cos_og: self.cos_og, opposite: self.opposite }
     }
 
     /// How light along `l` (world) meets the facets of a normal map. What shines meets it a second time along the
@@ -71,18 +126,18 @@ impl<'a> Shading<'a> {
         self.frame.to_world(self.seen.wo())
     }
 
-    /// `w`, which paths of `transport` come from, in the frame, and its cosine with the geometric normal; `None` where
-    /// the two normals disagree about the side of light, be it `w` or the direction seen along.
     #[inline]
     fn local(&self, w: Vec3, transport: Transport) -> Option<(Vec3, f32)> {
-        let local = self.frame.to_local(w);
-        let cos = w.dot(self.ng);
-        let agrees = local.z * cos > 0.0;
-        let lit = match transport {
-            Transport::Radiance => agrees,
-            Transport::Importance => !self.opposite && local.z * cos != 0.0,
-        };
-        (lit && self.cos_og > 0.0).then_some((if agrees { local } else { -local }, cos.abs()))
+        self.facing().local(w, transport)
+    }
+
+    /// The coat above a normal map, and the probability of drawing a direction from it, seen along `seen`.
+    #[inline]
+    fn coat(&self, seen: &Seen, set: LobeSet) -> Option<(&Coat<'a>, f32)> {
+        match (&self.coat, &self.bsdf) {
+            (Some(coat), Bsdf::Layered(layered)) => Some((coat, layered.coat_share(seen, set))),
+            _ => None,
+        }
     }
 
     /// The BSDF times the cosine that belongs to it: `f |wi.ns|` for radiance, and for importance
@@ -90,6 +145,19 @@ impl<'a> Shading<'a> {
     /// which [`Shading::sample`] draws `wi`.
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        let (value, pdf) = self.evaluate_base(wi, transport, set);
+        match self.coat(&self.seen, set) {
+            Some((coat, share)) if share > 0.0 => {
+                let (coated, density) = coat.evaluate_cos(wi, transport);
+                (value + Rgb::splat(coated), pdf + (density - pdf) * share)
+            }
+            _ => (value, pdf),
+        }
+    }
+
+    /// The same but for a coat above a normal map.
+    #[inline]
+    fn evaluate_base(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
         let adjoint = cos_ig / self.cos_og;
         if self.smooth.is_some() {
@@ -139,12 +207,21 @@ impl<'a> Shading<'a> {
     /// seen along.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
+        let pdf = self.reverse_base_pdf(wi, transport, set);
+        if self.coat.is_none() {
+            return pdf;
+        }
+        let (_, o) = Facing::new(self.frame, self.ng, wi);
+        match self.coat(&self.bsdf.seen(o), set) {
+            Some((coat, share)) if share > 0.0 => pdf + (coat.reverse_pdf(wi, transport) - pdf) * share,
+            _ => pdf,
+        }
+    }
+
+    #[inline]
+    fn reverse_base_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         // Whoever comes along `wi` looks for light if this path does not.
-        let own = match transport {
-            Transport::Radiance => Transport::Importance,
-            Transport::Importance => Transport::Radiance,
-        };
-        let Some((i, _)) = self.local(wi, own) else { return 0.0 };
+        let Some((i, _)) = self.local(wi, transport.reversed()) else { return 0.0 };
         let to = self.seen.wo();
         let pdf = self.bsdf.pdf(i, to, transport, set);
         let light = if transport == Transport::Radiance { self.own() } else { wi };
@@ -161,12 +238,12 @@ impl<'a> Shading<'a> {
     /// nearby, whose share of them does not vanish with their cosine here.
     #[inline]
     pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
+        if self.smooth.is_some() && cosine > 0.0 {
+            return self.evaluate_cos(wi, Transport::Radiance, set).0 / cosine;
+        }
         let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {
             return Rgb::ZERO;
         };
-        if self.smooth.is_some() {
-            return self.evaluate_relief(wi, i, Transport::Radiance, set).0 / cosine;
-        }
         self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cosine)
     }
 
@@ -179,6 +256,40 @@ impl<'a> Shading<'a> {
     /// Draws a direction, see [`Bsdf::sample`]; `wi` and the weight are those of the world.
     #[inline]
     pub fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        match self.coat(&self.seen, set) {
+            Some((coat, share)) if share > 0.0 => self.sample_coated((coat, share), transport, set, u_lobe, u),
+            _ => self.sample_base(transport, set, u_lobe, u),
+        }
+    }
+
+    /// From a coat above a normal map, which is chosen with the probability `share`, or from what lies below it.
+    #[inline(never)]
+    fn sample_coated(
+        &self,
+        (coat, share): (&Coat<'_>, f32),
+        transport: Transport,
+        set: LobeSet,
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<BsdfSample> {
+        let (drawn, chance) = if u_lobe < share {
+            (coat.sample(transport, u), share)
+        } else {
+            (self.sample_base(transport, set, (u_lobe - share) / (1.0 - share), u), 1.0 - share)
+        };
+        let mut sample = drawn?;
+        if sample.lobe == LobeSet::DELTA {
+            sample.weight /= chance;
+            sample.pdf_w *= chance;
+            return Some(sample);
+        }
+        let (value, pdf_w) = self.evaluate_cos(sample.wi, transport, set);
+        (sample.weight, sample.pdf_w) = (value / pdf_w, pdf_w);
+        (pdf_w > 0.0).then_some(sample)
+    }
+
+    #[inline]
+    fn sample_base(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let importance = transport == Transport::Importance;
         if self.cos_og == 0.0 || (importance && self.opposite) {
             return None;
@@ -219,7 +330,7 @@ impl<'a> Shading<'a> {
         }
         let local = std::mem::replace(&mut sample.wi, wi);
         if self.smooth.is_some() && sample.lobe != LobeSet::DELTA {
-            let (value, pdf_w) = self.evaluate_cos(wi, transport, set);
+            let (value, pdf_w) = self.evaluate_base(wi, transport, set);
             (sample.weight, sample.pdf_w) = (value / pdf_w, pdf_w);
             return (pdf_w > 0.0).then_some(sample);
         }

@@ -66,12 +66,16 @@ impl Lights {
                 let area = 0.5 * (b - a).cross(c - a).length();
                 // Mean emission from a few points, enough to choose by; the radiance of a sample is looked up exactly.
                 let probes = [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2]];
-                let (mut radiance, mut plane) = (Rgb::ZERO, Vec4::ZERO);
+                let (mut radiance, mut plane, mut coat) = (Rgb::ZERO, Vec4::ZERO, 0.0);
                 for barycentric in probes {
                     if let Some(surface) = shapes.surface(i as u32, primitive, barycentric) {
                         plane = surface.ng.extend(surface.ng.dot(surface.p));
                         radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
+                        coat += material.coat(&surface, &materials.textures) / probes.len() as f32;
                     }
+                }
+                if material.unlit {
+                    coat = 0.0;
                 }
                 let textured = material.unlit || material.emission_texture.is_some();
                 let plain = !textured && matches!(material.alpha, Alpha::Opaque);
@@ -96,7 +100,7 @@ impl Lights {
                     area,
                     two_sided,
                     radiance,
-                    spread: Spread::new(material.spread),
+                    spread: Spread::new(material.spread).below_coat(coat),
                     plane,
                     corners,
                     plain,

@@ -115,7 +115,7 @@ impl Material {
             p.specular_color *= texel.truncate().max(Rgb::ZERO);
         }
         if self.clearcoat > 0.0 {
-            p.clearcoat = unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x);
+            p.clearcoat = self.coat(surface, textures);
             let texel = look_up(&self.clearcoat_roughness_texture, surface, textures);
             p.clearcoat_alpha = sqr(unit(self.clearcoat_roughness) * unit(texel.y));
         }
@@ -166,7 +166,13 @@ impl Material {
         self.base_color[3] * surface.color.w * look_up(&self.base_color_texture, surface, textures).w
     }
 
-    /// Emitted radiance (W/sr/m2) of the front; unlit materials give their base colour.
+    /// Strength of the clear coat.
+    #[inline]
+    pub fn coat(&self, surface: &Surface, textures: &[Texture]) -> f32 {
+        unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x)
+    }
+
+    /// Emitted radiance (W/sr/m2) of the front, below its clear coat; unlit materials give their base colour.
     #[inline]
     pub fn emitted(&self, surface: &Surface, textures: &[Texture]) -> Rgb {
         if self.unlit {
