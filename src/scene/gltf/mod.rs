@@ -25,6 +25,7 @@ mod mesh;
 mod nodes;
 mod pointer;
 mod shading_frame;
+mod shells;
 mod texture;
 mod topology;
 mod transform;

@@ -7,6 +7,8 @@ use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::flat::flattened;
 use super::materials::{Library, tangent_coordinates};
 use super::mesh::FARTHEST;
+use super::shells::{self, Found};
+use super::topology::Solid;
 use super::transform::{Worlds, can_be_inverted, compose, finite, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
 use crate::error::Result;
@@ -389,10 +391,8 @@ impl Reader<'_> {
                 .wear(document, index, &mesh, bounds, warnings)
                 .map_err(|e| if e.place.is_empty() { e.within(&place) } else { e })?;
             let worn = &self.library.list[material as usize];
-            if worn.is_solid_glass() && bounds.closed && bounds.volume < 0.0 {
-                warnings.push(format!(
-                    "{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"
-                ));
+            if worn.is_solid_glass() && bounds.closed {
+                check_shells(&mut mesh, own, whole, &place, warnings);
             }
             if mesh.tangents.is_empty()
                 && let Some(coordinates) = tangent_coordinates(worn)
@@ -446,5 +446,20 @@ impl Reader<'_> {
         }
         memory::check(bytes, format_args!("{placed} placed meshes"))
             .map_err(|e| e.hint("place fewer copies, join them into one mesh, or render with more memory"))
+    }
+}
+
+/// Makes the shells of a solid bound what they were meant to, and says which were turned the other way.
+fn check_shells(mesh: &mut Mesh, own: Solid, whole: Solid, place: &str, warnings: &mut Vec<String>) {
+    let found = if own.closed { shells::turn_inner(mesh) } else { Found::default() };
+    if found.inverted > 0 || (!own.closed && whole.volume < 0.0) {
+        warnings
+            .push(format!("{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"));
+    }
+    if found.turned > 0 {
+        let shells = counted(found.turned, "closed shell lies", "closed shells lie");
+        warnings.push(format!(
+            "{place}: {shells} inside another and looked the same way, which would make no hollow: turned over (flip the normals of one of the two)"
+        ));
     }
 }

@@ -41,7 +41,7 @@ pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
 }
 
 /// A number for the place of each vertex, the same for all vertices there, and how many there are.
-fn welded(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
+pub(super) fn welded(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
     // Room for all at once: a table that grows is there twice.
     let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(meshes.iter().map(|m| m.positions.len()).sum());
     // Negative zero is zero.

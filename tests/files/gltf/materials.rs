@@ -4,6 +4,7 @@ use super::glb::{Glb, png};
 use super::{message, read, try_read};
 use caustique::material::{Alpha, Material};
 use caustique::math::{Rgb, Vec2};
+use caustique::scene::Description;
 use caustique::scene::gltf::{Glass, ReadOptions, read_bytes};
 use caustique::texture::{Integers, Texels, Wrap};
 use serde_json::{Value, json};
@@ -195,6 +196,40 @@ fn glass_is_solid_where_the_mesh_is_closed() {
 fn glass_that_is_inside_out_is_reported() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
     let turned = |file: &mut Glb, material: usize| {
+/// A hollow cube whose inner faces look the same way as its outer ones is made hollow, which is said.
+#[test]
+fn inner_shells_that_look_outwards_are_turned_over() {
+    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
+    let hollow = |inwards: bool| {
+        let corner = |i: u32, size: f32| [0, 1, 2].map(|k| if i >> k & 1 == 1 { size } else { -size });
+        let corners: Vec<[f32; 3]> = (0..16).map(|i| corner(i % 8, if i < 8 { 1.0 } else { 0.5 })).collect();
+        let mut inner = super::glb::CUBE.map(|i| i + 8);
+        if inwards {
+            inner.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
+        }
+        let mut file = Glb::new();
+        let material = file.push("materials", json!({"name": "glass", "extensions": clear}));
+        let mesh = file.mesh("hollow", &corners, &[super::glb::CUBE, inner].concat(), Some(material));
+        file.node(json!({"mesh": mesh}));
+        read(&file)
+    };
+    let (right, turned) = (hollow(true), hollow(false));
+    assert_eq!(right.warnings, [""; 0]);
+    assert_eq!(
+        turned.warnings,
+        [
+            "mesh \"hollow\", primitive 0: 1 closed shell lies inside another and looked the same way, which would make no \
+             hollow: turned over (flip the normals of one of the two)"
+        ]
+    );
+    let area = |scene: &Description, t: usize| {
+        let mesh = &scene.meshes[0];
+        let [a, b, c] = mesh.triangles[t].map(|i| mesh.positions[i as usize]);
+        (b - a).cross(c - a)
+    };
+    assert!((0..24).all(|t| area(&right, t) == area(&turned, t)));
+}
+
         let mesh = file.cube("inverted", Some(material));
         let mut indices = super::glb::CUBE;
         indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
