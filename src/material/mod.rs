@@ -51,6 +51,8 @@ pub struct Material {
     pub alpha: Alpha,
     /// Back faces emit too (and nothing else: scattering always has two sides).
     pub double_sided: bool,
+    /// Cameras look through its back faces; all light meets them.
+    pub culled: bool,
     /// Light passes it as if nothing were there; what it emits it emits all the same.
     pub null_bsdf: bool,
     /// KHR_materials_unlit: emits its base colour, scatters nothing.
@@ -119,6 +121,7 @@ impl Default for Material {
             emission_texture: None,
             alpha: Alpha::Opaque,
             double_sided: false,
+            culled: false,
             null_bsdf: false,
             unlit: false,
             ior: 1.5,

@@ -11,6 +11,8 @@ pub struct Survey {
     pub alpha: bool,
     /// Something is hidden from cameras.
     pub hidden_from_camera: bool,
+    /// Cameras look through the back faces of something.
+    pub culled: bool,
     /// Some mesh bounds a solid that light enters.
     pub solids: bool,
     /// Rays may cross boundaries that do not scatter: index-matched solids, solids inside others or there in part.
@@ -53,6 +55,7 @@ impl Survey {
             if worn == 0 {
                 continue;
             }
+            survey.culled |= material.culled;
             survey.alpha |= material.alpha != Alpha::Opaque;
             survey.narrow_lobes |= material.is_glossy() || material.transmission > 0.0;
             let lobes = material.perfect_and_sharp();

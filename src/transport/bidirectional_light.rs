@@ -123,6 +123,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
             return;
         }
         let Some(sample) = eye.camera.sample(vertex.p(), draws.two(Purpose::Lens)) else { return };
+        if vertex.is_culled(eye.scene, sample.wi) {
+            return;
+        }
         let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Importance, LobeSet::ALL);
         // Density of the rays of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();

@@ -217,7 +217,8 @@ pub(super) fn camera_token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32
 /// Random bits that tell of a camera's ray where that matters.
 #[inline(always)]
 pub(super) fn told(scene: &Scene, bits: u32, camera: bool) -> u32 {
-    if scene.survey.hidden_from_camera { bits & !CAMERA | if camera { CAMERA } else { 0 } } else { bits }
+    let matters = scene.survey.hidden_from_camera || scene.survey.culled;
+    if matters { bits & !CAMERA | if camera { CAMERA } else { 0 } } else { bits }
 }
 
 /// A ray from inside `interior`, about to be followed.
@@ -346,7 +347,8 @@ pub struct Between {
 pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
     let [starts, ends] = between.in_medium;
-    if scene.survey.null_boundaries || leaving.is_some() || reaching.is_some() {
+    let culls = scene.survey.culled && token & CAMERA != 0;
+    if scene.survey.null_boundaries || culls || leaving.is_some() || reaching.is_some() {
         return way_through(scene, between);
     }
     if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {

@@ -46,6 +46,10 @@ pub trait ScatterPoint {
     fn crosses(&self, w: Vec3) -> bool;
     /// As what receives light straight from lights.
     fn receiver(&self) -> Receiver;
+    /// Whether a camera that lies along `wi` looks through it.
+    fn is_culled(&self, _scene: &Scene, _wi: Vec3) -> bool {
+        false
+    }
     /// See [`Vertex::survival`].
     fn survival(&self, set: LobeSet) -> f32;
     /// See [`MediumVertex::next_event`].
@@ -115,6 +119,11 @@ pub fn lit_side(shading: &Shading<'_>, ng: Vec3, wo: Vec3) -> Vec3 {
 
 impl ScatterPoint for Vertex<'_, '_> {
     const IN_MEDIUM: bool = false;
+
+    #[inline]
+    fn is_culled(&self, scene: &Scene, wi: Vec3) -> bool {
+        scene.culls(self.surface, -wi)
+    }
 
     #[inline]
     fn receiver(&self) -> Receiver {

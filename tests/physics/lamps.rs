@@ -173,6 +173,30 @@ fn hidden_bodies_send_light_to_all_but_cameras() {
     agree("hidden", &scene, &METHODS);
 }
 
+/// A screen that glTF culls looks to a camera behind it like one that is hidden from cameras, and before it like any
+/// other. All methods agree that it shades the room all the same.
+#[test]
+fn cameras_look_through_back_faces_that_are_culled() {
+    let room = |culled: bool, hidden: bool, front: bool| {
+        let mut description = lit_room(matte(0.5, 0.0));
+        let (a, b) = (Vec3::X, Vec3::Y * 0.9);
+        let screen = quad(Vec3::new(-0.5, 0.3, 0.8), if front { a } else { b }, if front { b } else { a });
+        add(&mut description, "screen", screen, Material { culled, ..matte(0.9, 0.0) });
+        description.instances[2].hidden_from_camera = hidden;
+        build(description)
+    };
+    // By the same random numbers, so that only rounding differs.
+    let alike = |a: &Scene, b: &Scene| {
+        let [a, b] = [a, b].map(|scene| seen(scene, Method::Path).0);
+        (a - b).abs() < 2e-3 * b
+    };
+    assert!(alike(&room(true, false, true), &room(false, false, true)));
+    let culled = room(true, false, false);
+    assert!(alike(&culled, &room(false, true, false)));
+    assert!(!alike(&culled, &room(false, false, false)));
+    agree("culled", &culled, &METHODS);
+}
+
 /// A sky and the disc of a sun light a floor, and cameras see neither.
 #[test]
 fn cameras_see_no_hidden_light_from_infinity() {

@@ -138,6 +138,7 @@ class Writer:
         """Its index; a material that several meshes wear is written once."""
         if id(material) in self.worn:
             return self.worn[id(material)][1]
+        emission = np.asarray(material.emission, float)
         item: dict = {
             "name": material.name,
             "pbrMetallicRoughness": {
@@ -145,7 +146,8 @@ class Writer:
                 "metallicFactor": float(material.metallic),
                 "roughnessFactor": float(material.roughness),
             },
-            "doubleSided": bool(material.double_sided),
+            # Cameras would look through the back faces of others.
+            "doubleSided": bool(material.double_sided) or not emission.any(),
         }
         if material.base_color_texture is not None:
             data = png(f'material "{material.name}"', material.base_color_texture)
@@ -161,7 +163,6 @@ class Writer:
             extensions["KHR_materials_specular"] = {"specularFactor": float(material.specular)}
         if material.dispersion > 0.0:
             extensions["KHR_materials_dispersion"] = {"dispersion": float(material.dispersion)}
-        emission = np.asarray(material.emission, float)
         if emission.any():
             strength = max(1.0, float(emission.max()))
             item["emissiveFactor"] = numbers(emission / strength)

@@ -51,7 +51,7 @@ class Material:
     dispersion: float = 0.0
     #: Emitted radiance, W/(sr m2) per channel, from the front.
     emission: Triple = (0.0, 0.0, 0.0)
-    #: Emits from its back, too.
+    #: Emits from its back, too; otherwise cameras look through the back of a surface that emits.
     double_sided: bool = False
 
 

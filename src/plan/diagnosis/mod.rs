@@ -5,6 +5,7 @@
 //! answer everywhere.
 
 pub(super) mod black;
+mod culling;
 mod glass;
 mod lamps;
 mod overlap;
@@ -17,6 +18,7 @@ use crate::scene::Scene;
 /// All that looks like a mistake.
 pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<String> {
     let mut warnings = glass::thin(scene);
+    warnings.extend(culling::culled(scene, camera));
     warnings.extend(glass::wide(scene));
     warnings.extend(glass::faded(scene));
     warnings.extend(overlap::unordered(scene));

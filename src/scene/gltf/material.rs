@@ -146,6 +146,8 @@ pub(super) fn read(
     reader.surface(&mut material)?;
     reader.coatings(&mut material)?;
     let solid = reader.transmission(&mut material)?;
+    // Section 3.9.5. The back faces of glass are those of its other side.
+    material.culled = !material.double_sided && !material.transmits() && !material.null_bsdf;
     Ok(Loaded { material, solid, occlusion: core.occlusion_texture.is_some() })
 }
 

@@ -104,7 +104,7 @@ fn place(document: &Document, index: Option<usize>) -> Result<String> {
 
 /// The specification's default (section 3.9.1), for primitives without a material.
 fn default() -> Material {
-    Material { name: "default".into(), ..Material::default() }
+    Material { name: "default".into(), culled: true, ..Material::default() }
 }
 
 fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &mut Vec<String>) {

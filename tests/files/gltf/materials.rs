@@ -55,6 +55,7 @@ fn every_field_is_read() {
     }));
     assert_eq!(warnings, [""; 0]);
     assert_eq!((m.name.as_str(), m.double_sided, m.alpha, m.unlit), ("all", true, Alpha::Mask(0.25), true));
+    assert!(!m.culled);
     assert_eq!((m.base_color, m.metallic, m.roughness), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
     // Colour and data are two textures of one image.
     let set = |t: Option<caustique::texture::TextureRef>| t.map(|t| (t.texture, t.set));
@@ -77,6 +78,9 @@ fn every_field_is_read() {
 #[test]
 fn defaults_and_legacy_values() {
     let (m, _) = material(json!({}));
+    assert!(m.culled && !m.double_sided);
+    let glass = json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.5}}});
+    assert!(!material(glass).0.culled, "the back faces of glass are seen");
     assert_eq!(
         (m.name.as_str(), m.base_color, m.metallic, m.roughness, m.ior),
         ("material 0", [1.0; 4], 1.0, 1.0, 1.5)
@@ -192,10 +196,6 @@ fn glass_is_solid_where_the_mesh_is_closed() {
     }
 }
 
-#[test]
-fn glass_that_is_inside_out_is_reported() {
-    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
-    let turned = |file: &mut Glb, material: usize| {
 /// A hollow cube whose inner faces look the same way as its outer ones is made hollow, which is said.
 #[test]
 fn inner_shells_that_look_outwards_are_turned_over() {
@@ -230,6 +230,10 @@ fn inner_shells_that_look_outwards_are_turned_over() {
     assert!((0..24).all(|t| area(&right, t) == area(&turned, t)));
 }
 
+#[test]
+fn glass_that_is_inside_out_is_reported() {
+    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
+    let turned = |file: &mut Glb, material: usize| {
         let mesh = file.cube("inverted", Some(material));
         let mut indices = super::glb::CUBE;
         indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));

@@ -71,6 +71,22 @@ fn thin_walls_that_were_meant_to_bend_light() {
     silent(with(lit(), "Pane", quad(Vec3::new(-1.0, 1.0, 0.0), Vec3::X, Vec3::new(0.0, 1.0, 1.0)), thin));
 }
 
+/// A screen before the floor that shows its back to the camera is named; from its front it is as good as any.
+#[test]
+fn back_faces_that_the_camera_looks_through() {
+    let screen = |a, b, culled| {
+        let mesh = quad(Vec3::new(-0.5, 0.2, 1.0), a, b);
+        with(lit(), "Screen", mesh, Material { culled, ..matte(0.5, 0.0) })
+    };
+    assert_eq!(
+        warning(screen(Vec3::Y, Vec3::X, true)),
+        "object \"Screen\": the camera looks through back faces, which glTF culls where a material is not double-sided; \
+         set doubleSided to see them"
+    );
+    silent(screen(Vec3::Y, Vec3::X, false));
+    silent(screen(Vec3::X, Vec3::Y, true));
+}
+
 #[test]
 fn glass_too_rough_for_a_caustic() {
     let frosted = Material { roughness: 0.6, ..glass(1.5) };
