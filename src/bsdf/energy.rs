@@ -29,7 +29,7 @@ pub(super) struct SideTables {
     eta: f32,
     /// [`REFLECTED`] and [`SCATTERED`].
     albedos: Grid<2>,
-    /// [`SCATTERED`] of facets that are wider one way.
+    /// The same of facets that are wider one way.
     stretched: Pairs,
     /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of
     /// [`Smooth::grazing_weight`].
@@ -126,6 +126,11 @@ fn add_albedos(sums: &mut [f32; 5], smooth: &Smooth, ggx: &Ggx, wo: Vec3, lambda
     }
 }
 
+/// [`REFLECTED`] from what [`add_albedos`] has added up.
+fn reflected([total, r, rg, ..]: [f32; 5]) -> Vec4 {
+    Vec4::new(total + r, total, r - rg, rg)
+}
+
 /// [`SCATTERED`] from what [`add_albedos`] has added up: transmitted is what F leaves, t (1 - F0) - tg (F90 - F0).
 fn scattered([total, r, rg, t, tg]: [f32; 5]) -> Vec4 {
     Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0)
@@ -161,8 +166,7 @@ impl SideTables {
             let sums = tabulate(i, [0.0f32; 5], |sums, ggx, wo, lambda_o, h, weight| {
                 add_albedos(sums, &smooth, ggx, wo, lambda_o, h, weight);
             });
-            let reflected = sums.map(|[total, r, rg, ..]| Vec4::new(total + r, total, r - rg, rg));
-            [row(&reflected), row(&sums.map(scattered))]
+            [row(&sums.map(reflected)), row(&sums.map(scattered))]
         })
     }
 
@@ -193,14 +197,23 @@ impl SideTables {
 
     /// The same of facets that are wider one way.
     pub fn stretched_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> Stretched {
+        self.stretched(alphas, (SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0)))
+    }
+
+    /// As [`SideTables::reflection`], of facets that are wider one way.
+    pub fn stretched_reflection(&self, alphas: [Position; 2], f0: f32, f90: f32) -> Stretched {
+        self.stretched(alphas, (REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90)))
+    }
+
+    fn stretched(&self, alphas: [Position; 2], functions: (usize, f32, Vec4)) -> Stretched {
         let smooth = Smooth::new(self.eta);
-        self.stretched.around(alphas, 1.0, -Vec4::new(1.0, f0, f90, 0.0), |alpha_x, alpha_y, wo| {
+        self.stretched.around(alphas, functions, |alpha_x, alpha_y, wo| {
             let ggx = Ggx { alpha_x, alpha_y };
             let mut sums = [0.0; 5];
             over_facets(&ggx, wo, 1.0, |lambda_o, h, weight| {
                 add_albedos(&mut sums, &smooth, &ggx, wo, lambda_o, h, weight);
             });
-            scattered(sums)
+            [reflected(sums), scattered(sums)]
         })
     }
 

@@ -6,9 +6,10 @@ use super::energy::{Covering, EnergyTables, SideTables};
 use super::fresnel::{Smooth, is_matched, normal_incidence};
 use super::microfacet::{Ggx, class_of, refraction_width};
 use super::profile::{Position, Profile};
-use super::stretched::Stretched;
+use super::stretched::{Sides, Stretched};
 use super::{DELTA_ALPHA, LobeSet, Parameters};
 use crate::math::{Rgb, Vec2, Vec3, sqr};
+use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
 /// Reflection of light that facets of reflectance `f` scatter more than once, as a share of what a perfect reflector's
@@ -19,8 +20,8 @@ pub(super) fn again(f: Rgb, kept: f32) -> Rgb {
 }
 
 /// A rough or smooth interface with whatever lies on it.
-#[derive(Clone, Copy, Debug)]
-pub struct Interface {
+#[derive(Debug)]
+pub struct Interface<'a> {
     pub(super) ggx: Ggx,
     pub(super) class: LobeSet,
     /// One over the widest change that roughness makes to the cosine at a facet: see [`Interface::effective_cosine`].
@@ -44,19 +45,19 @@ pub struct Interface {
     pub(super) loss: Profile,
     /// What the interface lets in to the diffuse base.
     pub(super) through: Profile,
-    pub(super) glass: Option<RoughGlass>,
+    pub(super) glass: Option<RoughGlass<'a>>,
     pub(super) cover: Option<Covered>,
 }
 
 /// Compensation for solid glass, by side: 0 above, 1 below.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RoughGlass {
+#[derive(Debug)]
+pub(super) struct RoughGlass<'a> {
     /// What is lost: the mean over azimuths.
     pub loss: [Profile; 2],
-    /// What is lost where facets are wider one way.
-    stretched: Option<[Stretched; 2]>,
-    /// Albedo of the reflecting facets.
-    pub reflected: [Profile; 2],
+    /// Where facets are wider one way: what is lost, and the albedo of the reflecting facets.
+    stretched: Option<[Sides<'a>; 2]>,
+    /// Albedo of the reflecting facets, if they are not.
+    reflected: [Profile; 2],
     /// Reflected compensation: `returned[side] * loss(o) * loss(i)`.
     pub returned: [f32; 2],
     /// Transmitted compensation over the squared index of the side transmitted to (with 1 above): the same from both
@@ -79,9 +80,20 @@ pub(super) struct Covered {
     pub profiles: [Profile; 2],
 }
 
-impl Interface {
+impl<'a> Interface<'a> {
     /// The interface that `parameters` speak of, whatever their colours.
-    pub fn new(p: &Parameters, tables: &EnergyTables) -> Interface {
+    pub fn new(p: &Parameters, tables: &EnergyTables) -> Interface<'a> {
+        Interface::with(p, tables, |sides| Sides::Own(Box::new(sides)))
+    }
+
+    /// The same for one vertex; what is large is kept in `arena`, which runs no destructors.
+    #[inline]
+    pub fn new_in(p: &Parameters, tables: &EnergyTables, arena: &'a Bump) -> &'a Interface<'a> {
+        arena.alloc_with(|| Interface::with(p, tables, |sides| Sides::Lent(arena.alloc(sides))))
+    }
+
+    #[inline]
+    fn with(p: &Parameters, tables: &EnergyTables, keep: impl Fn([Stretched; 2]) -> Sides<'a>) -> Interface<'a> {
         let bends = p.transmission * (1.0 - p.metallic) > 0.0 && !p.thin;
         let mut class = class_of(p.alpha_x, p.alpha_y);
         // What is let through of nearly matching indices is narrow, however rough the surface.
@@ -115,7 +127,7 @@ impl Interface {
         };
         let matched = is_matched(p.eta);
         let glass = match sides {
-            Some(sides) if bends && rough => Some(RoughGlass::new(&ggx, alpha, sides, p.eta, f0_max, f90)),
+            Some(sides) if bends && rough => Some(RoughGlass::new(&ggx, alpha, sides, (p.eta, f0_max, f90), keep)),
             _ => None,
         };
         let mut interface = Interface {
@@ -165,13 +177,22 @@ impl Interface {
     }
 }
 
-impl RoughGlass {
+impl<'a> RoughGlass<'a> {
     /// `alpha` is the mean one of `ggx`.
-    fn new(ggx: &Ggx, alpha: Position, sides: [&SideTables; 2], eta: f32, f0: f32, f90: f32) -> RoughGlass {
+    fn new(
+        ggx: &Ggx,
+        alpha: Position,
+        sides: [&SideTables; 2],
+        (eta, f0, f90): (f32, f32, f32),
+        keep: impl Fn([Stretched; 2]) -> Sides<'a>,
+    ) -> RoughGlass<'a> {
         let alphas = [ggx.alpha_x, ggx.alpha_y].map(Position::new);
-        let stretched = (ggx.alpha_x != ggx.alpha_y).then(|| sides.map(|s| s.stretched_glass_loss(alphas, f0, f90)));
+        let stretched = (ggx.alpha_x != ggx.alpha_y).then(|| {
+            let loss = keep(sides.map(|s| s.stretched_glass_loss(alphas, f0, f90)));
+            [loss, keep(sides.map(|s| s.stretched_reflection(alphas, f0, f90)))]
+        });
         let loss = match &stretched {
-            Some(stretched) => stretched.each_ref().map(Stretched::mean),
+            Some([loss, _]) => [loss[0].mean(), loss[1].mean()],
             None => sides.map(|s| s.glass_loss(alpha, f0, f90)),
         };
         // Of what is lost from side s the share x_s passes. Reciprocity asks for x_s = k n^2 average, n and average
@@ -194,16 +215,25 @@ impl RoughGlass {
     pub fn loss_along(&self, side: usize, at: Position, w: Vec3) -> f32 {
         match &self.stretched {
             None => self.loss[side].at(at),
-            Some(stretched) => stretched[side].at(at, w),
+            Some([loss, _]) => loss[side].at(at, w),
         }
     }
 
-    /// The same, and the density per solid angle with which [`RoughGlass::sample`] draws `w`.
+    /// Albedo of the reflecting facets along `w`.
+    #[inline]
+    pub fn reflected_along(&self, side: usize, at: Position, w: Vec3) -> f32 {
+        match &self.stretched {
+            None => self.reflected[side].at(at),
+            Some([_, reflected]) => reflected[side].at(at, w),
+        }
+    }
+
+    /// What is lost along `w`, and the density per solid angle with which [`RoughGlass::sample`] draws `w`.
     #[inline]
     pub fn loss_with_pdf_w(&self, side: usize, at: Position, w: Vec3) -> (f32, f32) {
         match &self.stretched {
             None => self.loss[side].at_with_pdf_w(at, w.z.abs()),
-            Some(stretched) => (stretched[side].at(at, w), stretched[side].pdf_w(at, w)),
+            Some([loss, _]) => (loss[side].at(at, w), loss[side].pdf_w(at, w)),
         }
     }
 
@@ -212,13 +242,13 @@ impl RoughGlass {
     pub fn sample(&self, side: usize, u: Vec2) -> Option<Vec3> {
         match &self.stretched {
             None => self.loss[side].sample(u),
-            Some(stretched) => stretched[side].sample(u),
+            Some([loss, _]) => loss[side].sample(u),
         }
     }
 }
 
 impl Covered {
-    fn new(cover: Cover, p: &Parameters, alpha: Position, below: &Interface, tables: &EnergyTables) -> Covered {
+    fn new(cover: Cover, p: &Parameters, alpha: Position, below: &Interface<'_>, tables: &EnergyTables) -> Covered {
         let norm = |profile: &Profile| match profile.average {
             average if average > 1e-9 => average / profile.average_with(|mu| cover.passes(mu.into())).max(1e-9),
             _ => 1.0,

@@ -33,7 +33,7 @@ pub(super) fn mean(c: Rgb) -> f32 {
 /// See the module's documentation.
 #[derive(Clone, Copy, Debug)]
 pub struct Layered<'a> {
-    pub(super) interface: &'a Interface,
+    pub(super) interface: &'a Interface<'a>,
     /// Classes of lobes that are there.
     pub(super) lobes: LobeSet,
     pub(super) has_facets: bool,
@@ -146,7 +146,7 @@ impl Seen {
 impl<'a> Layered<'a> {
     /// The surface of `base` colour, `metallic` and transmitting in these shares, at `interface`.
     #[inline(always)]
-    pub(super) fn new(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface) -> Layered<'a> {
+    pub(super) fn new(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Layered<'a> {
         let Interface { matched, class, thin, average, .. } = *interface;
         let metal = metallic;
         let glass = (1.0 - metal) * transmission;
@@ -221,7 +221,7 @@ impl<'a> Layered<'a> {
 
     /// Compensation of solid glass, where there is any.
     #[inline]
-    pub(super) fn rough_glass(&self) -> Option<&'a RoughGlass> {
+    pub(super) fn rough_glass(&self) -> Option<&'a RoughGlass<'a>> {
         if self.glass > 0.0 { self.interface.glass.as_ref() } else { None }
     }
 
@@ -292,7 +292,7 @@ impl<'a> Layered<'a> {
             Some(glass) => {
                 let (side, at) = (seen.side, seen.at);
                 let loss = glass.loss_along(side, at, seen.o);
-                let reflected = glass.reflected[side].at(at);
+                let reflected = glass.reflected_along(side, at, seen.o);
                 let transmitted = (1.0 - loss - reflected).max(0.0);
                 let smooth = n.dielectric(cos, side).0;
                 let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);

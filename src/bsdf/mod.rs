@@ -145,13 +145,13 @@ fn lambert(color: Rgb, seen: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
 
 impl<'a> Bsdf<'a> {
     /// The BSDF of `parameters`, whose interface is `interface`.
-    pub fn new(parameters: &Parameters, interface: &'a Interface) -> Bsdf<'a> {
+    pub fn new(parameters: &Parameters, interface: &'a Interface<'a>) -> Bsdf<'a> {
         Bsdf::of(parameters.base_color, parameters.metallic, parameters.transmission, interface)
     }
 
     /// The BSDF of a surface of colour `base`, `metallic` and transmitting in these shares, at `interface`.
     #[inline(always)]
-    pub fn of(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface) -> Bsdf<'a> {
+    pub fn of(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Bsdf<'a> {
         if metallic == 0.0 && transmission == 0.0 && interface.bare {
             Bsdf::Matte(base)
         } else {

@@ -10,22 +10,21 @@ use std::sync::OnceLock;
 /// Nodes of the azimuth in a quarter turn. The other quarters are its mirror images.
 const AZIMUTHS: usize = 13;
 
-/// Three functions of the direction at a pair of alphas: constant, per F0, per F90; the fourth is unused.
-pub(super) type Row = [[Vec4; NODES]; AZIMUTHS];
+/// Twice four functions of the direction at a pair of alphas.
+pub(super) type Row = [[[Vec4; 2]; NODES]; AZIMUTHS];
 
 /// Rows at pairs of nodes of alpha, each made when it is first asked for.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairs(OnceLock<Box<[OnceLock<Box<Row>>]>>);
 
 impl Pairs {
-    /// `constant + factors . functions`, at least zero, of facets of these alphas along x and y. `make` makes the four
-    /// functions at an alpha along x, a smaller one along y, and a direction.
+    /// `constant + factors . functions`, at least zero, of the functions of number `n` of facets of these alphas along x
+    /// and y. `make` makes all functions at an alpha along x, a smaller one along y, and a direction.
     pub fn around(
         &self,
         [along_x, along_y]: [Position; 2],
-        constant: f32,
-        factors: Vec4,
-        make: impl Fn(f32, f32, Vec3) -> Vec4,
+        (n, constant, factors): (usize, f32, Vec4),
+        make: impl Fn(f32, f32, Vec3) -> [Vec4; 2],
     ) -> Stretched {
         let pairs = self.0.get_or_init(|| (0..NODES * NODES).map(|_| OnceLock::new()).collect());
         let row = |wide: usize, narrow: usize| {
@@ -45,7 +44,7 @@ impl Pairs {
             for (k, narrow_share) in narrow.around() {
                 let (row, factors) = (row(i, k), factors * (wide_share * narrow_share));
                 for (sums, values) in nodes.iter_mut().zip(row.iter()) {
-                    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factors.dot(*value));
+                    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factors.dot(value[n]));
                 }
             }
         }
@@ -59,6 +58,26 @@ pub(super) struct Stretched {
     azimuths: [Profile; AZIMUTHS],
     /// The wider alpha is the one along y.
     turned: bool,
+}
+
+/// The functions of the two sides of an interface, kept away from what every interface has: they are large.
+#[derive(Debug)]
+pub(super) enum Sides<'a> {
+    /// By an interface that many vertices share.
+    Own(Box<[Stretched; 2]>),
+    /// In the memory of a path.
+    Lent(&'a [Stretched; 2]),
+}
+
+impl std::ops::Deref for Sides<'_> {
+    type Target = [Stretched; 2];
+    #[inline]
+    fn deref(&self) -> &[Stretched; 2] {
+        match self {
+            Sides::Own(sides) => sides,
+            Sides::Lent(sides) => sides,
+        }
+    }
 }
 
 /// Share of the circle that belongs to a node.

@@ -23,17 +23,17 @@ struct Ready {
     /// say.
     shares: Option<(Vec4, f32, f32)>,
     /// The interface with the open space and its relative index of refraction; none where textures change it.
-    open: Option<(f32, Interface)>,
+    open: Option<(f32, Interface<'static>)>,
     /// The same with the solids around, by falling index: made when a path first meets it, for few pairs of materials
     /// ever do.
-    nested: Vec<(f32, OnceLock<Box<Interface>>)>,
+    nested: Vec<(f32, OnceLock<Box<Interface<'static>>>)>,
 }
 
 impl Ready {
     /// The interface of relative index `eta`, made by `make` where it is asked for the first time; none where it is not
     /// to be kept.
     #[inline(always)]
-    fn interface(&self, eta: f32, make: impl FnOnce() -> Interface) -> Option<&Interface> {
+    fn interface(&self, eta: f32, make: impl FnOnce() -> Interface<'static>) -> Option<&Interface<'static>> {
         match &self.open {
             Some((at, interface)) if *at == eta => Some(interface),
             _ => {
@@ -45,7 +45,7 @@ impl Ready {
 }
 
 /// The interface of a material whose textures do not change it: the same wherever it is made.
-fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Interface {
+fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Interface<'static> {
     const ANYWHERE: Surface = Surface {
         p: Vec3::ZERO,
         ng: Vec3::Z,
@@ -153,7 +153,7 @@ impl Scattering {
         let plain = || plain_interface(&materials.list[surface.material as usize], eta, &self.tables);
         let interface = match ready.interface(eta, plain) {
             Some(interface) => interface,
-            None => arena.alloc_with(|| Interface::new(&materials.parameters(surface, eta), &self.tables)),
+            None => Interface::new_in(&materials.parameters(surface, eta), &self.tables, arena),
         };
         Bsdf::of(base, metallic, transmission, interface)
     }

@@ -145,14 +145,20 @@ fn furnace_error(p: &Parameters) -> f32 {
 }
 
 /// A surface that loses nothing, under a white sky, is white: within 0.5 %, whatever its roughness and what lies on
-/// top, from both sides.
+/// top, from both sides; within 1.5 % in every direction where facets are wider one way, and within 5 % where they are
+/// thirty times as wide.
 #[test]
 fn white_furnace() {
+    let allowed = |stretch: f32| match stretch {
+        stretch if stretch > 10.0 => 0.05,
+        stretch if stretch > 1.0 => 0.015,
+        _ => 0.005,
+    };
     let failures: Vec<String> = white()
         .par_iter()
-        .map(|(name, p)| (name, furnace_error(p)))
-        .filter(|(_, error)| *error >= 0.005 || error.is_nan())
-        .map(|(name, error)| format!("{name}: off by {error}"))
+        .map(|(name, p)| (name, furnace_error(p), allowed(p.alpha_x.max(p.alpha_y) / p.alpha_x.min(p.alpha_y))))
+        .filter(|(_, error, allowed)| error >= allowed || error.is_nan())
+        .map(|(name, error, _)| format!("{name}: off by {error}"))
         .collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
     // A surface that loses 1 % is not taken for white.
