@@ -184,10 +184,7 @@ impl Wrap {
 impl Texture {
     /// Whether some texel's alpha is below 1.
     pub fn has_alpha(&self) -> bool {
-        match &self.texels {
-            Texels::Bytes { data, .. } => data.chunks_exact(4).any(|texel| texel[3] < 255),
-            Texels::Floats(texels) => texels.iter().any(|texel| texel[3] < 1.0),
-        }
+        (0..self.width as usize * self.height as usize).any(|index| self.texels.at(index).w < 1.0)
     }
 
     #[inline]

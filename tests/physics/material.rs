@@ -178,7 +178,7 @@ fn frames_of_mirrored_nodes_are_mirror_images() {
 fn rows_are_tabulated_when_they_are_asked_for() {
     let glass = |i: usize| {
         let ior = 1.3 + 0.037 * i as f32;
-        Material { ior, roughness: 0.5, transmission: 1.0, thin: false, ..Material::default() }
+        Material { ior, metallic: 0.0, roughness: 0.5, transmission: 1.0, thin: false, ..Material::default() }
     };
     let materials: Vec<Material> = (0..30).map(glass).collect();
     assert!(materials.iter().all(Material::is_solid_glass));

@@ -1,10 +1,9 @@
 //! Back faces that the camera looks through.
 
+use super::rays;
 use crate::camera::Camera;
 use crate::math::Vec2;
 use crate::scene::Scene;
-use crate::scene::contact::Along;
-use crate::trace::Ray;
 use std::collections::BTreeSet;
 
 /// Rays along each side of the picture.
@@ -22,10 +21,8 @@ pub(super) fn culled(scene: &Scene, camera: &Camera) -> Option<String> {
     for k in 0..RAYS * RAYS {
         let at = |k: u32, size: u32| (k as f32 + 0.5) / RAYS as f32 * size as f32;
         let ray = camera.ray(Vec2::new(at(k % RAYS, width), at(k / RAYS, height)), Vec2::splat(0.5));
-        let (origin, direction) = (ray.origin, ray.direction);
-        let mut along = Along::new(Ray { origin, direction, tmax: f32::INFINITY, token: 0 }, None);
-        if let Some((surface, _)) = along.next(scene)
-            && scene.culls(&surface, direction)
+        if let Some(surface) = rays::first(scene, ray.origin, ray.direction, f32::INFINITY, 0)
+            && scene.culls(&surface, ray.direction)
         {
             objects.insert(scene.shapes.instances[surface.instance as usize].name.as_str());
         }
