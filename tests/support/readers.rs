@@ -9,12 +9,14 @@ use caustique::film::Naming;
 use caustique::image::exr;
 use caustique::pipeline::merge::{Order, Shards};
 use caustique::pipeline::{checkpoint, records, shard};
+use caustique::render::{Control, Method, Session, Settings, Stage, StopReason, Strategy, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{Scene, environment_file, usd};
+use caustique::scene::{Scene, View, environment_file, usd};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
+use std::sync::LazyLock;
 
 /// A reader: what it is called, and what reads the bytes of a file; other files lie in the folder, which is its own.
 pub type Reader = (&'static str, fn(&[u8], &Path));
@@ -55,12 +57,43 @@ fn glb(bytes: &[u8], _: &Path) {
     }
 }
 
-/// Scene files, and the scenes that are built of them.
+/// Scene files, the scenes that are built of them, and an iteration of pictures of four pixels.
 fn scene(bytes: &[u8], _: &Path) {
-    if let Some(scene) = told(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default())) {
-        told(Scene::build(scene, 1));
+    let read = told(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default()));
+    let Some(scene) = read.and_then(|description| told(Scene::build(description, 1))) else { return };
+    let Ok(camera) = scene.camera(&small()) else { return };
+    for method in METHODS {
+        let settings =
+            Settings { iterations: Some(1), photons: 64, max_depth: 16, ..Settings::of(Strategy::plain(method)) };
+        let pixels = render(&scene, &camera, &settings, |_, _| Control::Continue).pixels.len();
+        assert_eq!(pixels, 4);
     }
 }
+
+/// Methods that share no code of their iterations.
+const METHODS: [Method; 3] = [Method::Path, Method::Sppm, Method::Vcm];
+
+/// A picture of four pixels.
+fn small() -> View {
+    View { width: Some(2), height: Some(2), ..View::default() }
+}
+
+/// Renders of [`METHODS`] that saved states are gone on with: of a triangle in light from all around.
+static STAGES: LazyLock<Vec<Stage<'static>>> = LazyLock::new(|| {
+    let document = serde_json::json!({
+        "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0], "extras": {"caustique": {"environment": {"color": [1, 1, 1]}}}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"componentType": 5126, "type": "VEC3", "count": 3, "bufferView": 0}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36}],
+    });
+    let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let bytes = packed(&document, corners.as_flattened());
+    let description = gltf::read_bytes(&bytes, Path::new("fuzz.glb"), &ReadOptions::default()).expect("it is a scene");
+    let scene: &Scene = Box::leak(Box::new(Scene::build(description, 1).expect("it can be built")));
+    let camera = Box::leak(Box::new(scene.camera(&small()).expect("there is one")));
+    METHODS.map(|method| Stage::new(scene, camera, &Settings::of(Strategy::plain(method)))).into()
+});
 
 /// A scene in JSON and, behind a zero, what lies beside it as `a.bin`, `a.png`, `a.jpg`, `a.hdr` and `a.exr`.
 fn gltf(bytes: &[u8], folder: &Path) {
@@ -151,11 +184,21 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A checkpoint as it is, or the contents of its records.
+/// A checkpoint as it is, or the contents of its records; the render goes on for an iteration.
 fn checkpoint(bytes: &[u8], folder: &Path) {
     let whole = bytes.starts_with(checkpoint::MAGIC);
     let bytes = if whole { bytes.to_vec() } else { [&checkpoint::MAGIC[..], &sealed(bytes)].concat() };
-    told(checkpoint::read(&file(folder, "fuzz.checkpoint", &bytes)));
+    let path = file(folder, "fuzz.checkpoint", &bytes);
+    if told(checkpoint::read(&path)).is_none() {
+        return;
+    }
+    for stage in STAGES.iter() {
+        let (_, state) = checkpoint::read(&path).expect("it was read before");
+        if let Some(mut session) = Session::resume(stage, state) {
+            session.step();
+            assert_eq!(session.finish(StopReason::Interrupted).pixels.len(), 4);
+        }
+    }
 }
 
 /// A shard as it is, or the contents of the records behind its picture; merged alone.
