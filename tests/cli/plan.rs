@@ -114,9 +114,14 @@ fn classes_of_light_paths_are_left_out() {
     );
     assert_eq!(none.code, Some(0), "{}", none.stderr);
     assert_eq!(folder.read("none.exr").1["light_paths"], 0);
-    // A layer that is left out cannot be asked for.
-    let asked = folder.run("render scene.glb -o out.exr --no-combine --layers Direct --effects -direct,-glossy");
-    assert_eq!(asked.code, Some(2), "{}", asked.stderr);
+    // A layer that is left out is black if it is asked for, and a warning says so.
+    let small = "render scene.glb -o out.exr --no-combine --width 16 --iterations 1";
+    let asked = folder.run(&format!("{small} --layers Direct --effects -direct,-glossy"));
+    assert_eq!(asked.code, Some(0), "{}", asked.stderr);
+    assert!(asked.stderr.contains("layer \"Direct\" is black"), "{}", asked.stderr);
+    let (layers, _) = folder.read("out.exr");
+    let black = layers.get("Direct").expect("it is there");
+    assert!(black.planes.iter().all(|plane| plane.values.iter().all(|value| *value == 0.0)));
 }
 
 /// The header of a render holds the plan that `plan` prints for the same options, with what a pilot has measured and

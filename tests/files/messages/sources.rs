@@ -62,7 +62,16 @@ const UNSAID: [(&str, &[&str]); 6] = [
         "tests/python/usd_render.py says it, by a variable of the environment",
         &["{} is no number of seconds", "give a whole number from 1 to 2000000, or none"],
     ),
-    ("they are no messages", &["Khronos glTF Blender I/O", "caustique checkpoint 3n", "not said", "default material"]),
+    (
+        "they are no messages",
+        &[
+            "Khronos glTF Blender I/O",
+            "caustique checkpoint 3n",
+            "caustique checkpoint ",
+            "not said",
+            "default material",
+        ],
+    ),
 ];
 
 /// The files of the loaders.

@@ -80,6 +80,11 @@ fn checkpoints(said: &mut Said, folder: &Path) {
     let own: Head = serde_json::from_slice(&head("0.1.0")).expect("a head");
     said.case("a checkpoint of another scene", &refused(checkpoint::check(&path, &own, Some("x"), &json!({}))));
     let other = json!({"width": 3});
+    let refusal = checkpoint::check_replaceable(&path, false, "add --resume");
+    said.case("the checkpoint of a render that was not finished", &refused(refusal));
+    fs::write(&path, b"glTF").expect("it can be written");
+    let refusal = checkpoint::check_replaceable(&path, true, "add --resume");
+    said.case("another file where a checkpoint would be saved", &refused(refusal));
     said.case("a checkpoint of other options", &refused(checkpoint::check(&path, &own, Some(""), &other)));
 }
 
