@@ -1,0 +1,407 @@
+//! Random scenes whose pictures are known: integrals of double precision over the film.
+
+use super::picture::{
+    CONFIRMING, Difference, MEANS, SEEDS, SIGNIFICANCE, SIZE, Shot, TILES, TOLERANCE, differences, pictures,
+};
+use super::random::Random;
+use super::relation::similar;
+use super::shapes::{cuboid, disc, joined, prism, quad, sphere, triangle};
+use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, ThingKind, World};
+use caustique::render::Method;
+use glam::{DAffine3, DQuat, DVec3};
+use std::f64::consts::PI;
+
+/// Kinds of scenes with a known picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A glowing convex body over a floor.
+    Glowing,
+    /// A punctual light over a floor.
+    Punctual,
+    /// A floor lit by a ball that a spot shines on.
+    Bounce,
+    /// A wall seen through a block that absorbs and does not refract.
+    Absorbing,
+    /// A wall seen through a pane of absorbing glass at right angles.
+    Pane,
+    /// White bodies of all kinds under a white sky.
+    Furnace,
+}
+
+pub const FORMS: [Form; 6] = [Form::Glowing, Form::Punctual, Form::Bounce, Form::Absorbing, Form::Pane, Form::Furnace];
+
+/// A scene and its picture.
+pub struct Known {
+    pub world: World,
+    pub expected: Vec<f64>,
+    pub max_depth: u32,
+}
+
+const CAMERA: &str = "camera 0";
+
+impl Form {
+    pub fn known(self, seed: u64) -> Known {
+        let mut random = Random::new(seed);
+        let mut known = match self {
+            Form::Glowing => glowing(&mut random),
+            Form::Punctual => punctual(&mut random),
+            Form::Bounce => bounce(&mut random),
+            Form::Absorbing => absorbing(&mut random),
+            Form::Pane => pane(&mut random),
+            Form::Furnace => furnace(&mut random),
+        };
+        let rotation = if random.chance(0.5) { DQuat::IDENTITY } else { random.turn() };
+        let size = random.scale(1e-3, 1e3);
+        let translation = if random.chance(0.7) { DVec3::ZERO } else { random.vector(-2.0, 2.0) * size };
+        known.world = similar(&known.world, size, rotation, translation);
+        known.world.seed = seed;
+        known
+    }
+
+    /// Methods that find this light, and the tolerance for their bias.
+    pub fn methods(self) -> Vec<Method> {
+        use Method as M;
+        let all = vec![M::Path, M::Bdpt, M::Vcm, M::Sppm, M::Light, M::Mlt, M::Appm, M::Cppm, M::Ppm, M::Pm, M::Bpm];
+        match self {
+            Form::Glowing | Form::Punctual => all,
+            Form::Bounce => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm, M::Light],
+            Form::Absorbing | Form::Pane => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm],
+            Form::Furnace => vec![M::Path, M::Bdpt, M::Vcm, M::Sppm],
+        }
+    }
+
+    fn tolerance(self, method: Method) -> f64 {
+        match (self, method) {
+            (_, Method::Path | Method::Bdpt | Method::Light) => TOLERANCE,
+            (Form::Glowing | Form::Punctual, Method::Bpm) => 0.15,
+            (Form::Glowing | Form::Punctual, _) => TOLERANCE,
+            (_, Method::Vcm) => 0.06,
+            _ => 0.2,
+        }
+    }
+}
+
+/// Compares a scene with its known picture; `None` where they agree.
+///
+/// # Errors
+/// The scene is not taken.
+pub fn check(form: Form, known: &Known, method: Method) -> Result<Option<Vec<Difference>>, String> {
+    let shot = Shot { max_depth: known.max_depth, ..Shot::new(method, CAMERA) };
+    let expected = vec![known.expected.clone(); 2];
+    let found = |seeds: std::ops::Range<u64>| -> Result<Vec<Difference>, String> {
+        let set = pictures(&known.world, &shot, seeds)?;
+        Ok(differences(&set, &expected, form.tolerance(method), SIGNIFICANCE))
+    };
+    let first = found(0..SEEDS)?;
+    if first.is_empty() {
+        return Ok(None);
+    }
+    let mut again = found(SEEDS..SEEDS * (1 + CONFIRMING))?;
+    again.retain(|difference| first.iter().any(|other| other.index == difference.index));
+    Ok((!again.is_empty()).then_some(again))
+}
+
+/// A room with black walls whose floor is the plane y = -1, and a camera that sees nothing but the floor.
+fn over_a_floor(random: &mut Random) -> (World, DVec3) {
+    let mut world = World { size: 2.0, ..World::default() };
+    let side = if random.chance(0.5) { 1.0 } else { -1.0 };
+    let eye = DVec3::new(0.9 * side, random.within(-0.6, -0.2), 0.9);
+    let target = DVec3::new(random.within(0.35, 0.6) * side, -1.0, random.within(0.1, 0.6));
+    let lens = Lens { view: random.within(0.1, 0.3), orthographic: false, aperture: 0.0, focus: 1.0 };
+    world.look(eye, target, lens);
+    let base = random.vector(0.2, 0.9);
+    let floor = quad(DVec3::new(-1.0, -1.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
+    world.add("floor", floor, Matter::matte(base), vec![Placement::IDENTITY]);
+    if random.chance(0.7) {
+        let walls = cuboid(DVec3::splat(-1.0), DVec3::ONE, true).part(|triangle| !(8..10).contains(&triangle));
+        world.add("walls", walls, Matter::matte(DVec3::ZERO), vec![Placement::IDENTITY]);
+    }
+    (world, base)
+}
+
+/// Means of a picture of the first camera: radiance by ray.
+fn expect(world: &World, radiance: impl Fn(DVec3, DVec3) -> DVec3) -> Vec<f64> {
+    const POINTS: u32 = 2;
+    let camera = &world.things[0];
+    let (to_world, ThingKind::Camera(lens)) = (camera.to_world(), camera.kind) else {
+        panic!("the first thing is the camera");
+    };
+    let mut means = vec![0.0; MEANS];
+    let half = (0.5 * lens.view).tan();
+    let n = SIZE * POINTS;
+    for index in 0..n * n {
+        let (x, y) = (index % n, index / n);
+        let film = |i: u32| (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0) * half;
+        let direction = to_world.transform_vector3(DVec3::new(film(x), -film(y), -1.0)).normalize();
+        let light = radiance(to_world.translation, direction);
+        let tile = y / (n / TILES) * TILES + x / (n / TILES);
+        for channel in 0..3 {
+            let share = light[channel] / f64::from(n * n);
+            means[3 * tile as usize + channel] += share * f64::from(TILES * TILES);
+            means[MEANS - 3 + channel] += share;
+        }
+    }
+    means
+}
+
+/// Where a ray meets the floor.
+fn on_floor(origin: DVec3, direction: DVec3) -> DVec3 {
+    origin + direction * ((-1.0 - origin.y) / direction.y)
+}
+
+/// A place for a light, often in the middle of the room.
+fn place(random: &mut Random, size: f64) -> DVec3 {
+    let reach = if random.chance(0.6) { random.scale(1e-4, 0.1) } else { 0.6 - size };
+    random.vector(-1.0, 1.0) * reach
+}
+
+/// Irradiance of a floor that looks up from a triangle that glows with radiance 1 (Lambert), wholly above it; none from
+/// its back.
+fn irradiance(p: DVec3, corners: [DVec3; 3]) -> f64 {
+    let front = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(p - corners[0]) > 0.0;
+    if !front {
+        return 0.0;
+    }
+    let v = corners.map(|corner| (corner - p).normalize());
+    let edge = |i: usize| {
+        let (a, b) = (v[i], v[(i + 1) % 3]);
+        let normal = a.cross(b);
+        // Exact also for directions that almost agree.
+        normal.length().atan2(a.dot(b)) * normal.normalize().y
+    };
+    0.5 * (edge(0) + edge(1) + edge(2)).abs()
+}
+
+fn corners<'a>(mesh: &'a Mesh, to_world: &'a DAffine3) -> impl Iterator<Item = [DVec3; 3]> + 'a {
+    let single = |p: DVec3| p.as_vec3().as_dvec3();
+    mesh.triangles.iter().map(move |t| t.map(|i| to_world.transform_point3(single(mesh.positions[i as usize]))))
+}
+
+fn glowing(random: &mut Random) -> Known {
+    let (mut world, base) = over_a_floor(random);
+    let size = random.scale(0.003, 0.3);
+    let mesh = match random.below(6) {
+        0 => sphere(16, true),
+        1 => disc(4 + random.below(12) as u32),
+        2 => cuboid(DVec3::splat(-0.57), DVec3::splat(0.57), false),
+        3 => prism(1.0, 3 + random.below(9) as u32),
+        4 => triangle(),
+        _ => quad(DVec3::new(-0.7, 0.0, -0.7), DVec3::Z * 1.4, DVec3::X * 1.4),
+    };
+    let flat = mesh.triangles.len() < 20 && mesh.positions.iter().all(|p| p.y == 0.0);
+    let emission = random.vector(0.2, 1.0) / (size * size);
+    let matter = if !flat && random.chance(0.25) {
+        Matter { emission, ..Matter::glass(random.within(1.0, 1.8), 0.0) }
+    } else {
+        Matter::glowing(emission)
+    };
+    // Flat ones look about downwards.
+    let tilt = DQuat::from_rotation_x(PI + random.within(-0.6, 0.6));
+    let rotation = if flat { tilt } else { random.turn() };
+    let chain = vec![Placement { translation: place(random, size), rotation, scale: DVec3::splat(size) }];
+    let lamp = world.add("lamp", mesh.clone(), matter, chain).to_world();
+    let expected = expect(&world, |origin, direction| {
+        let p = on_floor(origin, direction);
+        base / PI * emission * corners(&mesh, &lamp).map(|corners| irradiance(p, corners)).sum::<f64>()
+    });
+    Known { world, expected, max_depth: 2 }
+}
+
+fn punctual(random: &mut Random) -> Known {
+    let (mut world, base) = over_a_floor(random);
+    let color = random.vector(0.2, 2.0);
+    let p = place(random, 0.1);
+    let down = DQuat::from_rotation_x(-PI / 2.0 + random.within(-0.5, 0.5));
+    let rotation = DQuat::from_rotation_y(random.within(0.0, 2.0 * PI)) * down;
+    let axis = rotation * DVec3::NEG_Z;
+    let outer = random.within(0.9, 1.5);
+    let kind = match random.below(4) {
+        0 => LightKind::Point { radius: 0.0 },
+        1 => LightKind::Point { radius: random.scale(0.002, 0.03) },
+        2 => LightKind::Spot { inner: outer * random.within(0.0, 0.9), outer, radius: 0.0 },
+        _ => LightKind::Sun { angle: if random.chance(0.5) { 0.0 } else { random.within(0.5, 20.0) } },
+    };
+    if matches!(kind, LightKind::Sun { .. }) {
+        world.things.retain(|thing| !thing.name.starts_with("walls"));
+    }
+    world.add_kind(
+        "light",
+        ThingKind::Light(Light { kind, color }),
+        vec![Placement { translation: p, rotation, scale: DVec3::ONE }],
+    );
+    let expected = expect(&world, |origin, direction| {
+        let to = p - on_floor(origin, direction);
+        let (distance, cosine) = (to.length(), to.normalize().y);
+        let received = match kind {
+            LightKind::Sun { .. } => -axis.y,
+            LightKind::Point { .. } => cosine / (distance * distance),
+            LightKind::Spot { inner, outer, .. } => {
+                fall_off(-to.normalize().dot(axis), inner, outer) * cosine / (distance * distance)
+            }
+        };
+        base / PI * color * received
+    });
+    Known { world, expected, max_depth: 2 }
+}
+
+/// KHR_lights_punctual's recommended fall-off of a spot.
+fn fall_off(cosine: f64, inner: f64, outer: f64) -> f64 {
+    let x = ((cosine - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3)).clamp(0.0, 1.0);
+    x * x
+}
+
+fn bounce(random: &mut Random) -> Known {
+    let (mut world, base) = over_a_floor(random);
+    let size = random.within(0.15, 0.35);
+    let middle = place(random, size);
+    let ball =
+        if random.chance(0.5) { sphere(24, false) } else { cuboid(DVec3::splat(-0.57), DVec3::splat(0.57), false) };
+    let white = random.vector(0.3, 1.0);
+    let chain = vec![Placement { translation: middle, rotation: random.turn(), scale: DVec3::splat(size) }];
+    let to_world = world.add("ball", ball.clone(), Matter::matte(white), chain).to_world();
+    // From the side that the camera's part of the floor sees, and no light passes the ball.
+    let seen = world.things[0].to_world();
+    let seen = on_floor(seen.translation, seen.transform_vector3(DVec3::NEG_Z)) - middle;
+    let from = (seen.normalize() + random.vector(-0.5, 0.5) + 0.3 * DVec3::Y).normalize();
+    let p = middle + from * random.within(2.0, 3.0) * size;
+    let outer = (0.5 * size / p.distance(middle)).asin();
+    let color = random.vector(1.0, 5.0) / (size * size);
+    let up = if from.y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
+    let right = up.cross(from).normalize();
+    let rotation = DQuat::from_mat3(&glam::DMat3::from_cols(right, from.cross(right), from));
+    let kind = LightKind::Spot { inner: 0.5 * outer, outer, radius: 0.0 };
+    world.add_kind(
+        "spot",
+        ThingKind::Light(Light { kind, color }),
+        vec![Placement { translation: p, rotation, scale: DVec3::ONE }],
+    );
+    let patches = lit_patches(&ball, &to_world, p, -from, (0.5 * outer, outer));
+    let expected = expect(&world, |origin, direction| {
+        let floor = on_floor(origin, direction);
+        let received: f64 = patches
+            .iter()
+            .map(|&(q, normal, flux)| {
+                let to = floor - q;
+                let (square, to) = (to.length_squared(), to.normalize());
+                flux / PI * to.dot(normal).max(0.0) * (-to.y).max(0.0) / square
+            })
+            .sum();
+        base / PI * white * color * received
+    });
+    Known { world, expected, max_depth: 3 }
+}
+
+/// Small parts of a convex mesh that a spot of intensity 1 shines on: middle, normal and the flux that each receives.
+fn lit_patches(mesh: &Mesh, to_world: &DAffine3, p: DVec3, axis: DVec3, cone: (f64, f64)) -> Vec<(DVec3, DVec3, f64)> {
+    let mut patches = vec![];
+    for [a, b, c] in corners(mesh, to_world) {
+        let cross = (b - a).cross(c - a);
+        let normal = cross.normalize();
+        if normal.dot(p - a) <= 0.0 {
+            continue;
+        }
+        let n = if mesh.triangles.len() > 100 { 4 } else { 40 };
+        let at = |i: u32, j: u32, shift: f64| {
+            a + ((b - a) * (f64::from(i) + shift) + (c - a) * (f64::from(j) + shift)) / f64::from(n)
+        };
+        for i in 0..n {
+            for j in 0..n - i {
+                let upper = (i + j + 1 < n).then(|| at(i, j, 2.0 / 3.0));
+                for q in [Some(at(i, j, 1.0 / 3.0)), upper].into_iter().flatten() {
+                    let to = p - q;
+                    let cosine = to.normalize().dot(normal);
+                    let intensity = fall_off(-to.normalize().dot(axis), cone.0, cone.1);
+                    let area = 0.5 * cross.length() / f64::from(n * n);
+                    patches.push((q, normal, intensity * cosine / to.length_squared() * area));
+                }
+            }
+        }
+    }
+    patches.retain(|patch| patch.2 > 0.0);
+    patches
+}
+
+/// A glowing wall, and a camera that sees nothing but that.
+fn before_a_wall(random: &mut Random, view: f64) -> (World, DVec3) {
+    let mut world = World { size: 4.0, ..World::default() };
+    world.look(DVec3::Z * 2.0, DVec3::ZERO, Lens { view, orthographic: false, aperture: 0.0, focus: 2.0 });
+    let emission = random.vector(0.2, 3.0);
+    let wall = quad(DVec3::new(-2.0, -2.0, -1.0), DVec3::X * 4.0, DVec3::Y * 4.0);
+    world.add("wall", wall, Matter::glowing(emission), vec![Placement::IDENTITY]);
+    (world, emission)
+}
+
+fn absorbing(random: &mut Random) -> Known {
+    let view = random.within(0.2, 0.7);
+    let (mut world, emission) = before_a_wall(random, view);
+    let half = random.vector(0.1, 0.45);
+    let sigma_a = random.vector(0.2, 4.0);
+    let medium = Some(Medium { sigma_a, sigma_s: DVec3::ZERO, g: 0.0 });
+    let chain = vec![Placement { translation: random.vector(-0.1, 0.1), rotation: random.turn(), scale: DVec3::ONE }];
+    let matter = Matter { medium, ..Matter::glass(1.0, 0.0) };
+    let back = world.add("block", cuboid(-half, half, false), matter, chain).to_world().inverse();
+    let expected = expect(&world, |origin, direction| {
+        let (o, d) = (back.transform_point3(origin), back.transform_vector3(direction));
+        let (t0, t1) = ((-half - o) / d, (half - o) / d);
+        let chord = t0.max(t1).min_element() - t0.min(t1).max_element();
+        emission * (-sigma_a * chord.max(0.0)).exp()
+    });
+    Known { world, expected, max_depth: u32::MAX }
+}
+
+fn pane(random: &mut Random) -> Known {
+    let (mut world, emission) = before_a_wall(random, 0.05);
+    let (ior, thickness, sigma_a) = (random.within(1.1, 2.2), random.scale(1e-3, 0.5), random.vector(0.1, 2.0));
+    let sigma_a = sigma_a / thickness;
+    let matter = Matter { medium: Some(Medium { sigma_a, sigma_s: DVec3::ZERO, g: 0.0 }), ..Matter::glass(ior, 0.0) };
+    let half = DVec3::new(0.6, 0.6, 0.5 * thickness);
+    world.add("pane", cuboid(-half, half, false), matter, vec![Placement::IDENTITY]);
+    let reflected = ((ior - 1.0) / (ior + 1.0)).powi(2);
+    let left = (-sigma_a * thickness).exp();
+    let through = (1.0 - reflected).powi(2) * left / (DVec3::ONE - reflected * reflected * left * left);
+    let expected = expect(&world, |_, _| emission * through);
+    Known { world, expected, max_depth: u32::MAX }
+}
+
+fn furnace(random: &mut Random) -> Known {
+    let mut world = World { size: 2.0, sky: Some(DVec3::ONE), ..World::default() };
+    world.look(
+        DVec3::new(0.0, 0.3, 3.0),
+        DVec3::ZERO,
+        Lens { view: 0.6, orthographic: false, aperture: 0.0, focus: 3.0 },
+    );
+    for _ in 0..1 + random.below(3) {
+        let mesh = match random.below(4) {
+            0 => sphere(12 + 2 * random.below(8) as u32, false),
+            1 => cuboid(DVec3::splat(-0.57), DVec3::splat(0.57), false),
+            2 => joined([cuboid(DVec3::splat(-0.57), DVec3::splat(0.57), false), bubble()]),
+            _ => prism(1.0, 3 + random.below(9) as u32),
+        };
+        let scatters = Medium { sigma_a: DVec3::ZERO, sigma_s: random.vector(0.5, 3.0), g: random.within(-0.5, 0.5) };
+        let matter = match random.below(5) {
+            0 => Matter::matte(DVec3::ONE),
+            1 => {
+                Matter { metallic: 1.0, specular: 1.0, roughness: random.within(0.0, 1.0), ..Matter::matte(DVec3::ONE) }
+            }
+            2 => Matter::glass(random.within(1.1, 2.0), random.within(0.1, 0.8)),
+            3 => Matter { medium: Some(scatters), ..Matter::glass(random.within(1.0, 1.6), 0.0) },
+            _ => Matter::glass(random.within(1.1, 2.0), 0.0),
+        };
+        let p = random.vector(-0.5, 0.5);
+        if world.things.iter().skip(1).any(|thing| thing.to_world().translation.distance(p) < 0.75) {
+            continue;
+        }
+        let chain =
+            vec![Placement { translation: p, rotation: random.turn(), scale: DVec3::splat(random.within(0.2, 0.36)) }];
+        world.add("body", mesh, matter, chain);
+    }
+    let expected = expect(&world, |_, _| DVec3::ONE);
+    Known { world, expected, max_depth: u32::MAX }
+}
+
+/// A small sphere that looks inwards: in a solid, a bubble.
+fn bubble() -> Mesh {
+    let mut mesh = sphere(10, false).transformed(&DAffine3::from_scale(DVec3::splat(0.3)));
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.reverse());
+    mesh
+}

@@ -1,0 +1,219 @@
+//! Pictures of several seeds, and when two sets of them differ.
+
+use super::world::World;
+use super::write::glb;
+use crate::support::stats::mean_and_error;
+use caustique::plan::switch::Removed;
+use caustique::plan::{Asked, Plan, Switches};
+use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
+use caustique::scene::gltf::{self, ReadOptions};
+use caustique::scene::{Crop, Scene, View};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::path::Path;
+
+/// Pixels a side.
+pub const SIZE: u32 = 24;
+/// Tiles a side.
+pub const TILES: u32 = 4;
+/// Means of a picture: each channel of each tile, then each channel of the whole.
+pub const MEANS: usize = (3 * TILES * TILES + 3) as usize;
+/// Pictures of a set.
+pub const SEEDS: u64 = 8;
+/// Seeds of the set that confirms a difference, relative to the first.
+pub const CONFIRMING: u64 = 4;
+/// Probability with which one comparison of means of two equal sets exceeds the critical value.
+pub const SIGNIFICANCE: f64 = 1e-6;
+/// Relative difference of means that is a fault if it is significant.
+pub const TOLERANCE: f64 = 0.03;
+/// Tiles darker than this share of the picture are compared with that share.
+const DARK: f64 = 0.02;
+
+/// How pictures are made.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    pub method: Method,
+    /// Name of the camera.
+    pub camera: String,
+    /// A window in tiles: left, top, width, height.
+    pub window: Option<[u32; 4]>,
+    /// Factor on the iterations.
+    pub effort: f64,
+    /// Longest path in segments.
+    pub max_depth: u32,
+}
+
+impl Shot {
+    pub fn new(method: Method, camera: &str) -> Shot {
+        Shot { method, camera: camera.into(), window: None, effort: 1.0, max_depth: u32::MAX }
+    }
+
+    pub fn settings(&self, seed: u64) -> Settings {
+        let iterations = match self.method {
+            Method::Path => 24,
+            Method::Bdpt | Method::Light => 12,
+            Method::Vcm | Method::Bpm => 8,
+            Method::Mlt => 24,
+            Method::Pm => 4,
+            _ => 8,
+        };
+        let photons = if self.method == Method::Pm { 40_000 } else { 4000 };
+        Settings {
+            method: self.method,
+            seed,
+            photons,
+            levels: Levels::new(1),
+            iterations: Some((f64::from(iterations) * self.effort).ceil() as u64),
+            alpha: self.method.alpha(),
+            max_depth: self.max_depth,
+            ..Settings::default()
+        }
+    }
+
+    fn view(&self) -> View {
+        let tile = SIZE / TILES;
+        View {
+            camera: Some(self.camera.clone()),
+            width: Some(SIZE),
+            height: Some(SIZE),
+            crop: self.window.map(|window| Crop::Pixels(window.map(|side| side * tile))),
+            ..View::default()
+        }
+    }
+}
+
+/// Reads a scene as files are read.
+///
+/// # Errors
+/// What the reader says.
+pub fn read(world: &World) -> Result<Scene, String> {
+    let description = gltf::read_bytes(&glb(world), Path::new("random.glb"), &ReadOptions::default());
+    description.and_then(|description| Scene::build(description, 1)).map_err(|error| error.to_string())
+}
+
+/// Means of the pictures of some seeds; what a window leaves out is not a number.
+pub type Set = Vec<Vec<f64>>;
+
+/// Renders with some seeds.
+///
+/// # Errors
+/// The scene is not taken, or samples are rejected.
+pub fn renders(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Vec<Rendered>, String> {
+    let scene = read(world)?;
+    let camera = scene.camera(&shot.view()).map_err(|error| error.to_string())?;
+    seeds
+        .map(|seed| {
+            let rendered = render(&scene, &camera, &shot.settings(seed), |_, _| Control::Continue);
+            match rendered.rejected() {
+                0 => Ok(rendered),
+                rejected => Err(format!("{rejected} samples are not finite")),
+            }
+        })
+        .collect()
+}
+
+/// A set of pictures.
+///
+/// # Errors
+/// Those of [`renders`].
+pub fn pictures(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Set, String> {
+    Ok(renders(world, shot, seeds)?.iter().map(|rendered| means(rendered, shot.window)).collect())
+}
+
+/// Means of a picture, of a window in tiles or whole.
+fn means(rendered: &Rendered, window: Option<[u32; 4]>) -> Vec<f64> {
+    let own = rendered.settings.levels.own();
+    let [left, top, width, _] = window.unwrap_or([0, 0, TILES, TILES]);
+    let tile = SIZE / TILES;
+    let mut means = vec![f64::NAN; MEANS];
+    for (index, pixel) in (0..).zip(&rendered.pixels) {
+        let (x, y) = (left + index % (width * tile) / tile, top + index / (width * tile) / tile);
+        let mean = pixel.mean(own);
+        for channel in 0..3 {
+            let of_tile = &mut means[(3 * (y * TILES + x)) as usize + channel];
+            *of_tile = if of_tile.is_nan() { 0.0 } else { *of_tile } + mean[channel] / f64::from(tile * tile);
+        }
+    }
+    for channel in 0..3 {
+        let tiles = (0..TILES * TILES).map(|at| means[3 * at as usize + channel]);
+        means[MEANS - 3 + channel] = tiles.sum::<f64>() / f64::from(TILES * TILES);
+    }
+    means
+}
+
+/// Whether the method finds all light of the scene.
+pub fn finds_all(scene: &Scene, shot: &Shot) -> bool {
+    let removed = Removed::default();
+    let asked = Asked {
+        method: shot.method.name(),
+        because: "",
+        search: shot.method.search(),
+        max_depth: None,
+        switches: Switches::default(),
+        removed: &removed,
+    };
+    scene
+        .camera(&shot.view())
+        .is_ok_and(|camera| Plan::new(scene, &camera, &asked).effects.iter().all(|e| e.simulated || !e.present))
+}
+
+/// A mean in which two sets differ.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Difference {
+    /// `tile 5, red`.
+    pub place: String,
+    pub index: usize,
+    pub means: [f64; 2],
+    pub errors: [f64; 2],
+    /// Probability of a difference this large between equal sets.
+    pub probability: f64,
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Difference { place, means: [a, b], errors: [ea, eb], probability, .. } = self;
+        write!(f, "{place}: {a:.5} +- {ea:.5} and {b:.5} +- {eb:.5} (ratio {:.3}, p {probability:.1e})", b / a)
+    }
+}
+
+/// Means in which two sets differ by more than chance and a relative tolerance allow: Welch's t test of each.
+pub fn differences(a: &Set, b: &Set, tolerance: f64, significance: f64) -> Vec<Difference> {
+    let column = |set: &Set, index: usize| -> Vec<f64> { set.iter().map(|means| means[index]).collect() };
+    (0..MEANS)
+        .filter_map(|index| {
+            let (of_a, of_b) = (mean_and_error(&column(a, index)), mean_and_error(&column(b, index)));
+            let whole = mean_and_error(&column(b, MEANS - 3 + index % 3)).0;
+            let scale = of_a.0.abs().max(of_b.0.abs()).max(DARK * whole);
+            let apart = (of_a.0 - of_b.0).abs();
+            // Means that are not numbers are outside of a window.
+            if apart.is_nan() || apart <= tolerance * scale {
+                return None;
+            }
+            let probability = welch(apart, [of_a.1, of_b.1], [a.len(), b.len()]);
+            (probability < significance).then(|| Difference {
+                place: place(index),
+                index,
+                means: [of_a.0, of_b.0],
+                errors: [of_a.1, of_b.1],
+                probability,
+            })
+        })
+        .collect()
+}
+
+fn place(index: usize) -> String {
+    let channel = ["red", "green", "blue"][index % 3];
+    if index >= MEANS - 3 { format!("whole picture, {channel}") } else { format!("tile {}, {channel}", index / 3) }
+}
+
+/// Two-sided p-value of a difference of means with standard errors of as many values (Welch, Satterthwaite).
+pub fn welch(apart: f64, errors: [f64; 2], counts: [usize; 2]) -> f64 {
+    let squares = errors.map(|error| error * error);
+    let variance = squares[0] + squares[1];
+    if variance == 0.0 {
+        return if apart > 0.0 { 0.0 } else { 1.0 };
+    }
+    let spread: f64 = squares.iter().zip(counts).map(|(square, n)| square * square / (n as f64 - 1.0)).sum();
+    let freedom = (variance * variance / spread).max(1.0);
+    let t = StudentsT::new(0.0, 1.0, freedom).expect("a positive number of degrees of freedom");
+    2.0 * t.sf(apart / variance.sqrt())
+}

@@ -1,0 +1,39 @@
+//! Which checks a scene gets.
+
+use super::picture::{Shot, finds_all, read};
+use super::relation::{RELATIONS, Relation};
+use super::world::World;
+use caustique::render::Method;
+
+/// Methods that get most checks.
+pub const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm];
+/// The other methods.
+pub const OTHERS: [Method; 7] =
+    [Method::Light, Method::Mlt, Method::Appm, Method::Cppm, Method::Ppm, Method::Bpm, Method::Pm];
+
+/// `count` checks of the scene of a seed by the four methods, in turns that come to all pairs of relation and method;
+/// one by another method; and one method against another.
+pub fn checks(world: &World, count: usize) -> Vec<(Relation, Shot)> {
+    let i = world.seed as usize;
+    let cameras = world.cameras();
+    let shot = |method: Method| Shot::new(method, cameras[i % cameras.len()]);
+    let n = RELATIONS.len();
+    let mut list: Vec<(Relation, Shot)> =
+        (0..count).map(|k| (RELATIONS[(i + 5 * k) % n], shot(METHODS[(i + k + i / n) % METHODS.len()]))).collect();
+    list.push((RELATIONS[(3 * i + 1) % n], shot(OTHERS[i % OTHERS.len()])));
+    list.extend(methods(world, i).map(|(a, b)| (Relation::Method(b), shot(a))));
+    list
+}
+
+/// Two methods that find all light of the scene.
+fn methods(world: &World, turn: usize) -> Option<(Method, Method)> {
+    let scene = read(world).ok()?;
+    let camera = world.cameras()[0].to_owned();
+    let all: Vec<Method> = [Method::Path, Method::Bdpt, Method::Vcm, Method::Light, Method::Sppm]
+        .into_iter()
+        .filter(|method| finds_all(&scene, &Shot::new(*method, &camera)))
+        .collect();
+    let first = *all.get(turn % all.len().max(1))?;
+    let second = all[(turn + 1 + turn / 7 % all.len().max(2).saturating_sub(1)) % all.len()];
+    (first != second).then_some((first, second))
+}

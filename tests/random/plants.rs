@@ -1,0 +1,144 @@
+//! Faults that a renderer could have, planted into what is compared.
+
+use super::forms::{Form, Known};
+use super::relation::{Other, Relation, lifted, switch_off};
+use super::world::{Mesh, Thing, ThingKind, World};
+use glam::DVec3;
+
+/// A fault in one of the two sides of a relation.
+pub struct Plant {
+    pub name: &'static str,
+    pub relation: Relation,
+    /// Spoils the scene or what it is compared with; false where there is nothing to spoil.
+    pub spoil: fn(&mut World, &mut Other) -> bool,
+}
+
+/// Lights hide a part of themselves from what they shine on, as they did when shadow rays ended within them.
+fn lights_hide_themselves(world: &World) -> World {
+    let mut made = world.clone();
+    made.sky = made.sky.map(|sky| 0.7 * sky);
+    for index in world.lights() {
+        match &mut made.things[index].kind {
+            ThingKind::Light(light) => light.color *= 0.7,
+            ThingKind::Mesh { mesh, .. } => {
+                let whole = &world.meshes[*mesh];
+                let part = if whole.triangles.len() < 3 { small(whole) } else { whole.part(|i| i % 3 != 0) };
+                made.meshes.push(part);
+                *mesh = made.meshes.len() - 1;
+            }
+            ThingKind::Camera(_) => {}
+        }
+    }
+    made
+}
+
+/// A flat mesh of two thirds of its area.
+fn small(mesh: &Mesh) -> Mesh {
+    Mesh { positions: mesh.positions.iter().map(|p| 0.8 * *p).collect(), ..mesh.clone() }
+}
+
+fn hide(_: &mut World, other: &mut Other) -> bool {
+    other.worlds.iter_mut().for_each(|world| *world = lights_hide_themselves(world));
+    true
+}
+
+/// Glass that stands on something is glued to it: the floor is met inside the glass.
+fn glue(world: &mut World, _: &mut Other) -> bool {
+    let is_glass = |thing: &Thing| thing.rests && world.matter(thing).is_some_and(|m| m.is_glass() && m.ior > 1.3);
+    // Large enough to be seen.
+    let seen = world.things.iter().any(|thing| is_glass(thing) && world.radius(thing) > 0.08 * world.size);
+    let sunk = lifted(world, -1e-3).filter(|_| seen);
+    sunk.map(|sunk| *world = sunk).is_some()
+}
+
+fn lose_a_light(_: &mut World, other: &mut Other) -> bool {
+    other.worlds.pop().is_some()
+}
+
+fn lose_a_thing(world: &mut World, other: &mut Other) -> bool {
+    let size = |index: &usize| world.radius(&world.things[*index]);
+    let largest = (0..world.things.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
+    largest.map(|largest| other.worlds[0].things.remove(largest)).is_some()
+}
+
+fn forget_a_mirror(_: &mut World, other: &mut Other) -> bool {
+    other.worlds[0].things.iter_mut().filter(|thing| thing.mesh().is_some()).for_each(|thing| {
+        thing.chain.pop();
+    });
+    true
+}
+
+fn forget_channels(_: &mut World, other: &mut Other) -> bool {
+    other.channels = [0, 1, 2];
+    true
+}
+
+fn double_less(_: &mut World, other: &mut Other) -> bool {
+    other.factor = 2.2;
+    true
+}
+
+fn widen(_: &mut World, other: &mut Other) -> bool {
+    for thing in &mut other.worlds[0].things {
+        if let ThingKind::Camera(lens) = &mut thing.kind {
+            lens.view *= 1.2;
+        }
+    }
+    true
+}
+
+fn keep_intensity(world: &mut World, other: &mut Other) -> bool {
+    let mut any = false;
+    for (thing, before) in other.worlds[0].things.iter_mut().zip(&world.things) {
+        if let (ThingKind::Light(light), ThingKind::Light(before)) = (&mut thing.kind, before.kind) {
+            any |= light.color != before.color;
+            light.color = before.color;
+        }
+    }
+    any
+}
+
+fn turn_lights_off(world: &mut World, other: &mut Other) -> bool {
+    let first = world.lights().first().copied();
+    first.map(|first| switch_off(&mut other.worlds[0], first)).is_some()
+}
+
+/// Every relation with a fault that breaks it.
+pub fn plants() -> Vec<Plant> {
+    let plant = |name, relation, spoil| Plant { name, relation, spoil };
+    let hiding = |relation| plant("lights hide themselves", relation, hide);
+    vec![
+        hiding(Relation::Moved),
+        hiding(Relation::Turned),
+        hiding(Relation::Subdivided),
+        hiding(Relation::FarThing),
+        hiding(Relation::Method(caustique::render::Method::Bdpt)),
+        plant("lamps do not grow with the scene", Relation::Scaled, keep_intensity),
+        plant("the largest copy is lost", Relation::Copied, lose_a_thing),
+        plant("the first light is lost", Relation::Reordered, turn_lights_off),
+        plant("lights hide each other", Relation::LightsSplit, hide),
+        plant("a light is lost", Relation::SumOfLights, lose_a_light),
+        plant("light does not double", Relation::Doubled, double_less),
+        plant("channels stay", Relation::Permuted, forget_channels),
+        plant("glass is glued to the floor", Relation::Lifted, glue),
+        plant("the window shows more", Relation::Cropped, widen),
+        plant("a mirror is forgotten", Relation::MirroredTwice, forget_a_mirror),
+    ]
+}
+
+/// A fault in a scene whose picture is known.
+pub fn spoil(form: Form, known: &mut Known) {
+    match form {
+        Form::Glowing | Form::Punctual | Form::Bounce => known.world = lights_hide_themselves(&known.world),
+        Form::Absorbing | Form::Pane => {
+            for medium in known.world.materials.iter_mut().filter_map(|matter| matter.medium.as_mut()) {
+                medium.sigma_a *= 0.7;
+            }
+        }
+        Form::Furnace => {
+            for matter in &mut known.world.materials {
+                matter.base = DVec3::splat(0.7);
+            }
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! Relations that must hold whatever a scene is, and planted faults that must break them.
+
+use super::picture::{CONFIRMING, Difference, MEANS, SEEDS, SIGNIFICANCE, Set, Shot, TOLERANCE, differences, pictures};
+use super::random::Random;
+use super::shapes::cuboid;
+use super::world::{Light, LightKind, Matter, Mesh, Placement, ThingKind, World};
+use caustique::render::Method;
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// A relation between the pictures of a scene and of what is made of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Relation {
+    /// The whole scene moved.
+    Moved,
+    /// The whole scene turned.
+    Turned,
+    /// The whole scene larger or smaller.
+    Scaled,
+    /// Every triangle as four.
+    Subdivided,
+    /// Every copy a mesh of its own, in place, without nodes above it.
+    Copied,
+    /// Triangles, nodes and lights in another order.
+    Reordered,
+    /// Every light as two.
+    LightsSplit,
+    /// The sum of pictures with one light each; lamps that are off stay as black bodies.
+    SumOfLights,
+    /// Twice the light.
+    Doubled,
+    /// Colour channels exchanged.
+    Permuted,
+    /// What stands on something opaque lifted by 10^-4 of its size.
+    Lifted,
+    /// A window of the picture.
+    Cropped,
+    /// Every mesh mirrored in its file and on its node.
+    MirroredTwice,
+    /// A small black thing far away.
+    FarThing,
+    /// Another method.
+    Method(Method),
+}
+
+/// Relations of one method.
+pub const RELATIONS: [Relation; 14] = [
+    Relation::Moved,
+    Relation::Turned,
+    Relation::Scaled,
+    Relation::Subdivided,
+    Relation::Copied,
+    Relation::Reordered,
+    Relation::LightsSplit,
+    Relation::SumOfLights,
+    Relation::Doubled,
+    Relation::Permuted,
+    Relation::Lifted,
+    Relation::Cropped,
+    Relation::MirroredTwice,
+    Relation::FarThing,
+];
+
+/// What is compared with the pictures of a scene.
+pub struct Other {
+    /// Scenes whose pictures are added.
+    pub worlds: Vec<World>,
+    pub shot: Shot,
+    /// By what the pictures are divided.
+    pub factor: f64,
+    /// Channel of the pictures that is compared with each of the scene's.
+    pub channels: [usize; 3],
+    pub tolerance: f64,
+}
+
+impl Relation {
+    /// What is compared with the scene; `None` where the relation says nothing about it.
+    pub fn other(self, world: &World, shot: &Shot) -> Option<Other> {
+        let mut random = Random::new(world.seed ^ 0x5eed);
+        let identity = [0, 1, 2];
+        let one = |made: World| Other {
+            worlds: vec![made],
+            shot: shot.clone(),
+            factor: 1.0,
+            channels: identity,
+            tolerance: TOLERANCE,
+        };
+        Some(match self {
+            Relation::Moved => one(similar(world, 1.0, DQuat::IDENTITY, random.vector(-3.0, 3.0) * world.size)),
+            Relation::Turned => one(similar(world, 1.0, random.turn(), DVec3::ZERO)),
+            Relation::Scaled => one(similar(world, random.scale(1e-2, 1e2), DQuat::IDENTITY, DVec3::ZERO)),
+            Relation::Subdivided => one(subdivided(world)),
+            Relation::Copied => one(copied(world)),
+            Relation::Reordered => one(reordered(world, &mut random)),
+            Relation::LightsSplit => one(split(world)?),
+            Relation::SumOfLights => {
+                let worlds = single_lights(world);
+                if worlds.len() < 2 {
+                    return None;
+                }
+                Other { worlds, ..one(world.clone()) }
+            }
+            Relation::Doubled => Other { factor: 2.0, ..one(brighter(world, DVec3::splat(2.0))) },
+            Relation::Permuted => Other { channels: [2, 0, 1], ..one(permuted(world)) },
+            Relation::Lifted => one(lifted(world, 1e-4)?),
+            Relation::Cropped => {
+                Other { shot: Shot { window: Some([1, 1, 2, 3]), ..shot.clone() }, ..one(world.clone()) }
+            }
+            Relation::MirroredTwice => one(mirrored(world)),
+            Relation::FarThing => one(with_far_thing(world)?),
+            Relation::Method(method) => Other {
+                shot: Shot { method, ..shot.clone() },
+                tolerance: bias(shot.method).max(bias(method)),
+                ..one(world.clone())
+            },
+        })
+    }
+}
+
+/// Relative bias that a method's tiles may have at the effort of these tests: kernels blur.
+fn bias(method: Method) -> f64 {
+    match method {
+        Method::Path | Method::Bdpt | Method::Light | Method::Mlt => TOLERANCE,
+        Method::Vcm => 0.06,
+        _ => 0.25,
+    }
+}
+
+/// A relation that does not hold.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Broken {
+    pub relation: Relation,
+    pub method: Method,
+    pub camera: String,
+    /// What is confirmed by the second set, or what went wrong.
+    pub differences: Vec<Difference>,
+    pub error: Option<String>,
+}
+
+impl std::fmt::Display for Broken {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:?} by {}, {}:", self.relation, self.method.name(), self.camera)?;
+        self.error.iter().try_for_each(|error| write!(f, " {error}"))?;
+        self.differences.iter().take(4).try_for_each(|difference| write!(f, "\n    {difference}"))
+    }
+}
+
+/// Compares a scene with what a relation says must look alike. A difference counts when sets of four times as many
+/// other seeds show it again.
+pub fn check(world: &World, relation: Relation, shot: &Shot) -> Option<Broken> {
+    let other = relation.other(world, shot)?;
+    compare(world, &other, shot).unwrap_or_else(|error| Some((vec![], Some(error)))).map(|(differences, error)| {
+        Broken { relation, method: shot.method, camera: shot.camera.clone(), differences, error }
+    })
+}
+
+type Outcome = Option<(Vec<Difference>, Option<String>)>;
+
+/// # Errors
+/// One of the scenes is not taken.
+pub fn compare(world: &World, other: &Other, shot: &Shot) -> Result<Outcome, String> {
+    let found = |seeds: std::ops::Range<u64>| -> Result<Vec<Difference>, String> {
+        let a = pictures(world, shot, seeds.clone())?;
+        Ok(differences(&a, &others(other, seeds)?, other.tolerance, SIGNIFICANCE))
+    };
+    let first = found(0..SEEDS)?;
+    if first.is_empty() {
+        return Ok(None);
+    }
+    let mut again = found(SEEDS..SEEDS * (1 + CONFIRMING))?;
+    again.retain(|difference| first.iter().any(|other| other.index == difference.index));
+    Ok((!again.is_empty()).then_some((again, None)))
+}
+
+/// Seeds of the other scenes start here.
+const OTHER_SEEDS: u64 = 1 << 20;
+
+fn others(other: &Other, seeds: std::ops::Range<u64>) -> Result<Set, String> {
+    let mut sum: Set = vec![vec![0.0; MEANS]; (seeds.end - seeds.start) as usize];
+    for (index, world) in (1..).zip(&other.worlds) {
+        let first = index * OTHER_SEEDS;
+        let set = pictures(world, &other.shot, first + seeds.start..first + seeds.end)?;
+        for (total, means) in sum.iter_mut().zip(&set) {
+            for (at, total) in total.iter_mut().enumerate() {
+                *total += means[at - at % 3 + other.channels[at % 3]] / other.factor;
+            }
+        }
+    }
+    Ok(sum)
+}
+
+/// The scene scaled, then turned, then moved; it looks the same.
+pub fn similar(world: &World, scale: f64, rotation: DQuat, translation: DVec3) -> World {
+    let mut made = world.clone();
+    let parent = Placement { translation, rotation, scale: DVec3::splat(scale) };
+    made.size *= scale;
+    made.fog = made.fog.map(|fog| fog.scaled(scale));
+    for matter in &mut made.materials {
+        matter.medium = matter.medium.map(|medium| medium.scaled(scale));
+    }
+    for thing in &mut made.things {
+        thing.chain.insert(0, parent);
+        match &mut thing.kind {
+            ThingKind::Mesh { .. } => {}
+            ThingKind::Light(light) => match &mut light.kind {
+                LightKind::Point { radius } | LightKind::Spot { radius, .. } => {
+                    *radius *= scale;
+                    light.color *= scale * scale;
+                }
+                LightKind::Sun { .. } => {}
+            },
+            ThingKind::Camera(lens) => {
+                lens.aperture *= scale;
+                lens.focus *= scale;
+                lens.view *= if lens.orthographic { scale } else { 1.0 };
+            }
+        }
+    }
+    made
+}
+
+fn subdivided(world: &World) -> World {
+    let mut made = world.clone();
+    for mesh in &mut made.meshes {
+        let source = std::mem::take(mesh);
+        mesh.positions.clone_from(&source.positions);
+        mesh.normals.clone_from(&source.normals);
+        mesh.uvs.clone_from(&source.uvs);
+        for &[a, b, c] in &source.triangles {
+            let mut middle = |i: u32, j: u32| {
+                let (i, j) = (i as usize, j as usize);
+                // As a file holds them, so that neighbours get the same vertex.
+                let p = 0.5 * (source.positions[i] + source.positions[j]);
+                mesh.positions.push(p);
+                if !source.normals.is_empty() {
+                    mesh.normals.push((source.normals[i] + source.normals[j]).normalize());
+                }
+                if !source.uvs.is_empty() {
+                    mesh.uvs.push(0.5 * (source.uvs[i] + source.uvs[j]));
+                }
+                mesh.positions.len() as u32 - 1
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            mesh.triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+    }
+    made
+}
+
+fn copied(world: &World) -> World {
+    let mut made = World { meshes: vec![], ..world.clone() };
+    for thing in &mut made.things {
+        let to_world = thing.to_world();
+        if let ThingKind::Mesh { mesh, .. } = &mut thing.kind {
+            made.meshes.push(world.meshes[*mesh].transformed(&to_world));
+            *mesh = made.meshes.len() - 1;
+            thing.chain.clear();
+        }
+    }
+    made
+}
+
+fn reordered(world: &World, random: &mut Random) -> World {
+    let mut made = world.clone();
+    random.shuffle(&mut made.things);
+    for mesh in &mut made.meshes {
+        random.shuffle(&mut mesh.triangles);
+        for triangle in &mut mesh.triangles {
+            triangle.rotate_left(random.below(3));
+        }
+    }
+    made
+}
+
+/// Every light as two: a share of the intensity each, or a part of the triangles. Solids of glass stay whole.
+fn split(world: &World) -> Option<World> {
+    let mut made = world.clone();
+    let mut any = false;
+    for index in world.lights() {
+        let mut second = world.things[index].clone();
+        second.name += " too";
+        match &mut second.kind {
+            ThingKind::Light(light) => {
+                // A sphere would hide the other.
+                if matches!(light.kind, LightKind::Point { radius } if radius > 0.0) {
+                    continue;
+                }
+                light.color *= 0.3;
+                if let ThingKind::Light(first) = &mut made.things[index].kind {
+                    first.color *= 0.7;
+                }
+            }
+            ThingKind::Mesh { mesh, material } => {
+                let whole = &world.meshes[*mesh];
+                if world.materials[*material].is_glass() || whole.triangles.len() < 2 {
+                    continue;
+                }
+                made.meshes.push(whole.part(|i| i % 3 == 0));
+                made.meshes.push(whole.part(|i| i % 3 != 0));
+                *mesh = made.meshes.len() - 1;
+                made.things[index].kind = ThingKind::Mesh { mesh: *mesh - 1, material: *material };
+            }
+            ThingKind::Camera(_) => continue,
+        }
+        made.things.push(second);
+        any = true;
+    }
+    any.then_some(made)
+}
+
+/// Scenes with one of the lights each.
+fn single_lights(world: &World) -> Vec<World> {
+    let lights = world.lights();
+    let dark = {
+        let mut dark = World { sky: None, ..world.clone() };
+        lights.iter().for_each(|&index| switch_off(&mut dark, index));
+        dark
+    };
+    let mut worlds: Vec<World> = lights
+        .iter()
+        .map(|&index| {
+            let mut made = dark.clone();
+            made.things[index].kind = world.things[index].kind;
+            made
+        })
+        .collect();
+    if world.sky.is_some() {
+        worlds.push(World { sky: world.sky, ..dark });
+    }
+    worlds
+}
+
+/// Turns a light off; its body stays.
+pub fn switch_off(world: &mut World, index: usize) {
+    match world.things[index].kind {
+        ThingKind::Mesh { mesh, material } => {
+            let off = Matter { emission: DVec3::ZERO, ..world.materials[material].clone() };
+            world.materials.push(off);
+            world.things[index].kind = ThingKind::Mesh { mesh, material: world.materials.len() - 1 };
+        }
+        ThingKind::Light(light) => {
+            world.things[index].kind = ThingKind::Light(Light { color: DVec3::ZERO, ..light });
+        }
+        ThingKind::Camera(_) => {}
+    }
+}
+
+/// All light times a factor for each channel.
+fn brighter(world: &World, factor: DVec3) -> World {
+    let mut made = world.clone();
+    made.sky = made.sky.map(|sky| sky * factor);
+    made.materials.iter_mut().for_each(|matter| matter.emission *= factor);
+    for thing in &mut made.things {
+        if let ThingKind::Light(light) = &mut thing.kind {
+            light.color *= factor;
+        }
+    }
+    made
+}
+
+/// Red becomes blue, green red, and blue green.
+fn permuted(world: &World) -> World {
+    let turn = |color: &mut DVec3| *color = DVec3::new(color.y, color.z, color.x);
+    let mut made = world.clone();
+    made.sky.iter_mut().for_each(turn);
+    let media = made.materials.iter_mut().filter_map(|matter| matter.medium.as_mut()).chain(made.fog.as_mut());
+    for medium in media {
+        turn(&mut medium.sigma_a);
+        turn(&mut medium.sigma_s);
+    }
+    for matter in &mut made.materials {
+        turn(&mut matter.base);
+        turn(&mut matter.emission);
+    }
+    for thing in &mut made.things {
+        if let ThingKind::Light(light) = &mut thing.kind {
+            turn(&mut light.color);
+        }
+    }
+    for texture in made.textures.iter_mut().filter(|texture| texture.color) {
+        texture.texels.iter_mut().for_each(|[r, g, b]| (*r, *g, *b) = (*g, *b, *r));
+    }
+    made
+}
+
+/// Bodies that stand on something, raised by a share of their size; sunk if it is negative. `None` without any.
+pub fn lifted(world: &World, share: f64) -> Option<World> {
+    let mut made = world.clone();
+    for thing in made.things.iter_mut().filter(|thing| thing.rests) {
+        // A liquid is raised as far as its vessel, which is larger.
+        let of_body = world.things.iter().filter(|other| other.body == thing.body);
+        let radius = of_body.map(|other| world.radius(other)).fold(0.0, f64::max);
+        // A thing's own vertical is its floor's.
+        let up = thing.to_world().transform_vector3(DVec3::Y);
+        thing.chain.push(Placement::at(DVec3::Y * share * 2.0 * radius / up.length()));
+    }
+    made.things.iter().any(|thing| thing.rests).then_some(made)
+}
+
+/// Every mesh mirrored, and mirrored back by its node.
+fn mirrored(world: &World) -> World {
+    let mut made = world.clone();
+    let mirror = Placement::scaled(DVec3::new(1.0, -1.0, 1.0));
+    made.meshes = world.meshes.iter().map(|mesh| mesh.transformed(&mirror.affine())).collect();
+    made.things.iter_mut().filter(|thing| thing.mesh().is_some()).for_each(|thing| thing.chain.push(mirror));
+    made
+}
+
+/// A small black box far away, where no light shines on it that could return. `None` under a sky or sun, whose photons
+/// it would thin out.
+fn with_far_thing(world: &World) -> Option<World> {
+    let from_infinity = |kind: &ThingKind| matches!(kind, ThingKind::Light(Light { kind: LightKind::Sun { .. }, .. }));
+    if world.sky.is_some() || world.fog.is_some() || world.things.iter().any(|thing| from_infinity(&thing.kind)) {
+        return None;
+    }
+    let mut made = world.clone();
+    let mesh: Mesh = cuboid(DVec3::splat(-0.01), DVec3::splat(0.01), false);
+    let place = Placement { translation: DVec3::new(20.0, 17.0, -25.0) * world.size, ..Placement::IDENTITY };
+    let place = Placement { scale: DVec3::splat(world.size), ..place };
+    made.add("far", mesh, Matter::matte(DVec3::ZERO), vec![place]);
+    Some(made)
+}

@@ -1,0 +1,310 @@
+//! A scene as plain data, which transformations change before it is written as glTF.
+
+use glam::{DAffine3, DQuat, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Everything in a scene.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct World {
+    /// Seed it was generated from.
+    pub seed: u64,
+    /// Length of the room's longest side (m).
+    pub size: f64,
+    /// What stands in it; each becomes a chain of nodes.
+    pub things: Vec<Thing>,
+    /// Meshes; several things may share one.
+    pub meshes: Vec<Mesh>,
+    /// Materials; several things may share one.
+    pub materials: Vec<Matter>,
+    /// Textures of materials.
+    pub textures: Vec<Texture>,
+    /// Radiance from everywhere.
+    pub sky: Option<DVec3>,
+    /// The medium that fills the scene.
+    pub fog: Option<Medium>,
+}
+
+/// Something with a place.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Thing {
+    /// Name of its node.
+    pub name: String,
+    /// Nested nodes from the root to itself.
+    pub chain: Vec<Placement>,
+    /// What it is.
+    pub kind: ThingKind,
+    /// Things of one rigid body, which are lifted together: a vessel and what it holds.
+    pub body: u32,
+    /// Its body stands on something opaque.
+    pub rests: bool,
+}
+
+/// What a thing is.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub enum ThingKind {
+    /// A mesh with a material, by index.
+    Mesh { mesh: usize, material: usize },
+    /// A punctual light.
+    Light(Light),
+    /// A camera.
+    Camera(Lens),
+}
+
+/// A node's transform.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Placement {
+    pub translation: DVec3,
+    pub rotation: DQuat,
+    pub scale: DVec3,
+}
+
+/// A point, spot or directional light.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Light {
+    pub kind: LightKind,
+    /// Radiant intensity, or irradiance of a sun.
+    pub color: DVec3,
+}
+
+/// Kind of a punctual light.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum LightKind {
+    /// A point, or a sphere of that radius.
+    Point { radius: f64 },
+    /// A cone with half angles of full and no intensity.
+    Spot { inner: f64, outer: f64, radius: f64 },
+    /// From infinity, angle of its disc in degrees.
+    Sun { angle: f64 },
+}
+
+/// A camera, square, along -Z of its node.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Lens {
+    /// Field of view (radians), or half the width of an orthographic picture (m).
+    pub view: f64,
+    pub orthographic: bool,
+    pub aperture: f64,
+    pub focus: f64,
+}
+
+/// Triangles.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Mesh {
+    pub positions: Vec<DVec3>,
+    /// As many as positions, or none: flat.
+    pub normals: Vec<DVec3>,
+    /// As many as positions.
+    pub uvs: Vec<DVec2>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// A homogeneous medium (1/m).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Medium {
+    pub sigma_a: DVec3,
+    pub sigma_s: DVec3,
+    pub g: f64,
+}
+
+/// A material.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Matter {
+    pub base: DVec3,
+    pub metallic: f64,
+    pub roughness: f64,
+    /// Factor of the reflection of a dielectric; 0 is purely diffuse.
+    pub specular: f64,
+    pub transmission: f64,
+    /// Transmitting walls bound a solid.
+    pub solid: bool,
+    pub ior: f64,
+    pub emission: DVec3,
+    pub medium: Option<Medium>,
+    pub priority: i32,
+    /// Texture of the base colour.
+    pub texture: Option<usize>,
+    /// Strength of a normal map, and its texture.
+    pub bumps: Option<(f64, usize)>,
+    pub clearcoat: f64,
+}
+
+/// Texels of 8 bits, row by row.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Texture {
+    pub width: u32,
+    pub texels: Vec<[u8; 3]>,
+    /// Encoded colours, whose channels can be exchanged; directions otherwise.
+    pub color: bool,
+}
+
+impl Default for Matter {
+    fn default() -> Self {
+        Matter {
+            base: DVec3::splat(0.5),
+            metallic: 0.0,
+            roughness: 1.0,
+            specular: 0.0,
+            transmission: 0.0,
+            solid: true,
+            ior: 1.5,
+            emission: DVec3::ZERO,
+            medium: None,
+            priority: 0,
+            texture: None,
+            bumps: None,
+            clearcoat: 0.0,
+        }
+    }
+}
+
+impl Matter {
+    /// A purely diffuse material.
+    pub fn matte(base: DVec3) -> Matter {
+        Matter { base, ..Matter::default() }
+    }
+
+    /// A black surface that emits.
+    pub fn glowing(emission: DVec3) -> Matter {
+        Matter { base: DVec3::ZERO, emission, ..Matter::default() }
+    }
+
+    /// Solid glass.
+    pub fn glass(ior: f64, roughness: f64) -> Matter {
+        Matter { base: DVec3::ONE, roughness, specular: 1.0, transmission: 1.0, ior, ..Matter::default() }
+    }
+
+    pub fn is_glass(&self) -> bool {
+        self.transmission > 0.0
+    }
+
+    pub fn glows(&self) -> bool {
+        self.emission.max_element() > 0.0
+    }
+}
+
+impl Medium {
+    /// In a scene that is `scale` times as large, the same picture.
+    pub fn scaled(self, scale: f64) -> Medium {
+        Medium { sigma_a: self.sigma_a / scale, sigma_s: self.sigma_s / scale, ..self }
+    }
+}
+
+impl Placement {
+    pub const IDENTITY: Placement =
+        Placement { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
+
+    pub fn at(translation: DVec3) -> Placement {
+        Placement { translation, ..Placement::IDENTITY }
+    }
+
+    pub fn turned(rotation: DQuat) -> Placement {
+        Placement { rotation, ..Placement::IDENTITY }
+    }
+
+    pub fn scaled(scale: DVec3) -> Placement {
+        Placement { scale, ..Placement::IDENTITY }
+    }
+
+    pub fn affine(&self) -> DAffine3 {
+        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+}
+
+impl Thing {
+    /// Local to world.
+    pub fn to_world(&self) -> DAffine3 {
+        self.chain.iter().fold(DAffine3::IDENTITY, |to_world, placement| to_world * placement.affine())
+    }
+
+    pub fn mesh(&self) -> Option<(usize, usize)> {
+        match self.kind {
+            ThingKind::Mesh { mesh, material } => Some((mesh, material)),
+            _ => None,
+        }
+    }
+
+    pub fn is_camera(&self) -> bool {
+        matches!(self.kind, ThingKind::Camera(_))
+    }
+}
+
+impl Mesh {
+    /// The same with its vertices moved; a mirroring transform also turns its triangles over.
+    pub fn transformed(&self, by: &DAffine3) -> Mesh {
+        let mirrored = by.matrix3.determinant() < 0.0;
+        let of_normals = by.matrix3.inverse().transpose();
+        Mesh {
+            positions: self.positions.iter().map(|p| by.transform_point3(*p)).collect(),
+            normals: self.normals.iter().map(|n| (of_normals * *n).normalize()).collect(),
+            uvs: self.uvs.clone(),
+            triangles: self.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }).collect(),
+        }
+    }
+
+    /// A part of the triangles.
+    pub fn part(&self, keep: impl Fn(usize) -> bool) -> Mesh {
+        let triangles = self.triangles.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, t)| *t).collect();
+        Mesh { triangles, ..self.clone() }
+    }
+}
+
+impl World {
+    /// Adds a mesh with a material.
+    pub fn add(&mut self, name: &str, mesh: Mesh, matter: Matter, chain: Vec<Placement>) -> &mut Thing {
+        let kind = ThingKind::Mesh { mesh: self.meshes.len(), material: self.materials.len() };
+        self.meshes.push(mesh);
+        self.materials.push(matter);
+        self.add_kind(name, kind, chain)
+    }
+
+    /// Adds whatever it is.
+    pub fn add_kind(&mut self, name: &str, kind: ThingKind, chain: Vec<Placement>) -> &mut Thing {
+        let index = self.things.len();
+        let body = self.things.iter().map(|thing| thing.body + 1).max().unwrap_or(0);
+        self.things.push(Thing { name: format!("{name} {index}"), chain, kind, body, rests: false });
+        &mut self.things[index]
+    }
+
+    /// Adds a camera that looks from `eye` to `target`.
+    pub fn look(&mut self, eye: DVec3, target: DVec3, lens: Lens) {
+        let back = (eye - target).normalize();
+        let up = if back.y.abs() > 0.99 { DVec3::Z } else { DVec3::Y };
+        let right = up.cross(back).normalize();
+        let rotation = DQuat::from_mat3(&glam::DMat3::from_cols(right, back.cross(right), back));
+        self.add_kind(
+            "camera",
+            ThingKind::Camera(lens),
+            vec![Placement { translation: eye, rotation, ..Placement::IDENTITY }],
+        );
+    }
+
+    /// The material of a thing.
+    pub fn matter(&self, thing: &Thing) -> Option<&Matter> {
+        thing.mesh().map(|(_, material)| &self.materials[material])
+    }
+
+    /// Names of cameras.
+    pub fn cameras(&self) -> Vec<&str> {
+        self.things.iter().filter(|thing| thing.is_camera()).map(|thing| thing.name.as_str()).collect()
+    }
+
+    /// Radius of a thing's mesh about its middle in the world, 0 for what has none.
+    pub fn radius(&self, thing: &Thing) -> f64 {
+        let Some((mesh, _)) = thing.mesh() else { return 0.0 };
+        let to_world = thing.to_world();
+        let points = self.meshes[mesh].positions.iter().map(|p| to_world.transform_point3(*p));
+        let (low, high) =
+            points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        0.5 * (high - low).length()
+    }
+
+    /// Things that give light.
+    pub fn lights(&self) -> Vec<usize> {
+        let shines = |thing: &Thing| match thing.kind {
+            ThingKind::Mesh { .. } => self.matter(thing).is_some_and(Matter::glows),
+            ThingKind::Light(_) => true,
+            ThingKind::Camera(_) => false,
+        };
+        (0..self.things.len()).filter(|i| shines(&self.things[*i])).collect()
+    }
+}
