@@ -153,7 +153,7 @@ impl Integers {
 }
 
 fn roughness(gloss: u8, factor: f32) -> Vec4 {
-    Vec4::new(0.0, 1.0 - factor * f32::from(gloss) / 255.0, 1.0, 1.0)
+    Vec4::new(0.0, (255.0 - factor * f32::from(gloss)) / 255.0, 1.0, 1.0)
 }
 
 impl Texels {

@@ -71,8 +71,9 @@ fn expected(image: &DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
         }
         (Encoding::Linear, false) => image.to_rgba8().pixels().map(|p| p.0.map(alpha)).collect(),
         (Encoding::Linear, true) => image.to_rgba32f().pixels().map(|p| p.0).collect(),
-        (Encoding::Glossiness, _) => {
-            image.to_rgba8().pixels().map(|p| [0.0, f32::from(255 - p[3]) / 255.0, 1.0, 1.0]).collect()
+        (Encoding::Glossiness(factor), _) => {
+            let roughness = |gloss: u8| (255.0 - factor * f32::from(gloss)) / 255.0;
+            image.to_rgba8().pixels().map(|p| [0.0, roughness(p[3]), 1.0, 1.0]).collect()
         }
     }
 }
@@ -94,7 +95,7 @@ fn texels_are_exact_and_shared() {
             Integers::Words(data) => 2 * data.len(),
         };
         assert_eq!(bytes, image.as_bytes().len());
-        for encoding in [Encoding::Srgb, Encoding::Linear, Encoding::Glossiness] {
+        for encoding in [Encoding::Srgb, Encoding::Linear, Encoding::Glossiness(1.0), Encoding::Glossiness(0.3)] {
             let texels = Texels::Integers { data: Arc::clone(&color.0), channels: color.1, encoding };
             for (i, expected) in expected(&image, encoding).into_iter().enumerate() {
                 assert_eq!(
