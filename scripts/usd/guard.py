@@ -39,7 +39,9 @@ def guarded(work, folder, seconds, memory):
                         "use a simpler stage, or a machine with more memory")
         return code
     if events:
-        shutil.rmtree(folder, ignore_errors=True)
+        # Nothing but the folder that the program has made for this conversion.
+        if os.path.basename(folder).startswith("caustique-usd-"):
+            shutil.rmtree(folder, ignore_errors=True)
         return 1
     raise Fault("", f"the conversion takes longer than {seconds} s",
                 "use a simpler stage, or set CAUSTIQUE_USD_SECONDS to more")

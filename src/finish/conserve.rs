@@ -169,7 +169,7 @@ mod tests {
     fn one_bright_sample_is_let_go() {
         let mut estimate = rare(1e-9, 1, 1.0);
         (estimate.mean[777], estimate.deviation[777]) = ([1000.0; 3], [1000.0; 3]);
-        let exact = |index: usize| index % 5 == 0;
+        let exact = |index: usize| index.is_multiple_of(5);
         (0..SIZE.pixels()).filter(|i| exact(*i)).for_each(|i| estimate.deviation[i] = [0.0; 3]);
         let [within, whole] = finished(&estimate, 0.1);
         let brightest = whole.iter().map(|rgb| rgb[0]).fold(0.0, f32::max);

@@ -6,25 +6,19 @@ use super::bound::spread;
 use super::statistical;
 use crate::error::{Error, Kind, Result};
 use crate::installed;
-use crate::memory;
 use caustique_oidn as oidn;
 
 pub use oidn::Quality;
 
 /// Bytes that Open Image Denoise works in, for a pixel of a picture that it takes in one piece.
 const SCRATCH: u64 = 700;
-/// The least and the most memory that it is given to work in (MiB): in tiles where a picture needs more.
-const MEMORY_MIB: [u64; 2] = [448, 3000];
+/// The memory that it is given to work in (MiB): it takes a picture that needs more in tiles. Tiles leave other rounding,
+/// so this does not depend on the machine.
+const MEMORY_MIB: u32 = 1024;
 
-/// Bytes that the denoiser works in at least, for a picture of so many pixels.
-pub fn least_scratch(pixels: u64) -> u64 {
-    (SCRATCH * pixels).min(MEMORY_MIB[0] << 20)
-}
-
-/// The memory to work in (MiB) that is left beside `kept` bytes which are still to be taken.
-fn scratch_mib(kept: u64) -> u32 {
-    let left = memory::available().map_or(u64::MAX, |left| left.bytes).saturating_sub(kept);
-    (left >> 20).clamp(MEMORY_MIB[0], MEMORY_MIB[1]) as u32
+/// Bytes that the denoiser works in, for a picture of `pixels` pixels.
+pub fn scratch(pixels: u64) -> u64 {
+    (SCRATCH * pixels).min(u64::from(MEMORY_MIB) << 20)
 }
 
 /// `--denoise`.
@@ -49,9 +43,6 @@ pub enum Denoiser {
         filter: oidn::Filter,
         /// Version of the library.
         version: String,
-        /// Memory to work in (MiB), known once a picture of this many pixels has been denoised: tiles leave other
-        /// rounding, so it does not change between pictures of one size.
-        memory_mib: Option<(usize, u32)>,
     },
     /// [`statistical`].
     Own,
@@ -96,11 +87,7 @@ impl Denoiser {
                 let spread = spread(estimate);
                 Ok(statistical::denoise(&statistical::Input { mean, spread: &spread, albedo, normal, size: *size }))
             }
-            Denoiser::Oidn { filter, memory_mib, .. } => {
-                let pixels = size.pixels();
-                let known = memory_mib.filter(|(of, _)| *of == pixels).map(|(_, mib)| mib);
-                let most = known.unwrap_or_else(|| scratch_mib(super::BYTES_PER_PIXEL * pixels as u64));
-                *memory_mib = Some((pixels, most));
+            Denoiser::Oidn { filter, .. } => {
                 let finite: Vec<[f32; 3]> = mean
                     .iter()
                     .map(|rgb| rgb.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 }))
@@ -111,7 +98,7 @@ impl Denoiser {
                 input.albedo = albedo;
                 input.normal = normal.filter(|_| albedo.is_some());
                 (input.hdr, input.clean_aux) = (true, albedo.is_some());
-                (input.quality, input.max_memory_mib) = (quality, Some(most));
+                (input.quality, input.max_memory_mib) = (quality, Some(MEMORY_MIB));
                 filter.denoise(&input).map_err(|error| Error::new(Kind::Library, "Open Image Denoise", error))
             }
         }
@@ -142,5 +129,5 @@ fn oidn() -> Result<Denoiser> {
     let library = library().map_err(refuse)?;
     let device = oidn::Device::new(&library, rayon::current_num_threads()).map_err(refuse)?;
     let filter = device.filter().map_err(refuse)?;
-    Ok(Denoiser::Oidn { filter, version: library.version().to_string(), memory_mib: None })
+    Ok(Denoiser::Oidn { filter, version: library.version().to_string() })
 }

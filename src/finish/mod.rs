@@ -20,7 +20,7 @@ pub mod told;
 mod verdict;
 mod window;
 
-pub use denoiser::{Denoiser, DenoiserChoice, Quality, least_scratch};
+pub use denoiser::{Denoiser, DenoiserChoice, Quality, scratch};
 pub use verdict::{Errors, USUAL, Verdict};
 pub use window::{Size, Windows, window};
 

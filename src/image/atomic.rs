@@ -78,11 +78,29 @@ pub(crate) fn failure(path: &Path, cause: &io::Error) -> Error {
     }
 }
 
+/// Whether two names are of one file, whichever way they are written.
+#[cfg(unix)]
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let file = |path: &Path| fs::metadata(path).ok().map(|data| (data.dev(), data.ino()));
+    one == other || file(one).is_some_and(|one| Some(one) == file(other))
+}
+
+/// Whether two names are of one file.
+#[cfg(not(unix))]
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    one == other
+}
+
 /// Where the bytes go: links followed, so that a link stays a link, also one to a file that is not there yet.
 fn resolve(path: &Path) -> Result<PathBuf> {
     let error = |cause: &str| Error::new(Kind::Io, path.display(), cause);
     if path.file_name().is_none() || path.is_dir() {
         return Err(error("is a folder").hint("name a file in it"));
+    }
+    // A pipe or a device has no name beside which a file could be made.
+    if is_device(path) {
+        return Ok(path.to_owned());
     }
     let mut target = path.to_owned();
     let mut links = 0;
@@ -189,6 +207,16 @@ fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A pipe keeps its name, by which it is opened, also where that is a link of the kernel's that leads nowhere.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn pipes_are_written_to() {
+        use std::os::fd::AsRawFd;
+        let (_reader, writer) = std::io::pipe().expect("a pipe");
+        let path = PathBuf::from(format!("/proc/self/fd/{}", writer.as_raw_fd()));
+        assert_eq!(resolve(&path).expect("it can be written to"), path);
+    }
 
     /// A link stays a link, wherever it leads; one that leads nowhere is no file to be written.
     #[cfg(unix)]

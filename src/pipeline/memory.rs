@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
 use crate::estimator::Pixel;
 use crate::estimator::rule::{adaptive, chi_squared, local};
-use crate::finish::{self, BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, least_scratch};
+use crate::finish::{self, BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
 use crate::memory;
 use crate::photon;
 use crate::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
@@ -70,7 +70,7 @@ fn finish_bytes((width, height): (u32, u32), groups: usize) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
     // Parts by effect, and those of light groups and their caustics.
     let parts = (finish::PARTS.len() + 2 * groups) as u64;
-    FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + least_scratch(pixels)
+    FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
 }
 
 /// Fewer light paths than this make no picture: a cap below is refused.

@@ -39,6 +39,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Selection, output as film};
 use crate::finish::{Finish, finished_part, reads_for_picture};
+use crate::image::atomic::is_same_file;
 use crate::image::exr;
 use crate::plan::{Plan, Switches};
 use crate::render::auto::{self, Choice};
@@ -243,8 +244,8 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         plan: told,
         finished: false,
     };
-    let mut saver =
-        saving.map(|saving| Saver::new(saving, head.clone(), order.resume.as_deref() == Some(&*saving.path)));
+    let goes_on = |saving: &Saving| order.resume.as_deref().is_some_and(|resume| is_same_file(resume, &saving.path));
+    let mut saver = saving.map(|saving| Saver::new(saving, head.clone(), goes_on(saving)));
     let mut judging = None;
     let stop = drive(&mut session, |progress, session| {
         let accuracy = match judge::judge(session, ready.as_mut(), target) {

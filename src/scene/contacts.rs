@@ -125,7 +125,7 @@ impl Contacts {
             |instance: u32| shapes.meshes[shapes.instances[instance as usize].mesh as usize].triangles.len();
         let passed: usize = passing.iter().map(|&instance| triangles(instance)).sum();
         if shapes.triangles() > MOST || passed > MOST_PASSED {
-            return Contacts { unknown: true, sheets: true, ..Contacts::default() };
+            return Contacts { unknown: true, ..Contacts::default() };
         }
         let triangle = |instance: u32, primitive: u32| {
             let placed = &shapes.instances[instance as usize];
@@ -184,10 +184,10 @@ impl Contacts {
         Contacts { reach: all, unknown: false, sheets, thin: walls.into_iter().collect() }
     }
 
-    /// No triangle lies on another.
+    /// No triangle is known to lie on another.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
-        self.reach.is_empty() && !self.unknown
+        self.reach.is_empty()
     }
 
     /// How far apart (metres) surfaces may be that lie on a triangle, whose own positions may be off by `error`; `None`

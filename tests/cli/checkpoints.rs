@@ -129,6 +129,10 @@ fn the_state_of_a_stopped_render_is_not_replaced() {
     // It is not in the way of others, and goes where it is to go.
     assert_eq!(folder.run(&format!("{render} --iterations 2 --no-checkpoint")).code, Some(0));
     assert!(bytes(&folder, "a.exr.checkpoint") == saved);
+    // A render goes on from it by whatever name.
+    let (_, done) = state_of(&folder, "a.exr.checkpoint");
+    let resumed = folder.run(&format!("{render} --iterations {} --resume ./a.exr.checkpoint", done + 1));
+    assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
     let anew = folder.run(&format!("{render} --iterations 2 --overwrite --checkpoint a.exr.checkpoint"));
     assert_eq!(anew.code, Some(0), "{}", anew.stderr);
     // That of a render that was done is its last state, which another may replace.

@@ -244,6 +244,8 @@ fn inputs_are_not_overwritten() {
     assert_eq!(folder.run("merge 1.exr 2.exr -o both.exr").code, Some(0));
     let sky = folder.run("render scene.glb -o 1.exr --env 1.exr");
     assert_eq!((sky.code, folder.read("1.exr").1["seed"].clone()), (Some(2), 1.into()), "{}", sky.stderr);
+    let preview = folder.run("render scene.glb -o out.exr --env 1.exr --preview ./1.exr");
+    assert_eq!((preview.code, folder.read("1.exr").1["seed"].clone()), (Some(2), 1.into()), "{}", preview.stderr);
 }
 
 /// A shard whose sums are not those that its facts promise, its checks put right, is damaged, and ends no program.

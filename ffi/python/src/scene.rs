@@ -170,7 +170,9 @@ impl Scene {
         let saving = saving(&mut keywords)?;
         let resume: Option<PathBuf> = keywords.take("resume")?;
         let overwrite = keywords.take("overwrite")?.unwrap_or(false);
-        if let Some(Saving { path, .. }) = saving.as_ref().filter(|saving| resume.as_ref() != Some(&saving.path)) {
+        let goes_on =
+            |saving: &Saving| resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, &saving.path));
+        if let Some(Saving { path, .. }) = saving.as_ref().filter(|saving| !goes_on(saving)) {
             let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
             checkpoint::check_replaceable(path, overwrite, &remedy).map_err(raised)?;
         }

@@ -61,13 +61,23 @@ impl Claim {
                 Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(cause) => return Err(cause),
             }
+            // A link or a pipe is nobody's claim, and opening it may not end.
+            if fs::symlink_metadata(&path).is_ok_and(|data| !data.is_file()) {
+                return Err(io::Error::other(format!("{} is no file", path.display())));
+            }
             // Gone meanwhile: once more.
             let Some((holder, touched)) = read(&path)? else { continue };
             if !is_dead(&holder, age(&path, touched)?) {
                 let shown = holder.split('\n').next().unwrap_or_default();
                 return Ok(Claimed::Elsewhere(if shown.is_empty() { "another machine".into() } else { shown.into() }));
             }
-            remove(&path, touched)?;
+            match remove(&path, touched) {
+                // Another user's, in a folder that lets nobody else remove it.
+                Err(cause) if cause.kind() == io::ErrorKind::PermissionDenied => {
+                    return Ok(Claimed::Elsewhere("another user".into()));
+                }
+                removed => removed?,
+            }
         }
     }
 
@@ -139,7 +149,7 @@ fn is_dead(holder: &str, age: Duration) -> bool {
 /// it is still the claim that was read; where a file system has no locks, a frame may be rendered twice.
 fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
     let removed = || {
-        let file = File::options().read(true).write(true).open(path)?;
+        let file = File::open(path)?;
         let _ = file.lock();
         let [own, there] = [file.metadata()?, fs::metadata(path)?];
         let same = (own.dev(), own.ino(), own.modified()?) == (there.dev(), there.ino(), touched);
@@ -177,6 +187,15 @@ mod tests {
 
     fn make(path: &Path, owner: &str) -> Claimed {
         Claim::make(path.to_owned(), owner.into()).expect("the folder takes files")
+    }
+
+    /// A link that leads nowhere is no claim: an error, and no loop without an end.
+    #[test]
+    fn links_are_no_claims() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr.claim");
+        std::os::unix::fs::symlink("nowhere", &path).expect("a link");
+        assert!(Claim::make(path, owner()).is_err());
     }
 
     /// An owner that lives is not disturbed; one that is gone, or silent for long, is followed.

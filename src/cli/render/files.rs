@@ -2,6 +2,8 @@
 //! layer of USD that tells of it.
 
 use super::options::RenderArgs;
+use super::preview::Target;
+use crate::cli::scene::EnvironmentChoice;
 use crate::cli::{output, print_file};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
@@ -9,6 +11,7 @@ use caustique::image::exr::{self, Attributes};
 use caustique::image::{atomic, usd_layer};
 use caustique::pipeline::checkpoint;
 use caustique::pipeline::shard::Tail;
+use caustique::scene::gltf;
 use caustique::temporary;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -37,13 +40,40 @@ pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: O
     })
 }
 
-/// Writes the EXR before its picture is finished, for the case that the finish does not end. What fails now fails again
-/// when the finished picture is written.
-pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) {
-    if !output::is_stdout(&args.output) {
-        let options = args.picture.exr_options(args.exr_naming.into());
-        let _ = exr::write_followed(&args.output, set, attributes, options, |_| Ok(()));
+/// Writes the EXR before its picture is finished, for the case that the finish does not end, beside the output: whoever
+/// finds a file of that name has a finished picture. What fails now fails again when the finished picture is written.
+pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Option<PathBuf> {
+    let is_file = std::fs::metadata(&args.output).map_or(true, |data| data.is_file());
+    if output::is_stdout(&args.output) || !is_file {
+        return None;
     }
+    let path = args.output.with_extension("estimate.exr");
+    let options = args.picture.exr_options(args.exr_naming.into());
+    exr::write_followed(&path, set, attributes, options, |_| Ok(())).ok().map(|()| path)
+}
+
+/// Checks that no output would replace the scene, its environment, or a file that the scene names.
+///
+/// # Errors
+/// One would.
+pub fn check_inputs(args: &RenderArgs) -> Result<()> {
+    // A checkpoint replaces nothing but a checkpoint.
+    let written = args.files().filter(|(option, _)| !["--resume", "--checkpoint"].contains(option));
+    let outputs = written.map(|(_, path)| path.as_path());
+    let mut outputs =
+        outputs.chain(args.preview.as_ref().and_then(Target::file)).filter(|path| path.is_file()).peekable();
+    if outputs.peek().is_none() {
+        return Ok(());
+    }
+    let scene = &args.job.scene;
+    // A scene that cannot be read is an error of its own, and a pipe is read once.
+    let bytes = scene.path.is_file().then(|| std::fs::read(&scene.path).ok()).flatten().unwrap_or_default();
+    let mut inputs = gltf::files(&bytes, &scene.path, true);
+    inputs.push(scene.path.clone());
+    if let Some(EnvironmentChoice::File(sky)) = &scene.env {
+        inputs.push(sky.clone());
+    }
+    outputs.try_for_each(|path| output::check_inputs(path, inputs.iter().map(PathBuf::as_path)))
 }
 
 /// Checks that the state can be saved where it was asked for, and that no other render's is lost.
@@ -52,9 +82,8 @@ pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes
 /// See [`atomic::check_writable`] and [`checkpoint::check_replaceable`].
 pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
     args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
-    let Some(path) = args.saving().map(|saving| saving.path).filter(|path| args.resume.as_ref() != Some(path)) else {
-        return Ok(());
-    };
+    let goes_on = |path: &Path| args.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, path));
+    let Some(path) = args.saving().map(|saving| saving.path).filter(|path| !goes_on(path)) else { return Ok(()) };
     let of_frames = args.job.scene.frames.is_some();
     let going_on = if of_frames { "--skip-existing".into() } else { format!("--resume {}", path.display()) };
     let remedy = format!("go on with {going_on}, or start anew with --overwrite");

@@ -14,7 +14,6 @@ pub use options::RenderArgs;
 
 use super::finish::tell_missing;
 use super::progress::{Reporter, Turn, Waiting};
-use super::scene::EnvironmentChoice;
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, Kind, Result};
@@ -32,7 +31,7 @@ use caustique::scene::{Scene, Survey};
 use caustique::stop::Stop;
 use preview::Preview;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 pub use summary::{Summary, place, tell_finish, tell_picture};
 
 /// A render of so many seconds is not to be lost while its picture is finished.
@@ -63,9 +62,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;
-    if let Some(EnvironmentChoice::File(sky)) = &args.job.scene.env {
-        output::check_inputs(&args.output, std::iter::once(sky.as_path()))?;
-    }
+    files::check_inputs(args)?;
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     files::check_checkpoint(args)?;
     techniques::prepare(args)?;
@@ -102,6 +99,7 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
         why: None,
         summary: None,
         seconds: 0.0,
+        estimate: None,
         reason_if_black: String::new(),
         made_for: Picture::default(),
     };
@@ -122,6 +120,8 @@ struct Telling<'a> {
     summary: Option<Summary>,
     /// Seconds that the render has taken.
     seconds: f64,
+    /// The file of the estimate, until the finished picture is written.
+    estimate: Option<PathBuf>,
     /// Why the picture is black, should it be.
     reason_if_black: String,
     /// The picture that the scene was made for.
@@ -204,7 +204,7 @@ impl Watch for Telling<'_> {
 
     fn estimated(&mut self, set: &LayerSet, attributes: &exr::Attributes) {
         if self.seconds >= WORTH_KEEPING {
-            files::write_estimate(self.args, set, attributes);
+            self.estimate = files::write_estimate(self.args, set, attributes);
         }
     }
 }
@@ -212,7 +212,7 @@ impl Watch for Telling<'_> {
 impl Telling<'_> {
     /// Writes all files, and says what there is to say.
     fn deliver(self, delivery: Delivery) -> Result<()> {
-        let Telling { args, summary, preview, made_for, reason_if_black, .. } = self;
+        let Telling { args, summary, preview, made_for, reason_if_black, estimate, .. } = self;
         let Delivery { set, attributes, techniques, tail, .. } = &delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
@@ -239,7 +239,8 @@ impl Telling<'_> {
         pictured?;
         debugged?;
         // The picture is safe, and nobody misses a file that is not there.
-        let _ = delivery.spent_checkpoint.as_deref().map(std::fs::remove_file);
+        let spent = [delivery.spent_checkpoint.as_deref(), estimate.as_deref()];
+        spent.into_iter().flatten().for_each(|file| drop(std::fs::remove_file(file)));
         if talk {
             Summary::tell_files(args, set, techniques.len());
         }

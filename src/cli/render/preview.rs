@@ -48,6 +48,14 @@ impl FromStr for Target {
 }
 
 impl Target {
+    /// The file, if it is one.
+    pub fn file(&self) -> Option<&std::path::Path> {
+        match self {
+            Target::Png(path) | Target::Exr(path) => Some(path),
+            Target::Tev => None,
+        }
+    }
+
     /// Checks that it can be written.
     ///
     /// # Errors

@@ -21,6 +21,16 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
                 say(&format!("frame {frame}: {} {why}", one.output.display()));
             }
         };
+        // What a run that was stopped has left of it.
+        let left = || {
+            let left = one.saving().map(|saving| saving.path);
+            left.filter(|path| args.skip_existing && !args.overwrite && path.is_file())
+        };
+        let done = || args.skip_existing && left().is_none() && is_there(&one);
+        if done() {
+            pass_over("is there".into());
+            continue;
+        }
         // Held until the frame is written. What another machine renders meanwhile is not ours.
         let _claim = match args.skip_existing.then(|| Claim::of(&one.output)).transpose()? {
             Some(Claimed::Elsewhere(owner)) => {
@@ -30,13 +40,12 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             Some(Claimed::Here(claim)) => Some(claim),
             None => None,
         };
-        // What a run that was stopped has left of it.
-        let left = one.saving().map(|saving| saving.path);
-        let left = left.filter(|path| args.skip_existing && !args.overwrite && path.is_file());
-        if args.skip_existing && left.is_none() && is_there(&one) {
+        // Another machine may have written it meanwhile.
+        if done() {
             pass_over("is there".into());
             continue;
         }
+        let left = left();
         if Interrupt::came() {
             let cause = format!("interrupted before frame {frame}; the frames before it are written");
             return Err(Error::new(Kind::Interrupted, args.output.display(), cause)
