@@ -2,8 +2,8 @@
 //! coat reflects in a frame of its own. What it leaves to the base is reckoned there, too ([`super::cover`]).
 
 use super::cover::Cover;
+use super::facing::Facing;
 use super::layered::LEAST_COSINE;
-use super::shading::Facing;
 use super::{BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 

@@ -3,6 +3,7 @@
 mod coat;
 mod cover;
 mod energy;
+mod facing;
 mod fresnel;
 mod gathering;
 mod interface;

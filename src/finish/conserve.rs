@@ -69,6 +69,9 @@ pub fn give_back(
     picture.copy_from_slice(&changed);
 }
 
+/// Pixels that are summed together.
+const CHUNK: usize = 4096;
+
 impl<'a> Balance<'a> {
     fn of(
         picture: &'a [[f32; 3]],
@@ -98,10 +101,15 @@ impl<'a> Balance<'a> {
         finite(self.mean) && finite(self.denoised) && finite(&self.estimate.deviation) && !self.estimate.is_exact(i)
     }
 
-    /// Sums over the pixels that count, in their order.
-    fn sum(&self, of: impl Fn(usize, usize) -> f64) -> Light {
-        let pixels = (0..self.picture.len()).filter(|i| self.counts(*i));
-        pixels.fold([0.0; 3], |sum, i| std::array::from_fn(|c| sum[c] + of(i, c)))
+    /// Sums over the pixels that count, by chunks that do not depend on the number of threads.
+    fn sum(&self, of: impl Fn(usize, usize) -> f64 + Sync) -> Light {
+        let pixels = self.picture.len();
+        let chunk = |start: usize| {
+            let counted = (start..(start + CHUNK).min(pixels)).filter(|i| self.counts(*i));
+            counted.fold([0.0; 3], |sum, i| std::array::from_fn(|c| sum[c] + of(i, c)))
+        };
+        let parts: Vec<Light> = (0..pixels).into_par_iter().step_by(CHUNK).map(chunk).collect();
+        parts.iter().fold([0.0; 3], |sum, part| std::array::from_fn(|c| sum[c] + part[c]))
     }
 
     /// How much nearer to the denoised picture the pixel may come: by the share of it that may be other light than it

@@ -4,12 +4,16 @@
 use crate::math::{DAffine3, DVec3};
 use crate::scene::Description;
 use crate::scene::description::{CameraDescription, Picture, Placed, Projection};
+use smallvec::SmallVec;
 
 /// Aspect ratio of a picture whose shape nothing says.
 const USUAL_ASPECT: f64 = 16.0 / 9.0;
 
 /// What is nearer to a camera, in parts of its near plane's distance, goes through the camera itself.
 const THROUGH: f64 = 0.01;
+
+/// Triangles that are looked at for one plane: a tenth of a second. A scene that has more before them is not warned of.
+const MOST_TRIANGLES: usize = 1 << 20;
 
 /// A range of depths (m), of which nothing that is shown is nearer than `least`.
 struct Span {
@@ -29,7 +33,10 @@ pub(super) struct Clip {
 pub(super) fn check(out: &mut Description, clips: &[Clip], bounds: &[(DVec3, DVec3)]) {
     for (camera, clip) in out.cameras.iter().zip(clips) {
         let view = View::new(camera, &out.picture);
-        let shown = |span: Span| out.instances.iter().any(|placed| view.shows(out, placed, bounds, &span));
+        let shown = |span: Span| {
+            let mut left = MOST_TRIANGLES;
+            out.instances.iter().any(|placed| view.shows(out, placed, bounds, &span, &mut left))
+        };
         let (near, far) = (f64::from(clip.near), f64::from(clip.far));
         let before = Span { low: 0.0, high: near, least: THROUGH * near };
         let behind = Span { low: far, high: f64::INFINITY, least: 0.0 };
@@ -70,31 +77,49 @@ impl View {
         View { to_camera, sides }
     }
 
-    /// Whether some of a placed mesh is in view at such a depth.
-    fn shows(&self, out: &Description, placed: &Placed, bounds: &[(DVec3, DVec3)], span: &Span) -> bool {
+    /// Whether some of a placed mesh is in view at such a depth; `left` counts down the triangles that are looked at.
+    fn shows(
+        &self,
+        out: &Description,
+        placed: &Placed,
+        bounds: &[(DVec3, DVec3)],
+        span: &Span,
+        left: &mut usize,
+    ) -> bool {
         let Span { low, high, least: nearest } = *span;
+        if high <= low || placed.hidden_from_camera {
+            return false;
+        }
         let to_camera = self.to_camera * placed.to_world;
+        let ends = [(DVec3::NEG_Z, -low), (DVec3::Z, high)];
+        let planes = || self.sides.iter().chain(ends.iter().filter(|(_, offset)| offset.is_finite()));
+        let outside = |points: &[DVec3]| planes().any(|&(n, offset)| points.iter().all(|&p| n.dot(p) + offset < 0.0));
         let (least, most) = bounds[placed.mesh as usize];
         let corner = |i: usize| DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), least, most);
-        let depths = (0..8).map(|i| -to_camera.transform_point3(corner(i)).z);
-        let (first, last) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), d| (a.min(d), b.max(d)));
-        if high <= low || placed.hidden_from_camera || last <= low || first >= high {
+        if outside(&std::array::from_fn::<_, 8, _>(|i| to_camera.transform_point3(corner(i)))) {
             return false;
         }
         let mesh = &out.meshes[placed.mesh as usize];
+        let looked_at = mesh.triangles.len().min(*left);
+        *left -= looked_at;
         let place = |i: u32| to_camera.transform_point3(mesh.positions[i as usize].as_dvec3());
-        let ends = [(DVec3::NEG_Z, -low), (DVec3::Z, high)];
-        mesh.triangles.iter().any(|triangle| {
-            let planes = self.sides.iter().chain(ends.iter().filter(|(_, offset)| offset.is_finite()));
-            let polygon = planes.fold(triangle.map(place).to_vec(), |polygon, plane| cut(&polygon, plane));
+        mesh.triangles[..looked_at].iter().any(|triangle| {
+            let corners = triangle.map(place);
+            if outside(&corners) {
+                return false;
+            }
+            let polygon = planes().fold(Polygon::from_slice(&corners), |polygon, plane| cut(&polygon, plane));
             polygon.len() > 2 && polygon.iter().all(|p| -p.z >= nearest)
         })
     }
 }
 
+/// Corners: three, and one more for each plane.
+type Polygon = SmallVec<[DVec3; 9]>;
+
 /// The part of a convex polygon with n . p + offset >= 0 \[Sutherland and Hodgman 1974\].
-fn cut(polygon: &[DVec3], &(n, offset): &(DVec3, f64)) -> Vec<DVec3> {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
+fn cut(polygon: &[DVec3], &(n, offset): &(DVec3, f64)) -> Polygon {
+    let mut kept = Polygon::new();
     for (i, &p) in polygon.iter().enumerate() {
         let q = polygon[(i + 1) % polygon.len()];
         let (a, b) = (n.dot(p) + offset, n.dot(q) + offset);

@@ -91,17 +91,29 @@ pub fn said() -> String {
     for (what, image) in [("half a JPEG", &whole[..whole.len() / 2]), ("a JPEG of too few bits", &small)] {
         said.case(what, &told(&wearing(image, "image/jpeg").bytes(), &ReadOptions::default()));
     }
-    for (what, indices) in windings() {
+    let solid = |positions: &[[f32; 3]], indices: &[u32]| {
         let mut file = Glb::new();
         let glass = file.push(
             "materials",
             json!({"name": "glass", "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
                 "KHR_materials_volume": {"thicknessFactor": 1}}}),
         );
-        let corner = |i: u32| [0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 });
-        let mesh = file.mesh("cube", &[0, 1, 2, 3, 4, 5, 6, 7].map(corner), &indices, Some(glass));
+        let mesh = file.mesh("cube", positions, indices, Some(glass));
         file.node(json!({"mesh": mesh}));
-        said.case(what, &told(&file.bytes(), &ReadOptions::default()));
+        told(&file.bytes(), &ReadOptions::default())
+    };
+    let cube = |middle: f32, half: f32| {
+        let corner = move |i: u32| [0, 1, 2].map(|k| middle + if i >> k & 1 == 1 { half } else { -half });
+        [0, 1, 2, 3, 4, 5, 6, 7].map(corner)
+    };
+    for (what, indices) in windings() {
+        said.case(what, &solid(&cube(0.0, 1.0), &indices));
+    }
+    for (what, inner) in [("a cube in a cube", &[0.0][..]), ("two cubes in a cube", &[-0.5, 0.5])] {
+        let shells: Vec<_> = std::iter::once(cube(0.0, 1.0)).chain(inner.iter().map(|&at| cube(at, 0.2))).collect();
+        let shell = |k: u32| CUBE.into_iter().map(move |index| index + 8 * k);
+        let indices: Vec<u32> = (0..shells.len() as u32).flat_map(shell).collect();
+        said.case(what, &solid(&shells.concat(), &indices));
     }
     for (what, bytes) in containers() {
         said.case(what, &told(&bytes, &ReadOptions::default()));
