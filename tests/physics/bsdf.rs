@@ -520,14 +520,20 @@ fn classes_share_the_lobes_out() {
 /// The albedo that roulette goes by is near the true one.
 #[test]
 fn albedo_is_near_the_truth() {
+    let mut faults = Vec::new();
     for (name, p) in all() {
         let bsdf = bsdf(&p, &TABLES);
+        // Of stretched glass what a side reflects is known by a coarser table.
+        let within = if p.transmission > 0.0 && p.alpha_x != p.alpha_y { 0.2 } else { 0.12 };
         for mu in [1.0, 0.5, -0.5] {
             let wo = outgoing(mu, 1.0);
-            let (told, drawn) = (bsdf.albedo(wo, LobeSet::ALL), drawn_albedo(&bsdf, wo, Transport::Importance, 64));
-            assert!((told - drawn).abs().max_element() < 0.12, "{name}, {mu}: {told} is not {drawn}");
+            let (estimate, drawn) = (bsdf.albedo(wo, LobeSet::ALL), drawn_albedo(&bsdf, wo, Transport::Importance, 64));
+            if (estimate - drawn).abs().max_element() >= within {
+                faults.push(format!("{name}, {mu}: {estimate} is not {drawn}"));
+            }
         }
     }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 /// Nothing that a file or a ray can bring makes a value that is not finite.
