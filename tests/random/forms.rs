@@ -195,8 +195,8 @@ fn glowing(random: &mut Random) -> Known {
     } else {
         Matter::glowing(emission)
     };
-    // Flat ones look about downwards.
-    let tilt = DQuat::from_rotation_x(PI + random.within(-0.6, 0.6));
+    // Flat ones look about downwards, so that no floor in the picture is near their plane.
+    let tilt = DQuat::from_rotation_x(PI + random.within(-0.15, 0.15));
     let rotation = if flat { tilt } else { random.turn() };
     let chain = vec![Placement { translation: place(random, size), rotation, scale: DVec3::splat(size) }];
     let lamp = world.add("lamp", mesh.clone(), matter, chain).to_world();

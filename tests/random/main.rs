@@ -27,7 +27,7 @@ use forms::FORMS;
 use generate::generate;
 use picture::{SEEDS, Shot, differences, pictures, read};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
-use relation::{check, compare};
+use relation::check;
 
 /// Scenes whose relations are checked.
 const SCENES: u64 = 40;
@@ -111,7 +111,7 @@ fn known_pictures_are_met() {
     report(&faults);
 }
 
-/// Of each relation a fault that breaks it is found in one of a few scenes.
+/// Of each relation a fault that breaks it is found in one of a few scenes, by the first of the two sets of seeds.
 #[test]
 fn planted_faults_break_relations() {
     let missed: Vec<String> = plants::plants()
@@ -124,7 +124,7 @@ fn planted_faults_break_relations() {
                 (plant.spoil)(&mut world, &mut other).then_some((world, other, shot))
             });
             let found = spoiled.take(SPOILED).any(|(world, other, shot)| {
-                compare(&world, &other, &shot).is_ok_and(|differences| differences.is_some())
+                relation::found(&world, &other, &shot, 0..SEEDS).is_ok_and(|differences| !differences.is_empty())
             });
             (!found).then(|| format!("{:?}: {}", plant.relation, plant.name))
         })

@@ -158,18 +158,28 @@ type Outcome = Option<(Vec<Difference>, Option<String>)>;
 
 /// # Errors
 /// One of the scenes is not taken.
-pub fn compare(world: &World, other: &Other, shot: &Shot) -> Result<Outcome, String> {
-    let found = |seeds: std::ops::Range<u64>| -> Result<Vec<Difference>, String> {
-        let a = pictures(world, shot, seeds.clone())?;
-        Ok(differences(&a, &others(other, seeds)?, other.tolerance, SIGNIFICANCE))
-    };
-    let first = found(0..SEEDS)?;
+fn compare(world: &World, other: &Other, shot: &Shot) -> Result<Outcome, String> {
+    let first = found(world, other, shot, 0..SEEDS)?;
     if first.is_empty() {
         return Ok(None);
     }
-    let mut again = found(SEEDS..SEEDS * (1 + CONFIRMING))?;
+    let mut again = found(world, other, shot, SEEDS..SEEDS * (1 + CONFIRMING))?;
     again.retain(|difference| first.iter().any(|other| other.index == difference.index));
     Ok((!again.is_empty()).then_some((again, None)))
+}
+
+/// Differences of one set of seeds.
+///
+/// # Errors
+/// One of the scenes is not taken.
+pub fn found(
+    world: &World,
+    other: &Other,
+    shot: &Shot,
+    seeds: std::ops::Range<u64>,
+) -> Result<Vec<Difference>, String> {
+    let a = pictures(world, shot, seeds.clone())?;
+    Ok(differences(&a, &others(other, seeds)?, other.tolerance, SIGNIFICANCE))
 }
 
 /// Seeds of the other scenes start here.
