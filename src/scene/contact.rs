@@ -182,6 +182,15 @@ pub fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Smal
     back
 }
 
+/// A surface that lies on one which a camera looks through along `direction`, and which it sees.
+#[cold]
+#[inline(never)]
+pub fn on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token: u32) -> Option<Surface> {
+    let others = others(scene, &Place::of(culled), token);
+    let surface = |(_, hit): &(Place, Hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
+    others.iter().filter_map(surface).find(|other| !scene.culls(other, direction))
+}
+
 /// The surfaces along a ray, one after the other.
 #[derive(Clone, Copy)]
 pub struct Along {

@@ -257,7 +257,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
         };
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
         let medium = if T::MEDIA && scene.survey.media { interior.medium(scene) } else { None };
-        let Some((surface, t)) = met else {
+        let Some((mut surface, t)) = met else {
             if let Some(medium) = medium {
                 let (distance, beyond) = (f32::INFINITY, None);
                 let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
@@ -280,8 +280,11 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
         }
         distance += t;
         if token & CAMERA != 0 && scene.culls(&surface, direction) {
-            along.pass(&surface);
-            continue;
+            let Some(other) = contact::on_culled(scene, &surface, direction, token) else {
+                along.pass(&surface);
+                continue;
+            };
+            surface = other;
         }
         match boundary(scene, &surface, &interior, direction, token) {
             Boundary::Scattering(eta, crossing) => {
@@ -366,7 +369,7 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
     let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
-        let Some((surface, t)) = along.next(scene, !interior.is_open()) else {
+        let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {
             way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
             let Some(place) = reaching else { return way };
             for surface in &contact::before(scene, &place, direction, token) {
@@ -383,8 +386,11 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
         }
         // Towards the lens, so that the lens sees its other side.
         if token & CAMERA != 0 && scene.culls(&surface, -direction) {
-            along.pass(&surface);
-            continue;
+            let Some(other) = contact::on_culled(scene, &surface, -direction, token) else {
+                along.pass(&surface);
+                continue;
+            };
+            surface = other;
         }
         match boundary(scene, &surface, &interior, direction, token) {
             Boundary::Scattering(..) => return ShadowRay::BLOCKED,
