@@ -10,7 +10,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::random::Draws;
 use crate::scene::Scene;
-use crate::scene::contact::Place;
+use crate::scene::contact::{self, Place};
 use crate::spectrum::Wavelength;
 
 /// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is
@@ -122,7 +122,7 @@ impl ScatterPoint for Vertex<'_, '_> {
 
     #[inline]
     fn is_culled(&self, scene: &Scene, wi: Vec3) -> bool {
-        scene.culls(self.surface, -wi)
+        scene.culls(self.surface, -wi) && contact::on_culled(scene, self.surface, -wi, 0).is_none()
     }
 
     #[inline]

@@ -46,7 +46,7 @@ fn hide(_: &mut World, other: &mut Other) -> bool {
 fn glue(world: &mut World, _: &mut Other) -> bool {
     let is_glass = |thing: &Thing| thing.rests && world.matter(thing).is_some_and(|m| m.is_glass() && m.ior > 1.3);
     // Large enough to be seen.
-    let seen = world.things.iter().any(|thing| is_glass(thing) && world.radius(thing) > 0.08 * world.size);
+    let seen = world.things.iter().any(|thing| is_glass(thing) && world.radius(thing) > 0.15 * world.size);
     let sunk = lifted(world, -1e-3).filter(|_| seen);
     sunk.map(|sunk| *world = sunk).is_some()
 }
