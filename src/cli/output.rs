@@ -9,9 +9,7 @@ use caustique::image::{atomic, exr};
 use caustique::scene::description::{Picture, ToneCurve};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize, Serializer};
-use std::fs;
 use std::io::IsTerminal;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// From scene-linear light to the PNG's colours.
@@ -165,9 +163,10 @@ pub fn lossy<S: Serializer>(path: &Path, serializer: S) -> std::result::Result<S
 /// # Errors
 /// It is, by whatever name.
 pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path>) -> Result<()> {
-    let file = |path: &Path| fs::metadata(path).ok().filter(fs::Metadata::is_file).map(|data| (data.dev(), data.ino()));
-    let Some(own) = file(output) else { return Ok(()) };
-    match inputs.find(|input| file(input) == Some(own)) {
+    if !output.is_file() {
+        return Ok(());
+    }
+    match inputs.find(|input| atomic::is_same_file(input, output)) {
         None => Ok(()),
         Some(input) => {
             let cause = format!("{} is an input, which is not overwritten", input.display());
