@@ -6,6 +6,8 @@
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+pub use caustique_library::variable as set;
+
 /// Environment variable that names the folder in which `scripts/setup.sh` lies in `scripts`, and then no other.
 pub const VARIABLE: &str = "CAUSTIQUE_HOME";
 
@@ -33,11 +35,6 @@ pub fn origin(variable: &'static str, relative: &str, path: &Path) -> &'static s
     } else {
         "system"
     }
-}
-
-/// The value of a variable that is set and not empty, as a path.
-pub fn set(variable: &str) -> Option<PathBuf> {
-    std::env::var_os(variable).filter(|value| !value.is_empty()).map(PathBuf::from)
 }
 
 /// The folders that may be the project's, the nearest first.

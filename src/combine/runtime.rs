@@ -8,6 +8,7 @@ use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use caustique_library::{below, file_name};
 use ort::environment::Environment;
 
 use crate::error::{Error, Kind, Result};
@@ -88,30 +89,8 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     let versioned = MINOR_VERSIONS.rev().map(|minor| format!("{NAME}.1.{minor}"));
     let mut all: Vec<PathBuf> =
         [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned).map(PathBuf::from).collect();
-    for folder in installed::places(FOLDER) {
-        libraries(&folder, 3, &mut all);
-    }
+    all.extend(below(&installed::places(FOLDER), NAME));
     Ok(all)
-}
-
-/// Adds the ONNX Runtime libraries in `folder` and, `depth` levels deep, below it; longest (fullest version) first.
-fn libraries(folder: &Path, depth: usize, all: &mut Vec<PathBuf>) {
-    let Ok(entries) = std::fs::read_dir(folder) else { return };
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.sort_by(|a, b| b.cmp(a));
-    for path in paths {
-        if path.is_dir() {
-            if depth > 0 {
-                libraries(&path, depth - 1, all);
-            }
-        } else if file_name(&path).starts_with(NAME) && !all.contains(&path) {
-            all.push(path);
-        }
-    }
-}
-
-fn file_name(path: &Path) -> &str {
-    path.file_name().and_then(|name| name.to_str()).unwrap_or_default()
 }
 
 /// Loads the first candidate that is an ONNX Runtime new enough.
@@ -190,19 +169,5 @@ mod tests {
         assert_eq!(error.to_string(), "ONNX Runtime: the shared library was not found");
         assert_eq!(error.kind, Kind::Library);
         assert!(error.hint.unwrap().contains("scripts/setup.sh"));
-    }
-
-    #[test]
-    fn libraries_below_the_folder_are_found_fullest_version_first() {
-        let folder = tempfile::tempdir().unwrap();
-        let lib = folder.path().join("onnxruntime-1.21.1/lib");
-        std::fs::create_dir_all(&lib).unwrap();
-        for name in ["libonnxruntime.so", "libonnxruntime.so.1", "libonnxruntime.so.1.21.1", "libother.so"] {
-            std::fs::write(lib.join(name), "").unwrap();
-        }
-        let mut found = Vec::new();
-        libraries(folder.path(), 3, &mut found);
-        let names: Vec<&str> = found.iter().map(|path| file_name(path)).collect();
-        assert_eq!(names, ["libonnxruntime.so.1.21.1", "libonnxruntime.so.1", "libonnxruntime.so"]);
     }
 }

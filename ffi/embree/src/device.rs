@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::api::{self, Common, Handle};
 use crate::error::Error;
-use crate::load::Library;
+use crate::library::Library;
 
 /// An Embree device. Clones share it; it may be used from several threads.
 #[derive(Clone)]

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::load::LIBRARY_VARIABLE;
-use crate::scene::{GeometryId, MAX_GEOMETRY_ID};
+use crate::geometry::{GeometryId, MAX_GEOMETRY_ID};
+use crate::library::LIBRARY_VARIABLE;
 
 /// A failure to find Embree, to use it, or to accept what it was given.
 ///

@@ -6,8 +6,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
 use crate::api::{self, FilterArguments, FilterFunction, INVALID_GEOMETRY_ID, RawHit};
-use crate::query::Hit;
-use crate::scene::GeometryId;
+use crate::geometry::GeometryId;
+use crate::ray::Hit;
 
 /// A hit that Embree proposes to a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -45,8 +45,7 @@
 //!
 //! # What is unsafe
 //!
-//! This crate is the only place in the project with `unsafe` code, and it trusts two things it cannot
-//! prove: that the file found under Embree's name is Embree (loading it runs its initialisers), and
+//! This crate trusts two things it cannot prove: that the file found under Embree's name is Embree (loading it runs its initialisers), and
 //! that its C interface is the one its version number promises, of which the trial above checks what
 //! can be checked. A loaded library is never unloaded: Embree's worker threads outlive its devices.
 
@@ -54,15 +53,19 @@ mod api;
 mod device;
 mod error;
 mod filter;
+mod geometry;
+mod library;
 mod load;
 mod probe;
 mod query;
+mod ray;
 mod scene;
 mod transform;
 
 pub use device::Device;
 pub use error::Error;
 pub use filter::{Candidate, Filter};
-pub use load::{LIBRARY_VARIABLE, Library, Version};
-pub use query::{Bounds, Hit, Ray};
-pub use scene::{GeometryId, MAX_GEOMETRY_ID, Scene, SceneBuilder};
+pub use geometry::{Bounds, GeometryId, MAX_GEOMETRY_ID};
+pub use library::{LIBRARY_VARIABLE, Library, Version};
+pub use ray::{Hit, Ray};
+pub use scene::{Scene, SceneBuilder};

@@ -1,17 +1,13 @@
 //! Finds and opens the library, version 4 or 3, or says what to install.
 
-use std::ffi::OsStr;
-use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+
+use caustique_library::{Refusal, file_of, first_of, open, variable};
 
 use crate::api::{Common, Trace, Trace3, Trace4};
 use crate::error::Error;
+use crate::library::{LIBRARY_VARIABLE, Library};
 use crate::probe;
-
-/// Name of the environment variable that, when set and not empty, holds the path of the Embree library to
-/// use. Nothing else is tried then.
-pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_EMBREE";
 
 /// Names to try, best first. Those with a version number are what distributions install for programs, the
 /// others come with development packages.
@@ -29,37 +25,6 @@ const NAMES: &[&str] = &[
 #[cfg(windows)]
 const NAMES: &[&str] = &["embree4.dll", "embree3.dll"];
 
-/// Embree's version number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Version {
-    /// 3 or 4.
-    pub major: u32,
-    /// As in 4.3.
-    pub minor: u32,
-    /// As in 4.3.3.
-    pub patch: u32,
-}
-
-impl fmt::Display for Version {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}.{}", self.major, self.minor, self.patch)
-    }
-}
-
-/// An opened and tried Embree library. Clones share it.
-#[derive(Clone)]
-pub struct Library {
-    inner: Arc<Inner>,
-}
-
-struct Inner {
-    path: PathBuf,
-    version: Version,
-    hit_extent: usize,
-    common: Common,
-    trace: Trace,
-}
-
 impl Library {
     /// Opens the library named by [`LIBRARY_VARIABLE`], or else the first usable one of the names
     /// Embree goes by, version 4 before 3, where the system looks for libraries.
@@ -68,22 +33,10 @@ impl Library {
     ///
     /// [`Error::NotFound`] with what was tried; [`Error::Unusable`] as for [`Library::load_from`].
     pub fn load() -> Result<Library, Error> {
-        match std::env::var_os(LIBRARY_VARIABLE) {
-            Some(path) if !path.is_empty() => Library::load_from(Path::new(&path)),
-            _ => Library::first_of(NAMES),
+        match variable(LIBRARY_VARIABLE) {
+            Some(path) => Library::load_from(path),
+            None => load_first(NAMES),
         }
-    }
-
-    fn first_of(names: &[&str]) -> Result<Library, Error> {
-        let mut tried = Vec::new();
-        for name in names {
-            match Library::load_from(Path::new(name)) {
-                Ok(library) => return Ok(library),
-                Err(Error::Unusable { path, reason }) => tried.push((path, reason)),
-                Err(other) => tried.push((PathBuf::from(name), other.to_string())),
-            }
-        }
-        Err(Error::NotFound { tried })
     }
 
     /// Opens one library file. A bare file name is looked for where the system looks for libraries.
@@ -95,108 +48,43 @@ impl Library {
     /// [`Error::Unusable`] when the file cannot be opened, is not Embree, is neither version 3 nor 4, or does
     /// not find the triangle of the trial scene where it is.
     pub fn load_from(path: impl AsRef<Path>) -> Result<Library, Error> {
-        let path = path.as_ref();
-        let unusable = |path: &Path, reason: String| Error::Unusable { path: path.to_owned(), reason };
-        // SAFETY: initialisers run here; that the file is to be trusted is in the documentation.
-        let library = unsafe { libloading::Library::new(OsStr::new(path)) }
-            .map_err(|error| unusable(path, shorten(path, &error)))?;
-        // SAFETY: the symbols carry Embree's names; the library is never unloaded (see below).
-        let common = unsafe { Common::load(&library) }
-            .map_err(|error| unusable(path, format!("not Embree 3 or 4 ({})", shorten(path, &error))))?;
-        let path = origin(common.new_device as *const _).unwrap_or_else(|| path.to_owned());
-
-        let version = probe::version(&common).map_err(|reason| unusable(&path, reason))?;
-        let trace = match version.major {
-            // SAFETY: as for `common`; the version says which form the functions have.
-            3 => unsafe { Trace3::load(&library) }.map(Trace::V3),
-            // SAFETY: as above.
-            4 => unsafe { Trace4::load(&library) }.map(Trace::V4),
-            _ => {
-                let reason = format!("Embree {version} is neither version 3 nor 4");
-                return Err(unusable(&path, reason));
-            }
-        }
-        .map_err(|error| unusable(&path, shorten(&path, &error)))?;
-        // Embree's worker threads may still be on their way out when the last device is released, so its
-        // code must stay mapped.
-        std::mem::forget(library);
-
-        let with_extent =
-            |hit_extent| Library { inner: Arc::new(Inner { path: path.clone(), version, hit_extent, common, trace }) };
-        let extent = probe::try_out(&with_extent(0)).map_err(|reason| unusable(&path, reason))?;
-        Ok(with_extent(extent))
-    }
-
-    /// The file that was opened: its full path where the system tells, else the name it was found by.
-    pub fn path(&self) -> &Path {
-        &self.inner.path
-    }
-
-    /// The version, as a device of the library reports it.
-    pub fn version(&self) -> Version {
-        self.inner.version
-    }
-
-    /// How many bytes of `RTCRayHit` the library was seen to use when it was tried: 80 up to Embree 4.2,
-    /// 84 from 4.3 on. Room is kept for 96; a library that uses more is refused.
-    pub fn hit_extent(&self) -> usize {
-        self.inner.hit_extent
-    }
-
-    pub(crate) fn common(&self) -> &Common {
-        &self.inner.common
-    }
-
-    pub(crate) fn trace(&self) -> Trace {
-        self.inner.trace
+        load(path.as_ref()).map_err(|Refusal { path, reason }| Error::Unusable { path, reason })
     }
 }
 
-impl fmt::Debug for Library {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Embree {} at {}", self.version(), self.path().display())
-    }
+fn load_first(names: &[&str]) -> Result<Library, Error> {
+    let names: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+    first_of(&names, load).map_err(|refusals| Error::NotFound {
+        tried: refusals.into_iter().map(|refusal| (refusal.path, refusal.reason)).collect(),
+    })
 }
 
-/// The loader's message without the path, which our own messages begin with.
-fn shorten(path: &Path, error: &libloading::Error) -> String {
-    let text = error.to_string();
-    let prefix = format!("{}: ", path.display());
-    text.strip_prefix(&prefix).map(str::to_owned).unwrap_or(text)
-}
+fn load(path: &Path) -> Result<Library, Refusal> {
+    // SAFETY: initialisers run here; that the file is to be trusted is in the documentation.
+    let library = unsafe { open(path) }?;
+    // SAFETY: the symbols carry Embree's names; the library is never unloaded (see below).
+    let common = unsafe { Common::load(&library) }.map_err(|error| {
+        let missing = Refusal::by_loader(path, &error).reason;
+        Refusal::new(path, format!("not Embree 3 or 4 ({missing})"))
+    })?;
+    let path = file_of(common.new_device as *const _).unwrap_or_else(|| path.to_owned());
 
-/// The file that an address was loaded from.
-#[cfg(unix)]
-fn origin(address: *const std::ffi::c_void) -> Option<PathBuf> {
-    use std::ffi::{CStr, OsStr, c_char, c_int, c_void};
-    use std::os::unix::ffi::OsStrExt;
+    let version = probe::version(&common).map_err(|reason| Refusal::new(&path, reason))?;
+    let trace = match version.major {
+        // SAFETY: as for `common`; the version says which form the functions have.
+        3 => unsafe { Trace3::load(&library) }.map(Trace::V3),
+        // SAFETY: as above.
+        4 => unsafe { Trace4::load(&library) }.map(Trace::V4),
+        _ => return Err(Refusal::new(&path, format!("Embree {version} is neither version 3 nor 4"))),
+    }
+    .map_err(|error| Refusal::by_loader(&path, &error))?;
+    // Embree's worker threads may still be on their way out when the last device is released, so its
+    // code must stay mapped.
+    std::mem::forget(library);
 
-    #[repr(C)]
-    struct DlInfo {
-        file_name: *const c_char,
-        file_base: *mut c_void,
-        symbol_name: *const c_char,
-        symbol_address: *mut c_void,
-    }
-    unsafe extern "C" {
-        fn dladdr(address: *const c_void, info: *mut DlInfo) -> c_int;
-    }
-    let null = std::ptr::null_mut();
-    let mut info =
-        DlInfo { file_name: null as *const _, file_base: null, symbol_name: null as *const _, symbol_address: null };
-    // SAFETY: `dladdr` only looks the address up, and fills in `info` when it returns non-zero.
-    if unsafe { dladdr(address, &mut info) } == 0 || info.file_name.is_null() {
-        return None;
-    }
-    // SAFETY: a non-null name is a C string that lives as long as the library, which is never unloaded while
-    // this function runs.
-    let name = unsafe { CStr::from_ptr(info.file_name) };
-    Some(PathBuf::from(OsStr::from_bytes(name.to_bytes())))
-}
-
-#[cfg(not(unix))]
-fn origin(_address: *const std::ffi::c_void) -> Option<PathBuf> {
-    None
+    let untried = Library::new(&path, version, 0, common, trace);
+    let extent = probe::try_out(&untried).map_err(|reason| Refusal::new(&path, reason))?;
+    Ok(Library::new(&path, version, extent, common, trace))
 }
 
 #[cfg(test)]
@@ -205,7 +93,7 @@ mod tests {
 
     #[test]
     fn nothing_found_lists_what_was_tried_and_names_packages() {
-        let error = Library::first_of(&["libno-such-embree.so.4", "libno-such-embree.so.3"]).unwrap_err();
+        let error = load_first(&["libno-such-embree.so.4", "libno-such-embree.so.3"]).unwrap_err();
         let text = error.to_string();
         assert!(text.starts_with("Embree was not found; tried libno-such-embree.so.4: "), "{text}");
         assert!(text.contains("; libno-such-embree.so.3: "), "{text}");

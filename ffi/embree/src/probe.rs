@@ -10,9 +10,10 @@ use std::sync::Arc;
 use crate::api::{self, Common, RawRay, RawRayHit};
 use crate::device::Device;
 use crate::error::Error;
-use crate::load::{Library, Version};
-use crate::query::Ray;
-use crate::scene::{GeometryId, Scene, SceneBuilder};
+use crate::geometry::GeometryId;
+use crate::library::{Library, Version};
+use crate::ray::Ray;
+use crate::scene::{Scene, SceneBuilder};
 
 /// The version that a device of the library reports.
 pub fn version(common: &Common) -> Result<Version, String> {

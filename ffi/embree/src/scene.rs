@@ -1,34 +1,14 @@
 //! Scenes: built from triangle meshes and instances, then immutable.
 
 use std::collections::HashMap;
-use std::fmt;
 use std::sync::Arc;
 
 use crate::api::{self, Handle, RawBounds, Trace};
 use crate::device::Device;
 use crate::error::Error;
 use crate::filter::{self, Filter};
-use crate::query::Bounds;
+use crate::geometry::{Bounds, GeometryId, MAX_COORDINATE, MAX_GEOMETRY_ID};
 use crate::transform;
-
-/// The number of a mesh or instance within its scene.
-///
-/// Give small, dense numbers: Embree keeps a table up to the largest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct GeometryId(pub u32);
-
-/// The largest id a mesh or instance may have.
-pub const MAX_GEOMETRY_ID: GeometryId = GeometryId((1 << 24) - 1);
-
-/// Embree (`FLT_LARGE` in its sources) drops triangles with coordinates beyond this without a word, and takes no
-/// rays with such.
-pub(crate) const MAX_COORDINATE: f32 = 1.844e18;
-
-impl fmt::Display for GeometryId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "geometry {}", self.0)
-    }
-}
 
 /// A scene in the making.
 ///

@@ -3,8 +3,7 @@
 //! Embree carries rays into the instance's space by the inverse matrix, in single precision, and takes only
 //! coordinates up to [`MAX_COORDINATE`] there too: a library built with assertions aborts the program on others.
 
-use crate::query::Bounds;
-use crate::scene::MAX_COORDINATE;
+use crate::geometry::{Bounds, MAX_COORDINATE};
 
 /// Every scene takes rays with coordinates at least this large.
 const LEAST_REACH: f32 = 1e9;

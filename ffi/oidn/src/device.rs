@@ -5,11 +5,8 @@ use std::sync::Arc;
 
 use crate::api::{self, Functions, Handle};
 use crate::error::Error;
-use crate::filter::{Filter, Input};
-use crate::load::{Library, Version};
-
-/// The most threads that a device is made for. The library sets a place aside for each, used or not.
-pub const MAX_THREADS: usize = 4096;
+use crate::library::{Library, Version};
+use crate::limits::MAX_THREADS;
 
 /// A device that denoises on the processor. Clones share it; it may be used from several threads, whose pictures are
 /// then denoised one after the other.
@@ -51,26 +48,6 @@ impl Device {
         let raw = Raw::open(functions, threads as c_int)
             .map_err(|message| Error::Oidn { during: "make a device", message })?;
         Ok(Device { inner: Arc::new(Inner { raw, library: library.clone() }) })
-    }
-
-    /// A denoiser of pictures with this device.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Oidn`], for instance when there is no memory left.
-    pub fn filter(&self) -> Result<Filter, Error> {
-        Filter::new(self)
-    }
-
-    /// Denoises one picture. For several of one size and kind [`Device::filter`] is faster.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Filter::denoise`].
-    pub fn denoise(&self, input: &Input) -> Result<Vec<[f32; 3]>, Error> {
-        // What is wrong with the input is told before the library is asked for anything.
-        input.check()?;
-        self.filter()?.denoise(input)
     }
 
     /// The library this device is of.

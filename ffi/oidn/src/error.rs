@@ -3,9 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::device::MAX_THREADS;
-use crate::filter::MAX_SIDE;
-use crate::load::LIBRARY_VARIABLE;
+use crate::library::LIBRARY_VARIABLE;
+use crate::limits::{MAX_SIDE, MAX_THREADS};
 
 /// A failure to find Open Image Denoise, to use it, or to accept what it was given.
 ///

@@ -5,9 +5,7 @@ use std::ffi::{CStr, c_int, c_void};
 use crate::api::{self, Handle};
 use crate::device::Device;
 use crate::error::Error;
-
-/// The longest side of a picture.
-pub const MAX_SIDE: usize = 65_536;
+use crate::limits::MAX_SIDE;
 
 /// How well, against how fast.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -176,6 +174,28 @@ impl Filter {
         // SAFETY: the handle is a filter, the name a C string.
         unsafe { (self.device.functions().set_filter_bool)(self.raw, name.as_ptr(), value) };
         self.device.check("set an option")
+    }
+}
+
+impl Device {
+    /// A denoiser of pictures with this device.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Oidn`], for instance when there is no memory left.
+    pub fn filter(&self) -> Result<Filter, Error> {
+        Filter::new(self)
+    }
+
+    /// Denoises one picture. For several of one size and kind [`Device::filter`] is faster.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Filter::denoise`].
+    pub fn denoise(&self, input: &Input) -> Result<Vec<[f32; 3]>, Error> {
+        // What is wrong with the input is told before the library is asked for anything.
+        input.check()?;
+        self.filter()?.denoise(input)
     }
 }
 

@@ -57,9 +57,12 @@ mod api;
 mod device;
 mod error;
 mod filter;
+mod library;
+mod limits;
 mod load;
 
-pub use device::{Device, MAX_THREADS};
+pub use device::Device;
 pub use error::Error;
-pub use filter::{Filter, Input, MAX_SIDE, Quality};
-pub use load::{LIBRARY_VARIABLE, Library, Version};
+pub use filter::{Filter, Input, Quality};
+pub use library::{LIBRARY_VARIABLE, Library, Version};
+pub use limits::{MAX_SIDE, MAX_THREADS};

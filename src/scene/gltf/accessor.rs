@@ -8,10 +8,6 @@ use crate::memory;
 use gltf::json::accessor::ComponentType;
 use gltf::json::validation::Checked;
 
-/// More elements than this a file does not get out of nothing, as accessors without a buffer view ask for, whose
-/// purpose is that a few of them are replaced.
-pub(super) const MOST_ZEROS: u64 = 1 << 20;
-
 const DAMAGED: &str = "the file is damaged: export it again";
 
 /// Elements that lie `stride` bytes apart.

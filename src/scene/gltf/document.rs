@@ -1,6 +1,5 @@
 //! A glTF document in parts with types, its raw JSON beside them for extensions and extras.
 
-use super::accessor::MOST_ZEROS;
 use super::container::{self, malformed};
 use super::{fault, uri};
 use crate::error::Result;
@@ -12,6 +11,10 @@ use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::cell::Cell;
 use std::fmt::Display;
+
+/// The most elements that a file may have without data. An accessor without a buffer view has such elements, most of which
+/// a sparse accessor is meant to replace.
+const MAX_ZEROS: u64 = 1 << 20;
 
 /// A parsed document. Indices in it are not checked yet: `get` does that.
 pub(super) struct Document<'a> {
@@ -26,7 +29,7 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
-    /// Elements that may still be made out of nothing.
+    /// Number of further elements that the file may have without data.
     pub(super) zeros_left: Cell<u64>,
     /// Bytes that were taken since memory was last asked for.
     unasked: Cell<u64>,
@@ -69,7 +72,7 @@ impl<'a> Document<'a> {
             samplers: parts(&raw, "samplers")?,
             raw,
             folder,
-            zeros_left: Cell::new(MOST_ZEROS),
+            zeros_left: Cell::new(MAX_ZEROS),
             unasked: Cell::new(0),
             buffers: Vec::new(),
         };

@@ -1,0 +1,177 @@
+//! Finds and opens shared libraries at run time: the part that the bindings of Embree, Open Image Denoise and ONNX
+//! Runtime have in common.
+
+use std::ffi::{OsStr, c_void};
+use std::path::{Path, PathBuf};
+
+pub use libloading::Library;
+
+/// Levels of folders that [`below`] searches under a folder.
+const DEPTH: usize = 3;
+
+/// A library file that cannot be used, and the reason.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// The file, or the name that the system's loader was asked for.
+    pub path: PathBuf,
+    /// Why it cannot be used, without the path.
+    pub reason: String,
+}
+
+impl Refusal {
+    /// The refusal of the file at `path`.
+    pub fn new(path: &Path, reason: impl Into<String>) -> Refusal {
+        Refusal { path: path.to_owned(), reason: reason.into() }
+    }
+
+    /// The refusal of the file at `path` by the system's loader, whose message repeats the path.
+    pub fn by_loader(path: &Path, error: &libloading::Error) -> Refusal {
+        let text = error.to_string();
+        let prefix = format!("{}: ", path.display());
+        Refusal::new(path, text.strip_prefix(&prefix).unwrap_or(&text))
+    }
+}
+
+/// The path in an environment variable that is set and not empty.
+pub fn variable(name: &str) -> Option<PathBuf> {
+    std::env::var_os(name).filter(|path| !path.is_empty()).map(PathBuf::from)
+}
+
+/// Opens the library file at `path`. The system's loader looks a bare file name up in its own folders.
+///
+/// # Errors
+/// The loader's message.
+///
+/// # Safety
+/// Loading runs the file's initialisers, so the file must be trusted.
+pub unsafe fn open(path: &Path) -> Result<Library, Refusal> {
+    // SAFETY: the caller answers for the file.
+    unsafe { Library::new(OsStr::new(path)) }.map_err(|error| Refusal::by_loader(path, &error))
+}
+
+/// The first of `candidates` that `load` accepts.
+///
+/// # Errors
+/// The refusal of every candidate, in order.
+pub fn first_of<T>(candidates: &[PathBuf], load: impl Fn(&Path) -> Result<T, Refusal>) -> Result<T, Vec<Refusal>> {
+    let mut refusals = Vec::new();
+    for candidate in candidates {
+        match load(candidate) {
+            Ok(library) => return Ok(library),
+            Err(refusal) => refusals.push(refusal),
+        }
+    }
+    Err(refusals)
+}
+
+/// The files below `folders` whose names begin with `stem`. In each folder the longest name, which holds the fullest
+/// version number, comes first.
+pub fn below(folders: &[PathBuf], stem: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for folder in folders {
+        add_below(folder, stem, DEPTH, &mut found);
+    }
+    found
+}
+
+fn add_below(folder: &Path, stem: &str, depth: usize, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort_by(|a, b| b.cmp(a));
+    for path in paths {
+        if path.is_dir() {
+            if depth > 0 {
+                add_below(&path, stem, depth - 1, found);
+            }
+        } else if file_name(&path).starts_with(stem) && !found.contains(&path) {
+            found.push(path);
+        }
+    }
+}
+
+/// The last part of a path; empty where it is not UTF-8.
+pub fn file_name(path: &Path) -> &str {
+    path.file_name().and_then(OsStr::to_str).unwrap_or_default()
+}
+
+/// The file that holds the code or data at `address`, by the name that the loader was given.
+#[cfg(unix)]
+pub fn file_of(address: *const c_void) -> Option<PathBuf> {
+    use std::ffi::{CStr, c_char, c_int};
+    use std::os::unix::ffi::OsStrExt;
+
+    #[repr(C)]
+    struct DlInfo {
+        file_name: *const c_char,
+        file_base: *mut c_void,
+        symbol_name: *const c_char,
+        symbol_address: *mut c_void,
+    }
+    unsafe extern "C" {
+        fn dladdr(address: *const c_void, info: *mut DlInfo) -> c_int;
+    }
+    let null = std::ptr::null_mut();
+    let mut info =
+        DlInfo { file_name: null as *const _, file_base: null, symbol_name: null as *const _, symbol_address: null };
+    // SAFETY: `dladdr` only looks the address up, and fills in `info` when it returns non-zero.
+    if unsafe { dladdr(address, &mut info) } == 0 || info.file_name.is_null() {
+        return None;
+    }
+    // SAFETY: a non-null name is a C string that lives as long as the library. The bindings never unload one.
+    let name = unsafe { CStr::from_ptr(info.file_name) };
+    Some(PathBuf::from(OsStr::from_bytes(name.to_bytes())))
+}
+
+/// The file that holds the code or data at `address`: this system cannot tell.
+#[cfg(not(unix))]
+pub fn file_of(_address: *const c_void) -> Option<PathBuf> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_below_a_folder_are_found_fullest_version_first_and_without_modules() {
+        let folder = tempfile::tempdir().unwrap();
+        let lib = folder.path().join("oidn-2.5.1/lib");
+        std::fs::create_dir_all(&lib).unwrap();
+        for suffix in [".so", ".so.2", ".so.2.5.1", "_core.so.2.5.1", "_device_cpu.so.2.5.1"] {
+            std::fs::write(lib.join(format!("libOpenImageDenoise{suffix}")), "").unwrap();
+        }
+        std::fs::write(lib.join("libonnxruntime.so"), "").unwrap();
+        let found = below(&[folder.path().to_owned(), lib.clone()], "libOpenImageDenoise.so");
+        let names: Vec<_> = found.iter().map(|path| file_name(path)).collect();
+        assert_eq!(names, ["libOpenImageDenoise.so.2.5.1", "libOpenImageDenoise.so.2", "libOpenImageDenoise.so"]);
+    }
+
+    #[test]
+    fn the_first_usable_candidate_is_taken_and_all_refusals_are_kept() {
+        let candidates = ["a", "b", "c"].map(PathBuf::from);
+        let load = |usable: &'static str| {
+            move |path: &Path| match path {
+                path if path == Path::new(usable) => Ok(usable),
+                path => Err(Refusal::new(path, "broken")),
+            }
+        };
+        assert_eq!(first_of(&candidates, load("b")), Ok("b"));
+        let refusals = first_of(&candidates, load("d")).unwrap_err();
+        assert_eq!(refusals, ["a", "b", "c"].map(|name| Refusal::new(Path::new(name), "broken")));
+    }
+
+    #[test]
+    fn a_loader_message_does_not_repeat_the_path() {
+        // SAFETY: there is no such file, so nothing is loaded.
+        let refusal = unsafe { open(Path::new("/no/such/libfoo.so")) }.unwrap_err();
+        assert_eq!(refusal.path, Path::new("/no/such/libfoo.so"));
+        assert!(refusal.reason.starts_with("cannot open shared object file"), "{}", refusal.reason);
+    }
+
+    #[test]
+    fn the_file_of_this_function_is_the_test_program() {
+        let address = file_of as fn(*const c_void) -> Option<PathBuf>;
+        let found = file_of(address as *const c_void).and_then(|path| path.canonicalize().ok());
+        assert_eq!(found, std::env::current_exe().ok());
+    }
+}
