@@ -3,7 +3,8 @@
 use crate::error::{Error, Kind, Result};
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::LEAST_ASKED;
-use crate::render::{Method, Settings};
+use crate::plan::Search;
+use crate::render::Settings;
 use crate::scene::Scene;
 use crate::transport::Indirect;
 use std::path::Path;
@@ -14,9 +15,9 @@ use std::path::Path;
 /// Media scatter, and the method gathers photons on surfaces only, or photons of caustics alone.
 pub fn media(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
     let method = settings.method;
-    let (option, hint) = match method {
+    let (option, hint) = match method.search() {
         _ if !scene.survey.scattering => return Ok(()),
-        Method::Pm | Method::Bpm => {
+        Search::Map | Search::Merging => {
             (format!("--method {}", method.name()), "choose --method sppm, cppm, vcm, bdpt or path")
         }
         _ if settings.indirect == Indirect::Paths => ("--indirect paths".into(), "leave --indirect paths out"),

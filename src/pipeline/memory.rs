@@ -7,7 +7,7 @@ use crate::estimator::rule::{adaptive, chi_squared, local};
 use crate::finish::{self, BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
 use crate::memory;
 use crate::photon;
-use crate::render::{MAX_TECHNIQUES, Method, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
+use crate::render::{BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
 use crate::scene::Scene;
 use crate::transport::MergePhoton;
 use std::fmt::Display;
@@ -32,7 +32,7 @@ fn needed(
     let method = settings.method;
     let gathered = (f64::from(settings.photons) * per_light_path * PHOTON_BYTES as f64) as u64;
     let (merged, photons) = match (method.counts_photons(), method.has_bandwidths()) {
-        _ if method == Method::Pm => (0, settings.photon_memory.min(gathered)),
+        _ if method.has_one_map() => (0, settings.photon_memory.min(gathered)),
         (true, _) => (0, gathered),
         (false, true) => ((light_paths * per_light_path * MERGED_BYTES as f64) as u64, 0),
         (false, false) => (0, 0),
@@ -41,16 +41,16 @@ fn needed(
     let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
     // Bandwidths of their own, and counts.
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
-    let state = match method {
-        Method::Cppm => {
+    let state = match settings.rule() {
+        Some(BandwidthRule::ChiSquared) => {
             // Guided, the largest weight as well.
             size_of::<chi_squared::Bandwidth>() + (cells + usize::from(settings.guided)) * size_of::<u32>()
         }
-        Method::Appm => size_of::<adaptive::Bandwidth>(),
-        _ if method.gathers() && !settings.is_memoryless() => size_of::<local::Bandwidth>(),
-        _ => 0,
+        Some(BandwidthRule::Adaptive) => size_of::<adaptive::Bandwidth>(),
+        Some(BandwidthRule::Local) => size_of::<local::Bandwidth>(),
+        Some(BandwidthRule::Memoryless) | None => 0,
     };
-    let apart = if method == Method::Cppm && settings.chi_squared.plus { 3 } else { 1 };
+    let apart = if settings.has_channels() { 3 } else { 1 };
     // At most: a scene may have photons of one kind alone. Twice, because an iteration that is given up takes them back.
     let own = 2 * (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
     let per_pixel = own
@@ -129,7 +129,7 @@ impl Cap {
                 "use a smaller --width and --height, --crop, fewer --levels, another --method, or more --memory";
             return Err(Error::new(Kind::Usage, "command line", cause).hint(fewer));
         }
-        if settings.method == Method::Pm {
+        if settings.method.has_one_map() {
             let told = format!(
                 "--memory {mib}: the photon map has room for {} MiB instead of {}",
                 left >> 20,
@@ -153,7 +153,7 @@ pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize, fin
     let needed = needed(size, (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
     let needed = needed + if finishes { finish_bytes(size, groups) } else { 0 };
     let paths = if settings.method.counts_photons() {
-        let each = if settings.method == Method::Pm { "" } else { " an iteration" };
+        let each = if settings.method.has_one_map() { "" } else { " an iteration" };
         format!(" and {} light paths{each}", settings.photons)
     } else {
         format!(" with --method {}", settings.method.name())
@@ -190,6 +190,7 @@ fn refuse(needed: u64, what: impl Display, fewer: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Method;
 
     /// A finish takes what its pixels and parts take; the denoiser works in tiles.
     #[test]

@@ -1,13 +1,13 @@
-//! From settings to the passes that they ask for: the one place where methods, rules and kernels are told apart.
+//! From settings to the passes that they ask for: the one place that knows which pass a method is.
 
 use super::bidirectional::Passes;
 use super::counting::Counting;
 use super::iterate::Iterate;
-use super::method::Method;
+use super::method::{BandwidthRule, Method};
 use super::metropolis::Metropolis;
 use super::path::Paths;
 use super::pm::Pm;
-use super::settings::{KernelChoice, RadiusRule, Settings};
+use super::settings::{KernelChoice, Settings};
 use super::sppm::Sppm;
 use crate::camera::Camera;
 use crate::estimator::rule::CountingRule;
@@ -43,19 +43,18 @@ pub(super) fn passes<'a>(
 
 /// Progressive photon mapping by the rule that the settings say.
 fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Iterate + 'a> {
-    match (settings.method, settings.radius_rule, settings.kernel) {
+    use BandwidthRule as Rule;
+    match (settings.rule(), settings.kernel) {
         // Photons of equal flux are as dense as the light.
-        (Method::Cppm, ..) if sppm.guide().is_some() && !settings.chi_squared.plus => {
+        (Some(Rule::ChiSquared), _) if sppm.guide().is_some() && !settings.has_channels() => {
             counting(sppm, settings, Thinned::new(&settings.chi_squared), kernel::Box)
         }
-        (Method::Cppm, ..) => counting(sppm, settings, ChiSquared::new(&settings.chi_squared), kernel::Box),
-        (Method::Appm, _, KernelChoice::Box) => adaptive(sppm, settings, kernel::Box),
-        (Method::Appm, _, KernelChoice::Epanechnikov) => adaptive(sppm, settings, kernel::Epanechnikov),
-        (Method::Appm, _, KernelChoice::Gaussian) => adaptive(sppm, settings, kernel::Gaussian),
-        (Method::Ppm, ..) | (_, RadiusRule::Local, _) => {
-            counting(sppm, settings, LocalStatistics { alpha: settings.alpha }, kernel::Box)
-        }
-        (_, RadiusRule::Memoryless, _) => Box::new(sppm),
+        (Some(Rule::ChiSquared), _) => counting(sppm, settings, ChiSquared::new(&settings.chi_squared), kernel::Box),
+        (Some(Rule::Adaptive), KernelChoice::Box) => adaptive(sppm, settings, kernel::Box),
+        (Some(Rule::Adaptive), KernelChoice::Epanechnikov) => adaptive(sppm, settings, kernel::Epanechnikov),
+        (Some(Rule::Adaptive), KernelChoice::Gaussian) => adaptive(sppm, settings, kernel::Gaussian),
+        (Some(Rule::Local), _) => counting(sppm, settings, LocalStatistics { alpha: settings.alpha }, kernel::Box),
+        (Some(Rule::Memoryless) | None, _) => Box::new(sppm),
     }
 }
 

@@ -1,14 +1,14 @@
 //! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on
 //! (`scripts/figures.sh cost`); choices depend on their ratios.
 
-use super::method::Method;
+use super::method::BandwidthRule;
 use super::settings::Settings;
 use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
-use crate::plan::{ClassSet, Effect, PathClass, classes_in};
+use crate::plan::{ClassSet, Effect, PathClass, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::transport::{Eye, Indirect, Lengths, Surroundings};
 
@@ -103,13 +103,15 @@ impl Cost {
         let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
         let [eye_vertex, light_vertex, two_way_vertex] =
             [EYE_VERTEX, LIGHT_VERTEX, TWO_WAY_VERTEX].map(|vertex| vertex * (1.0 + TEXTURED * textured));
-        let gather = match way.method {
+        let gather = match way.method.rules() {
             _ if unwanted => 0.0,
-            Method::Cppm => GATHER + COUNTING,
+            [BandwidthRule::ChiSquared] => GATHER + COUNTING,
             _ => GATHER,
         };
         let all = match (way.method, way.indirect) {
-            (Method::Path, _) => pixels * (EYE_PATH + eye_alone * eye_vertex + eye_media_alone * EYE_MEDIUM),
+            (method, _) if method.search() == Search::EyePaths => {
+                pixels * (EYE_PATH + eye_alone * eye_vertex + eye_media_alone * EYE_MEDIUM)
+            }
             (method, Indirect::Photons) if method.gathers() => {
                 paths * (EYE_PATH + eye_to_broad * (eye_vertex + gather) + on_the_way * ON_THE_WAY)
                     + photons * (start + light_alone * light_vertex + light_media_alone * LIGHT_VERTEX)

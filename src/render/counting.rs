@@ -8,7 +8,6 @@
 use super::clock::cpu_seconds;
 use super::iterate::{Iterate, Work};
 use super::measures::Measures;
-use super::method::Method;
 use super::result::Phases;
 use super::settings::Settings;
 use super::sppm::Sppm;
@@ -176,8 +175,7 @@ pub(super) struct Counting<'a, R: CountingRule, K> {
 impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     /// Nothing done yet.
     pub fn new(sppm: Sppm<'a>, settings: &'a Settings, rule: R, kernel: K) -> Self {
-        let apart = settings.method == Method::Cppm && settings.chi_squared.plus;
-        let channels = apart.then(|| sppm.equal_flux());
+        let channels = settings.has_channels().then(|| sppm.equal_flux());
         // Where photons bring nothing, pixels still have a state.
         let kinds = match sppm.kinds() {
             [false, false] => [true, false],
@@ -192,7 +190,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
         // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: what one point of the film sees,
         // all of it if it is by glass.
-        let film = if self.settings.method == Method::Ppm { 1 } else { i };
+        let film = if self.settings.method.has_fixed_points() { 1 } else { i };
         [film, i].map(|pass| Streams::in_sequence(self.settings.seed, pass, domain))
     }
 

@@ -2,7 +2,6 @@
 
 use super::control::{History, StopReason};
 use super::error_estimate::ErrorEstimate;
-use super::method::Method;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Settings, Shard};
 use crate::estimator::{BandwidthState, Pixel};
@@ -104,7 +103,7 @@ impl Part {
         let last = parts.iter().max_by_key(|part| part.last)?;
         let sum = |of: fn(&Phases) -> f64| parts.iter().map(|part| of(&part.phases)).sum();
         // All shards trace the same map.
-        let once = last.settings.method == Method::Pm;
+        let once = last.settings.method.has_one_map();
         let of_light =
             |counts: &mut dyn Iterator<Item = u64>| if once { counts.max().unwrap_or(0) } else { counts.sum() };
         Some(Part {

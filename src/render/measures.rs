@@ -2,7 +2,6 @@
 //! iteration that is given up counts for none of them. One level takes half the bytes of a measure that has room for
 //! all.
 
-use super::method::Method;
 use super::settings::{Levels, Settings};
 use super::tiles::TILE_PIXELS;
 use crate::estimator::Pixel;
@@ -29,9 +28,9 @@ type OfLevel = [Rgb; 3];
 /// Bytes that an iteration keeps of a pixel besides its sums.
 pub fn bytes_of_measures(settings: &Settings) -> usize {
     let pairs = 1 + usize::from(settings.levels.two_paths);
-    match settings.method {
-        Method::Mlt => size_of::<EyeMeasure>(),
-        _ => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
+    match settings.method.has_chains() {
+        true => size_of::<EyeMeasure>(),
+        false => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
     }
 }
 

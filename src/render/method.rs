@@ -1,4 +1,4 @@
-//! The methods, and what of a render's shape follows from the one chosen.
+//! The methods: one row each, with all that others ask about a method. Its pass is made in `choice.rs`.
 
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
@@ -14,117 +14,325 @@ pub const DEFAULT_MAP_KNN: usize = 100;
 /// one.
 pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
-/// How light is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
+/// Default reduction rate where merging complements connections \[Georgiev et al. 2012\].
+const MERGING_ALPHA: f64 = 0.75;
+
+/// The rule that a method's bandwidths follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BandwidthRule {
+    /// The iteration's number alone ([`memoryless`]).
+    Memoryless,
+    /// The number of photons found ([`local`](crate::estimator::rule::local)).
+    Local,
+    /// The least estimated error ([`adaptive`](crate::estimator::rule::adaptive)).
+    Adaptive,
+    /// A test of uniformity ([`chi_squared`](crate::estimator::rule::chi_squared)).
+    ChiSquared,
+}
+
+/// What others ask about a method.
+struct Row {
+    /// Name on the command line and in files.
+    name: &'static str,
+    /// One line for help texts.
+    help: &'static str,
+    /// Techniques, where photons bring all indirect light.
+    search: Search,
+    /// Techniques where photons bring caustics alone, if the method can leave the rest to camera paths.
+    search_with_paths: Option<Search>,
+    /// Rules that its bandwidths can follow, the default first. Empty: it has no bandwidths that shrink.
+    rules: &'static [BandwidthRule],
+    /// Whether its bandwidths are several levels.
+    has_levels: bool,
+    /// Default number of light paths where that is a setting. The other methods trace one per camera path, or none.
+    photons: Option<u32>,
+    /// Default number of neighbours that set bandwidths, with several levels and with one.
+    neighbours: (usize, usize),
+    /// Default reduction rate of the memoryless rule.
+    alpha: f64,
+    /// Whether its light paths can be guided.
+    guides: bool,
+    /// Whether camera paths gather at the same points in every iteration.
+    has_fixed_points: bool,
+    /// Whether its samples are Markov chains.
+    has_chains: bool,
+    /// Method that takes its place in pilots, where levels must keep the ratio of their bandwidths.
+    pilot: Option<Method>,
+}
+
+impl Row {
+    /// An unbiased method.
+    const UNBIASED: Row = Row {
+        name: "",
+        help: "",
+        search: Search::Connections,
+        search_with_paths: None,
+        rules: &[],
+        has_levels: false,
+        photons: None,
+        neighbours: DEFAULT_KNN,
+        alpha: memoryless::ALPHA,
+        guides: false,
+        has_fixed_points: false,
+        has_chains: false,
+        pilot: None,
+    };
+
+    /// A method whose camera paths gather the photons of a new map in every iteration.
+    const GATHERING: Row = Row {
+        search: Search::Photons,
+        has_levels: true,
+        photons: Some(DEFAULT_PHOTONS),
+        guides: true,
+        ..Row::UNBIASED
+    };
+}
+
+/// Declares [`Method`] and its rows.
+macro_rules! methods {
+    ($($(#[$attribute:meta])* $method:ident = $row:expr;)*) => {
+        /// How light is found.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Method {
+            $($(#[$attribute])* $method,)*
+        }
+
+        impl Method {
+            /// All methods, in the order of help texts.
+            pub const ALL: &[Method] = &[$(Method::$method),*];
+
+            const fn row(self) -> &'static Row {
+                match self {
+                    $(Method::$method => const { &$row },)*
+                }
+            }
+        }
+    };
+}
+
+methods! {
     /// Path tracing with next-event estimation.
-    Path,
+    Path = Row { name: "path", help: "Path tracing", search: Search::EyePaths, ..Row::UNBIASED };
+
     /// Light tracing with connections to the camera; of eye paths only what mirrors and clear glass show of lights.
-    Light,
+    Light = Row {
+        name: "light",
+        help: "Light tracing: what mirrors and clear glass show stays black",
+        search: Search::LightPaths,
+        guides: true,
+        ..Row::UNBIASED
+    };
+
     /// Bidirectional path tracing.
-    Bdpt,
+    Bdpt = Row { name: "bdpt", help: "Bidirectional path tracing", guides: true, ..Row::UNBIASED };
+
     /// Classical photon mapping: photons traced once, nearest neighbours.
-    Pm,
+    Pm = Row {
+        name: "pm",
+        help: "Classical photon mapping: one map, the nearest photons; tends to a blurred picture",
+        search: Search::Map,
+        photons: Some(DEFAULT_MAP_PHOTONS),
+        neighbours: (DEFAULT_MAP_KNN, DEFAULT_MAP_KNN),
+        ..Row::UNBIASED
+    };
+
     /// Progressive photon mapping: measurement points stay where they are, bandwidths follow local statistics.
-    Ppm,
+    Ppm = Row {
+        name: "ppm",
+        help: "Progressive photon mapping: one fixed point per pixel, so edges are jagged",
+        rules: &[BandwidthRule::Local],
+        has_fixed_points: true,
+        ..Row::GATHERING
+    };
+
     /// Stochastic progressive photon mapping.
     #[default]
-    Sppm,
+    Sppm = Row {
+        name: "sppm",
+        help: "Stochastic progressive photon mapping",
+        search_with_paths: Some(Search::PathsAndPhotons),
+        rules: &[BandwidthRule::Memoryless, BandwidthRule::Local],
+        ..Row::GATHERING
+    };
+
     /// Adaptive progressive photon mapping: the bandwidths of least estimated error.
-    Appm,
+    Appm = Row {
+        name: "appm",
+        help: "Adaptive progressive photon mapping: sppm whose bandwidths have the least estimated error",
+        rules: &[BandwidthRule::Adaptive],
+        ..Row::GATHERING
+    };
+
     /// Chi-squared progressive photon mapping: bandwidths shrink where photons do not look uniform.
-    Cppm,
+    Cppm = Row {
+        name: "cppm",
+        help: "Chi-squared progressive photon mapping: sppm whose bandwidths shrink only where the photons do not look \
+               uniform",
+        rules: &[BandwidthRule::ChiSquared],
+        pilot: Some(Method::Sppm),
+        ..Row::GATHERING
+    };
+
     /// Bidirectional photon mapping: merging at all vertices, nothing else.
-    Bpm,
+    Bpm = Row {
+        name: "bpm",
+        help: "Bidirectional photon mapping: merging alone",
+        search: Search::Merging,
+        rules: &[BandwidthRule::Memoryless],
+        alpha: MERGING_ALPHA,
+        guides: true,
+        ..Row::UNBIASED
+    };
+
     /// Vertex connection and merging.
-    Vcm,
+    Vcm = Row {
+        name: "vcm",
+        help: "Vertex connection and merging",
+        search: Search::ConnectionsAndMerging,
+        rules: &[BandwidthRule::Memoryless],
+        has_levels: true,
+        alpha: MERGING_ALPHA,
+        guides: true,
+        ..Row::UNBIASED
+    };
+
     /// Multiplexed Metropolis light transport.
-    Mlt,
+    Mlt = Row {
+        name: "mlt",
+        help: "Metropolis light transport: chains that stay where light is; what they miss they miss for long",
+        has_chains: true,
+        ..Row::UNBIASED
+    };
 }
 
 impl Method {
-    /// Its name on the command line and in files.
+    /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Method::Path => "path",
-            Method::Light => "light",
-            Method::Bdpt => "bdpt",
-            Method::Pm => "pm",
-            Method::Ppm => "ppm",
-            Method::Sppm => "sppm",
-            Method::Appm => "appm",
-            Method::Cppm => "cppm",
-            Method::Bpm => "bpm",
-            Method::Vcm => "vcm",
-            Method::Mlt => "mlt",
-        }
+        self.row().name
+    }
+
+    /// The method of that name.
+    pub fn named(name: &str) -> Option<Method> {
+        Method::ALL.iter().copied().find(|method| method.name() == name)
+    }
+
+    /// One line for help texts.
+    pub fn help(self) -> &'static str {
+        self.row().help
     }
 
     /// How it looks for light, where photons bring all indirect light.
     pub fn search(self) -> Search {
-        match self {
-            Method::Path => Search::EyePaths,
-            Method::Light => Search::LightPaths,
-            Method::Bdpt | Method::Mlt => Search::Connections,
-            Method::Pm => Search::Map,
-            Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => Search::Photons,
-            Method::Bpm => Search::Merging,
-            Method::Vcm => Search::ConnectionsAndMerging,
-        }
+        self.row().search
+    }
+
+    /// How it looks for light where photons bring caustics alone, if it can leave the rest to camera paths.
+    pub fn search_with_paths(self) -> Option<Search> {
+        self.row().search_with_paths
+    }
+
+    /// Rules that its bandwidths can follow, the default first; empty without bandwidths that shrink.
+    pub fn rules(self) -> &'static [BandwidthRule] {
+        self.row().rules
+    }
+
+    /// The rule that its bandwidths follow where `asked` is asked for, if they follow one.
+    pub fn rule(self, asked: BandwidthRule) -> Option<BandwidthRule> {
+        let rules = self.rules();
+        rules.iter().find(|rule| **rule == asked).or(rules.first()).copied()
     }
 
     /// Whether it weighs sampling techniques against each other path by path, or has but one.
     pub fn has_techniques(self) -> bool {
-        !self.counts_photons() && self != Method::Mlt
+        !self.counts_photons() && !self.has_chains()
+    }
+
+    /// Whether its samples are Markov chains.
+    pub fn has_chains(self) -> bool {
+        self.row().has_chains
     }
 
     /// Whether its bandwidths are several levels.
     pub fn has_levels(self) -> bool {
-        self.gathers() || self == Method::Vcm
+        self.row().has_levels
     }
 
-    /// Whether it has bandwidths.
+    /// Whether it has bandwidths that shrink.
     pub fn has_bandwidths(self) -> bool {
-        self.gathers() || matches!(self, Method::Bpm | Method::Vcm)
+        !self.rules().is_empty()
+    }
+
+    /// Whether a reduction rate sets how fast its bandwidths shrink.
+    pub fn takes_alpha(self) -> bool {
+        self.rules().iter().any(|rule| matches!(rule, BandwidthRule::Memoryless | BandwidthRule::Local))
+    }
+
+    /// Whether it weighs photons by any kernel when its bandwidths follow a rule; the box is for all.
+    pub fn takes_kernels(self, rule: BandwidthRule) -> bool {
+        self.gathers() && matches!(self.rule(rule), Some(BandwidthRule::Memoryless | BandwidthRule::Adaptive))
     }
 
     /// Whether every iteration gathers the photons of a map of its own: progressive photon mapping, of whatever rule.
     pub fn gathers(self) -> bool {
-        matches!(self, Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm)
+        self.search() == Search::Photons
+    }
+
+    /// Whether all iterations gather the photons of one map, so that bias stays.
+    pub fn has_one_map(self) -> bool {
+        self.search() == Search::Map
+    }
+
+    /// Whether camera paths gather at the same points in every iteration.
+    pub fn has_fixed_points(self) -> bool {
+        self.row().has_fixed_points
     }
 
     /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have
     /// one for every eye path, or none.
     pub fn counts_photons(self) -> bool {
-        self.gathers() || self == Method::Pm
+        self.row().photons.is_some()
     }
 
     /// Whether its light paths can be guided.
     pub fn guides(self) -> bool {
-        self.gathers() || matches!(self, Method::Light | Method::Bdpt | Method::Bpm | Method::Vcm)
+        self.row().guides
     }
 
-    /// Light paths where no number is asked for, of methods that count them.
+    /// Default number of light paths of methods where it is a setting.
     pub fn photons(self) -> u32 {
-        if self == Method::Pm { DEFAULT_MAP_PHOTONS } else { DEFAULT_PHOTONS }
+        self.row().photons.unwrap_or(DEFAULT_PHOTONS)
     }
 
-    /// Neighbours that set bandwidths where no number is asked for.
+    /// Default number of neighbours that set bandwidths.
     pub fn neighbours(self, levels: usize) -> usize {
-        match (self, levels) {
-            (Method::Pm, _) => DEFAULT_MAP_KNN,
-            (_, 1) => DEFAULT_KNN.1,
-            _ => DEFAULT_KNN.0,
-        }
+        let (several, one) = self.row().neighbours;
+        if levels == 1 { one } else { several }
     }
 
-    /// Reduction rate of the memoryless rule where none is asked for \[Georgiev et al. 2012 for merging with
-    /// connections\].
+    /// Default reduction rate of the memoryless rule.
     pub fn alpha(self) -> f64 {
-        match self {
-            Method::Bpm | Method::Vcm => 0.75,
-            _ => memoryless::ALPHA,
+        self.row().alpha
+    }
+
+    /// The method that is tried in its place by pilots, where levels must keep the ratio of their bandwidths.
+    pub fn pilot(self) -> Method {
+        self.row().pilot.unwrap_or(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names are those that serde writes into checkpoints, and each is one method's.
+    #[test]
+    fn names_are_those_in_files() {
+        for method in Method::ALL {
+            assert_eq!(serde_json::to_value(method).unwrap(), method.name());
+            assert_eq!(Method::named(method.name()), Some(*method));
+            assert!(!method.help().is_empty() && !method.help().ends_with('.'));
         }
+        assert_eq!(Method::named("photons"), None);
     }
 }

@@ -43,7 +43,7 @@ pub use error_estimate::ErrorEstimate;
 pub use forecast::photons_per_path;
 pub use joined::Part;
 pub use measures::bytes_of_measures;
-pub use method::{DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
+pub use method::{BandwidthRule, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
 pub use pm::PHOTON_BYTES;
 pub use rejections::Rejections;
 pub use result::{Phases, Rendered};

@@ -1,7 +1,6 @@
 //! What a render leaves in its file: layers, and the account in the header.
 
 use super::control::StopReason;
-use super::method::Method;
 use super::result::Rendered;
 use super::settings::Settings;
 use crate::error::Result;
@@ -51,7 +50,7 @@ impl Rendered {
         put("iterations", self.iterations.into());
         put("light_paths", self.light_paths.into());
         put("shard", json!({"index": shard.index, "count": shard.count}));
-        if self.settings.method == Method::Pm {
+        if self.settings.method.has_one_map() {
             put("map", json!({"photons": self.photons, "full": self.map_is_full()}));
         }
         put("levels", self.settings.levels.count.into());

@@ -3,7 +3,6 @@
 use super::control::{History, StopReason};
 use super::error_estimate::ErrorEstimate;
 use super::measures::bytes_of_measures;
-use super::method::Method;
 use super::rejections::Rejections;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
@@ -65,9 +64,9 @@ impl Rendered {
         [self.pixels.first().map_or(0, Pixel::size), bytes_of_measures(&self.settings)]
     }
 
-    /// Whether the maps of [`Method::Pm`], traced once, had no room for the photons of all its light paths.
+    /// Whether the maps of [`Method::Pm`](super::Method::Pm), traced once, had no room for the photons of all its light paths.
     pub fn map_is_full(&self) -> bool {
-        self.settings.method == Method::Pm && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)
+        self.settings.method.has_one_map() && self.iterations > 0 && self.light_paths < u64::from(self.settings.photons)
     }
 
     /// Estimated relative error of the method's own image, bias included: root of the mean over pixels of the mean over

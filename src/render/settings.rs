@@ -1,6 +1,6 @@
 //! What a render is asked to do.
 
-use super::method::{DEFAULT_KNN, DEFAULT_PHOTONS, Method};
+use super::method::{BandwidthRule, DEFAULT_KNN, DEFAULT_PHOTONS, Method};
 use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::estimator::bandwidth::SCREEN_CAP;
@@ -90,6 +90,15 @@ pub enum RadiusRule {
     Local,
 }
 
+impl From<RadiusRule> for BandwidthRule {
+    fn from(rule: RadiusRule) -> Self {
+        match rule {
+            RadiusRule::Memoryless => BandwidthRule::Memoryless,
+            RadiusRule::Local => BandwidthRule::Local,
+        }
+    }
+}
+
 /// Settings of a render.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Settings {
@@ -146,7 +155,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings {
-            method: Method::Sppm,
+            method: Method::default(),
             seed: 0,
             photons: DEFAULT_PHOTONS,
             photon_memory: DEFAULT_MAP_MEMORY,
@@ -249,10 +258,8 @@ impl Settings {
 
     /// How it looks for light.
     pub fn search(&self) -> Search {
-        match (self.method, self.indirect) {
-            (Method::Sppm, Indirect::Paths) => Search::PathsAndPhotons,
-            (method, _) => method.search(),
-        }
+        let with_paths = self.method.search_with_paths().filter(|_| self.indirect == Indirect::Paths);
+        with_paths.unwrap_or(self.method.search())
     }
 
     /// Classes of light that photons are to bring to eye paths that gather them.
@@ -269,19 +276,29 @@ impl Settings {
         }
     }
 
+    /// The rule that its bandwidths follow, if they follow one.
+    pub fn rule(&self) -> Option<BandwidthRule> {
+        self.method.rule(self.radius_rule.into())
+    }
+
+    /// Whether red, green and blue have photons and bandwidths of their own.
+    pub fn has_channels(&self) -> bool {
+        self.rule() == Some(BandwidthRule::ChiSquared) && self.chi_squared.plus
+    }
+
     /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any
     /// order.
     pub fn is_memoryless(&self) -> bool {
-        match self.method {
-            Method::Ppm | Method::Cppm | Method::Appm => false,
-            Method::Sppm => self.radius_rule == RadiusRule::Memoryless,
-            _ => true,
-        }
+        self.rule().is_none_or(|rule| rule == BandwidthRule::Memoryless)
     }
 
     /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on
     /// its own, those up to the method's own image, which leaves none to compare it with.
     pub fn compared_levels(&self) -> usize {
-        if self.is_memoryless() || self.method == Method::Appm { self.levels.count } else { self.levels.own() + 1 }
+        if self.is_memoryless() || self.rule() == Some(BandwidthRule::Adaptive) {
+            self.levels.count
+        } else {
+            self.levels.own() + 1
+        }
     }
 }

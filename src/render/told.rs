@@ -4,7 +4,6 @@
 //! ([`crate::estimator::SquaredError`]). Where there is no such level, or the points that gather photons stay where
 //! they are, the number lacks a part of the error, and whoever reads it is told so beside it.
 
-use super::method::Method;
 use super::settings::Settings;
 use serde::Serialize;
 
@@ -48,8 +47,8 @@ impl Settings {
     pub fn told(&self) -> Told {
         let compared = self.levels.own() + 1 < self.compared_levels();
         match self.method {
-            Method::Ppm => Told::PhotonNoise,
-            Method::Pm => Told::Noise,
+            method if method.has_fixed_points() => Told::PhotonNoise,
+            method if method.has_one_map() => Told::Noise,
             method if method.has_bandwidths() && !compared => Told::Noise,
             _ => Told::All,
         }
@@ -59,7 +58,7 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{Levels, RadiusRule};
+    use crate::render::{Levels, Method, RadiusRule};
 
     #[test]
     fn bias_is_told_by_a_larger_level() {

@@ -1,6 +1,7 @@
 //! How fast the squared error should fall with iterations.
 
-use crate::render::{Method, Settings};
+use crate::plan::Search;
+use crate::render::{BandwidthRule, Settings};
 
 /// An exponent of the squared error in the number of iterations, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,11 +19,11 @@ pub struct Theory {
 /// \[Kaplanyan and Dachsbacher 2013\].
 pub fn theory(settings: &Settings) -> Option<Theory> {
     let kernel = -settings.alpha.min(2.0 - 2.0 * settings.alpha);
-    let (exponent, because) = match settings.method {
-        Method::Path | Method::Light | Method::Bdpt | Method::Mlt => (-1.0, "unbiased: variance alone, N^−1"),
-        Method::Sppm | Method::Bpm => (kernel, "the slower of variance N^−α and squared bias N^(2α − 2)"),
-        Method::Vcm => (kernel, "of what is merged; where connections do, N^−1"),
-        Method::Pm => (0.0, "one map: its error stays"),
+    let (exponent, because) = match (settings.method.search(), settings.method.rules()) {
+        (Search::Map, _) => (0.0, "one map: its error stays"),
+        (_, []) => (-1.0, "unbiased: variance alone, N^−1"),
+        (Search::ConnectionsAndMerging, _) => (kernel, "of what is merged; where connections do, N^−1"),
+        (_, [BandwidthRule::Memoryless, ..]) => (kernel, "the slower of variance N^−α and squared bias N^(2α − 2)"),
         _ => return None,
     };
     // Not -0.
@@ -32,6 +33,7 @@ pub fn theory(settings: &Settings) -> Option<Theory> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Method;
 
     #[test]
     fn the_memoryless_rule_is_best_at_two_thirds() {

@@ -4,7 +4,6 @@ use crate::estimator::{InitialBandwidth, Pixel};
 use crate::finish::{Size, window};
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
-use crate::render::method::Method;
 use crate::render::settings::{Levels, Settings, Shard};
 use crate::stat::median;
 use crate::transport::MAX_LEVELS;
@@ -38,7 +37,7 @@ fn widened(of: &Settings, photons: f64, area: f32) -> Settings {
 /// The same with all levels, level 1 by an eye path of its own, which [`values`] asks for.
 pub(super) fn with_levels(of: &Settings, photons: f64) -> Settings {
     // Bandwidths that follow counts shrink on their own.
-    let method = if of.method == Method::Cppm { Method::Sppm } else { of.method };
+    let method = of.method.pilot();
     // One level alone is what of several is the second largest, of half the area.
     let larger = if of.levels.count == 1 { 2 } else { 1 };
     let initial = match of.initial {
