@@ -19,7 +19,7 @@ _DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can name: the same files
 def contents():
     """What the zip holds: names in it, and the files they come from."""
     addon = os.path.join(_HERE, "caustique_addon")
-    files = {name: os.path.join(addon, name) for name in os.listdir(addon) if name.endswith((".py", ".toml"))}
+    files = {name: os.path.join(addon, name) for name in os.listdir(addon) if name.endswith((".py", ".toml", ".json"))}
     files.update((f"exporter/{os.path.basename(source)}", source) for source in _exporter())
     files.update((name, os.path.join(_ROOT, name)) for name in ("LICENSE-MIT", "LICENSE-APACHE"))
     return {f"{_NAME}/{name}": files[name] for name in sorted(files)}

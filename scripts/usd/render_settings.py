@@ -1,7 +1,9 @@
 """UsdRender: the picture that a stage asks for, and what `caustique:*` says about the way to it."""
 
 import fractions
+import json
 import math
+import pathlib
 
 from pxr import UsdGeom, UsdRender
 
@@ -24,11 +26,8 @@ LAYERS = {
     "albedo": "albedo", "diffusealbedo": "albedo", "n": "normal", "normal": "normal", "nn": "normal",
     "depth": "depth", "z": "Z", "cameradepth": "Z", "p": "P", "position": "P",
 }
-OUR_LAYERS = {
-    "CombinedDirect", "CombinedIndirect", "CombinedCaustic", "CombinedEmission", "CombinedVolume", "Noisy", "Direct",
-    "Indirect", "Caustic", "Emission", "Volume", "Error", "albedo", "normal", "depth", "Z", "P", "CryptoObject",
-    "CryptoMaterial",
-}
+# The program's table of layers: tests/generated.rs writes the file.
+TABLE = json.loads(pathlib.Path(__file__).with_name("layers.json").read_text("utf-8"))
 
 
 class Settings:
@@ -160,8 +159,8 @@ class Settings:
         for target in targets:
             var = self._stage.stage.GetPrimAtPath(target)
             name = self._stage.get(var.GetAttribute("sourceName"), "") if var else ""
-            layer = LAYERS.get(name.lower(), name if name in OUR_LAYERS or name.startswith(("LightGroup_", "Caustic_"))
-                               else None)
+            ours = name in TABLE["layers"] or name.startswith(tuple(TABLE["groups"]))
+            layer = LAYERS.get(name.lower(), name if ours else None)
             if layer is None:
                 self._stage.losses.name(target, f'there is no layer for the RenderVar\'s sourceName "{name}"')
             elif layer not in found:

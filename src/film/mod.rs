@@ -2,12 +2,14 @@
 
 mod ascii;
 pub mod cryptomatte;
+pub mod kind;
 mod layers;
 mod naming;
 pub mod output;
 mod plain;
 
 pub use ascii::ascii_json;
+pub use kind::{CAUSTIC, COMBINED, CRYPTOMATTES, LIGHT_GROUP, finished_part, kind_of, part_names};
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};
-pub use naming::{CAUSTIC, COMBINED, Description, LIGHT_GROUP, Naming, Selection, check, describe};
+pub use naming::{Description, Naming, Selection, check, describe};
 pub use plain::take_plain_names;

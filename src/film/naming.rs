@@ -5,6 +5,7 @@
 //! names of ours are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the component, and at most 31
 //! characters.
 
+use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, LayerKind, Suffix, Use, finished_part, kind_of, part_names, stem};
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, Kind, Result};
 
@@ -24,15 +25,7 @@ impl Naming {
         match self {
             Naming::Plain => name.to_owned(),
             Naming::Blender => {
-                let pass = match name {
-                    "" => "Combined",
-                    "Z" => "Depth",
-                    "P" => "Position",
-                    "albedo" => "Denoising Albedo",
-                    "normal" => "Normal",
-                    "depth" => "Denoising Depth",
-                    other => other,
-                };
+                let pass = kind_of(name).and_then(|(kind, _)| kind.blender).unwrap_or(name);
                 format!("ViewLayer.{pass}")
             }
         }
@@ -43,8 +36,8 @@ impl Naming {
     /// y)) in files with its names.
     pub fn axis<'c>(self, layer: &str, component: &'c str) -> (&'c str, bool) {
         match (self, layer, component) {
-            (Naming::Blender, "P" | "normal", "Y") => ("Z", true),
-            (Naming::Blender, "P" | "normal", "Z") => ("Y", false),
+            (Naming::Blender, layer, "Y") if has_axes(layer) => ("Z", true),
+            (Naming::Blender, layer, "Z") if has_axes(layer) => ("Y", false),
             _ => (component, false),
         }
     }
@@ -70,6 +63,11 @@ impl Naming {
     }
 }
 
+/// Whether a layer of ours holds places or directions of the world.
+pub(super) fn has_axes(name: &str) -> bool {
+    kind_of(name).is_some_and(|(kind, _)| kind.components == "XYZ")
+}
+
 /// What `describe` knows of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Description {
@@ -81,59 +79,14 @@ pub struct Description {
     pub meaning: &'static str,
 }
 
-const RADIANCE: &str = "W/(sr m^2)";
-
-/// Beginning of the names of layers of a group of lights.
-pub const LIGHT_GROUP: &str = "LightGroup_";
-/// Beginning of the names of layers of its caustics.
-pub const CAUSTIC: &str = "Caustic_";
-/// Beginning of the names of finished parts.
-pub const COMBINED: &str = "Combined";
-
 /// Components, unit and meaning of a layer of ours by its plain name; `None` for a name that is not ours.
 pub fn describe(name: &str) -> Option<Description> {
-    let is = |components, unit, meaning| Some(Description { components, unit, meaning });
-    for (prefix, meaning) in
-        [(LIGHT_GROUP, "light of one group of lights"), (CAUSTIC, "caustics of one group of lights")]
-    {
-        if name.strip_prefix(COMBINED).unwrap_or(name).starts_with(prefix) {
-            return is("RGB", RADIANCE, meaning);
-        }
-    }
-    match name.trim_end_matches(|c: char| c.is_ascii_digit()) {
-        "" if name.is_empty() => is("RGBA", RADIANCE, "beauty: the finished image, or the estimator's own"),
-        "Noisy" => is("RGB", RADIANCE, "the estimator's image without the finish"),
-        "Level" => is("RGB", RADIANCE, "estimate of one bandwidth level, 1 the smallest"),
-        "Variance" => is("RGB", "(W/(sr m^2))^2", "variance of the mean of one level"),
-        "Quarter" => is("RGB", RADIANCE, "the estimator's image by every fourth iteration: four independent pictures"),
-        "Radius" => is("X", "m", "bandwidth of the last iteration of one level"),
-        "CausticRadius" => is("X", "m", "the same for photons of caustics, where others are gathered, too"),
-        "VolumeRadius" => is("X", "m", "the same for photons in media"),
-        "Direct" => is("RGB", RADIANCE, "light after one bounce"),
-        "Indirect" => is("RGB", RADIANCE, "light after several bounces, caustics excepted"),
-        "Caustic" => is("RGB", RADIANCE, "light from a rough surface that mirrors or glass sent there"),
-        "Emission" => is("RGB", RADIANCE, "light that reaches the camera from its source without a rough bounce"),
-        "Volume" => is("RGB", RADIANCE, "light scattered to the camera by media"),
-        "CombinedDirect" => is("RGB", RADIANCE, "Direct as finished; all finished parts sum to the beauty"),
-        "CombinedIndirect" => is("RGB", RADIANCE, "Indirect as finished"),
-        "CombinedCaustic" => is("RGB", RADIANCE, "Caustic as finished"),
-        "CombinedEmission" => is("RGB", RADIANCE, "Emission as finished"),
-        "CombinedVolume" => is("RGB", RADIANCE, "Volume as finished"),
-        "Error" => is(
-            "RGB",
-            RADIANCE,
-            "estimated error of the beauty: the truth lies within twice as much in nine pixels of ten",
-        ),
-        "albedo" => is("RGB", "1", "reflectance at the first hit that is not a mirror or clear glass"),
-        "normal" => is("XYZ", "1", "world-space unit normal at that hit"),
-        "depth" => is("Z", "m", "distance along the path to that hit"),
-        "Z" => is("Z", "m", "camera depth of the first visible hit, 1e10 on the background"),
-        "P" => is("XYZ", "m", "position of the first visible hit"),
-        "CryptoObject" => is("rgba", "1", "cryptomatte of objects: two ranks of id and coverage"),
-        "CryptoMaterial" => is("rgba", "1", "cryptomatte of materials: two ranks of id and coverage"),
-        "Rejected" => is("X", "1", "samples rejected as not finite"),
-        _ => None,
-    }
+    let (&LayerKind { components, unit, meaning, finish, .. }, finished) = kind_of(name)?;
+    let meaning = match finish {
+        Some(Use::Part(meaning)) if finished => meaning,
+        _ => meaning,
+    };
+    Some(Description { components, unit, meaning })
 }
 
 /// What `--layers` asks for.
@@ -167,18 +120,21 @@ impl Selection {
                 .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
         }
         match names.iter().find(|name| *name != "beauty" && describe(name).is_none()) {
-            Some(unknown) => Err(unknown_layer(unknown, KNOWN.iter().copied())),
+            Some(unknown) => {
+                let known = suggestions();
+                Err(unknown_layer(unknown, known.iter().map(String::as_str)))
+            }
             None => Ok(Selection::List(names)),
         }
     }
 
     /// Whether a layer of this plain name is asked for.
     pub fn wants(&self, name: &str) -> bool {
-        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let stem = stem(name);
         match self {
-            Selection::All => stem != "Quarter",
+            Selection::All => !kind_of(name).is_some_and(|(kind, _)| kind.on_request),
             Selection::Beauty => name.is_empty(),
-            Selection::Comp => name.is_empty() || stem.starts_with("Combined") || COMP.contains(&stem),
+            Selection::Comp => kind_of(name).is_some_and(|(kind, finished)| finished || kind.compositing),
             Selection::List(names) => {
                 names.iter().any(|n| n == name || (n == "beauty" && name.is_empty()) || (!stem.is_empty() && n == stem))
             }
@@ -210,47 +166,25 @@ impl Selection {
     }
 }
 
-/// Layers for compositing besides the picture and its parts, by their names without numbers.
-const COMP: [&str; 5] = ["albedo", "normal", "Z", "CryptoObject", "CryptoMaterial"];
-
 /// Whether half floats hold a layer as well as anybody sees: colours and directions, where none is too bright. Depth
 /// wants more digits, and the ids of cryptomattes are no numbers.
 fn serves_as_half(layer: &Layer) -> bool {
     const LARGEST: f32 = 65_504.0;
-    let colours = layer.name.is_empty() || layer.name.starts_with("Combined");
-    (colours || layer.name == "albedo" || layer.name == "normal")
+    kind_of(&layer.name).is_some_and(|(kind, finished)| finished || kind.half)
         && layer.planes.iter().all(|plane| plane.values.iter().all(|value| value.abs() <= LARGEST))
 }
 
-/// Names to suggest from; [`describe`] knows each.
-const KNOWN: [&str; 26] = [
-    "beauty",
-    "Noisy",
-    "Level1",
-    "Variance1",
-    "Quarter1",
-    "Radius1",
-    "CausticRadius1",
-    "VolumeRadius1",
-    "Direct",
-    "Indirect",
-    "Caustic",
-    "Emission",
-    "Volume",
-    "CombinedDirect",
-    "CombinedIndirect",
-    "CombinedCaustic",
-    "CombinedEmission",
-    "CombinedVolume",
-    "Error",
-    "albedo",
-    "normal",
-    "depth",
-    "Z",
-    "P",
-    "CryptoObject00",
-    "Rejected",
-];
+/// Names to suggest from: of numbered layers the first.
+fn suggestions() -> Vec<String> {
+    let first = |kind: &LayerKind| match kind.suffix {
+        Suffix::None if kind.name.is_empty() => Some("beauty".into()),
+        Suffix::None => Some(kind.name.into()),
+        Suffix::Level | Suffix::Quarter => Some(format!("{}1", kind.name)),
+        Suffix::Ranks => Some(format!("{}00", kind.name)),
+        Suffix::Group => None,
+    };
+    LAYERS.iter().filter_map(first).chain(part_names().filter_map(finished_part)).collect()
+}
 
 fn unknown_layer<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Error {
     let known: Vec<&str> = known.collect();
@@ -324,7 +258,7 @@ mod tests {
     #[test]
     fn every_suggested_name_is_described_and_well_formed() {
         let mut set = LayerSet::new(1, 1);
-        for name in KNOWN {
+        for name in &suggestions() {
             let name = if name == "beauty" { "" } else { name };
             let components = describe(name).expect(name).components;
             let planes = components.chars().map(|c| super::super::layers::Plane {

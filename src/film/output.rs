@@ -12,8 +12,8 @@
 //! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and
 //!   `normal` are zero there.
 
+use super::kind::{CAUSTIC, LIGHT_GROUP, kind_of};
 use super::layers::{Layer, LayerSet, Plane, Sample};
-use super::naming::{CAUSTIC, LIGHT_GROUP};
 use crate::error::Result;
 use crate::estimator::{BandwidthState, FAR, Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
@@ -74,23 +74,29 @@ struct Column {
 }
 
 impl Column {
+    /// A layer of the [table](super::kind).
+    fn new(name: impl Into<String>, get: impl Fn(&At<'_>) -> [f32; 4] + Sync + 'static) -> Column {
+        let name = name.into();
+        let components = kind_of(&name).map_or("", |(kind, _)| kind.components);
+        Column { name, components, get: Box::new(get) }
+    }
+
     fn rgb(name: impl Into<String>, get: impl Fn(&Pixel) -> DVec3 + Sync + 'static) -> Column {
-        Column { name: name.into(), components: "RGB", get: Box::new(move |at| three(get(at.pixel).as_vec3())) }
+        Column::new(name, move |at| three(get(at.pixel).as_vec3()))
     }
 
     fn noise(name: impl Into<String>, get: impl Fn(&At<'_>) -> DVec3 + Sync + 'static) -> Column {
         // Squares of 10^20 and more are no f32: what is known to be large is not to look as if nothing were known.
         let most = DVec3::splat(f64::from(f32::MAX));
-        let get = Box::new(move |at: &At<'_>| three(get(at).min(most).as_vec3()));
-        Column { name: name.into(), components: "RGB", get }
+        Column::new(name, move |at| three(get(at).min(most).as_vec3()))
     }
 
     fn xyz(name: &str, get: impl Fn(&Pixel) -> Vec3 + Sync + 'static) -> Column {
-        Column { name: name.into(), components: "XYZ", get: Box::new(move |at| three(get(at.pixel))) }
+        Column::new(name, move |at| three(get(at.pixel)))
     }
 
-    fn one(name: impl Into<String>, components: &'static str, get: impl Fn(&At<'_>) -> f32 + Sync + 'static) -> Column {
-        Column { name: name.into(), components, get: Box::new(move |at| [get(at), 0.0, 0.0, 0.0]) }
+    fn one(name: impl Into<String>, get: impl Fn(&At<'_>) -> f32 + Sync + 'static) -> Column {
+        Column::new(name, move |at| [get(at), 0.0, 0.0, 0.0])
     }
 }
 
@@ -115,14 +121,10 @@ pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
 fn columns(shape: &Shape) -> Vec<Column> {
     let Shape { levels, compared, own, kinds, environment, classes, volume, volume_photons, .. } = *shape;
     let mut columns = vec![
-        Column {
-            name: String::new(),
-            components: "RGBA",
-            get: Box::new(move |at| {
-                let alpha = if environment { 1.0 } else { at.pixel.coverage.hit_fraction() };
-                at.pixel.mean(own).as_vec3().extend(alpha).to_array()
-            }),
-        },
+        Column::new("", move |at| {
+            let alpha = if environment { 1.0 } else { at.pixel.coverage.hit_fraction() };
+            at.pixel.mean(own).as_vec3().extend(alpha).to_array()
+        }),
         Column::rgb("Noisy", move |p| p.mean(own)),
     ];
     for level in 0..levels {
@@ -134,12 +136,12 @@ fn columns(shape: &Shape) -> Vec<Column> {
     for (kind, name) in radius_layers(kinds) {
         for level in 0..levels {
             let radius = move |at: &At<'_>| at.bandwidths.radius2(at.index, at.pixel, kind, level).sqrt();
-            columns.push(Column::one(format!("{name}{}", level + 1), "X", radius));
+            columns.push(Column::one(format!("{name}{}", level + 1), radius));
         }
     }
     for level in (0..levels).filter(|_| volume_photons) {
         let radius = move |at: &At<'_>| at.bandwidths.volume_radius(at.pixel, level);
-        columns.push(Column::one(format!("VolumeRadius{}", level + 1), "X", radius));
+        columns.push(Column::one(format!("VolumeRadius{}", level + 1), radius));
     }
     for quarter in 0..QUARTERS {
         columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarter(quarter)));
@@ -170,10 +172,10 @@ fn columns(shape: &Shape) -> Vec<Column> {
         }),
         Column::rgb("albedo", Pixel::albedo),
         Column::xyz("normal", |p| p.normal().as_vec3()),
-        Column::one("depth", "Z", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
-        Column::one("Z", "Z", |at| at.pixel.first().0),
+        Column::one("depth", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
+        Column::one("Z", |at| at.pixel.first().0),
         Column::xyz("P", |p| p.first().1),
-        Column::one("Rejected", "X", |at| at.pixel.rejected.total() as f32),
+        Column::one("Rejected", |at| at.pixel.rejected.total() as f32),
     ]);
     columns
 }
@@ -289,6 +291,13 @@ mod tests {
 
     fn value(set: &LayerSet, layer: &str, component: &str) -> f32 {
         set.get(layer).and_then(|l| l.plane(component)).expect("the layer is there").values[0]
+    }
+
+    #[test]
+    fn every_layer_is_in_the_table() {
+        for column in columns(&shape()) {
+            assert!(!column.components.is_empty(), "{} has no row in src/film/kind.rs", column.name);
+        }
     }
 
     #[test]

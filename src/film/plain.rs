@@ -1,11 +1,12 @@
 //! Names and axes of Blender's layers back to ours.
 
+use super::kind::LAYERS;
 use super::layers::{Layer, LayerSet, Plane};
-use super::naming::{Naming, check};
+use super::naming::{Naming, check, has_axes};
 
 /// Names as Blender gives them back to ours. Layers with names that we cannot write are left out and returned.
 pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
-    let known = ["", "Z", "P", "albedo", "normal", "depth"];
+    let known: Vec<&str> = LAYERS.iter().filter(|kind| kind.blender.is_some()).map(|kind| kind.name).collect();
     for layer in &mut set.layers {
         if let Some(plain) = known.iter().find(|plain| Naming::Blender.layer(plain) == layer.name) {
             layer.name = (*plain).into();
@@ -27,7 +28,7 @@ pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
 
 /// Positions and normals from Blender's axes to ours: (x, y, z) there is (x, z, -y) here.
 fn turn_back(layer: &mut Layer) {
-    if !matches!(layer.name.as_str(), "P" | "normal") {
+    if !has_axes(&layer.name) {
         return;
     }
     for plane in &mut layer.planes {

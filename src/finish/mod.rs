@@ -27,7 +27,8 @@ pub use window::{Size, Windows, window};
 use crate::combine::{Combiner, LevelStack};
 use crate::error::{Error, Kind, Result};
 use crate::estimator::QUARTERS;
-use crate::film::{CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Role};
+use crate::film::kind::Use;
+use crate::film::{CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Role, finished_part, kind_of, part_names};
 pub use bound::Clamped;
 use parts::Part;
 use rayon::prelude::*;
@@ -42,30 +43,19 @@ pub const BYTES_PER_PIXEL: u64 = 384;
 pub const BYTES_PER_PIXEL_OF_PART: u64 = 36;
 /// The layer of the picture's error.
 pub const ERROR: &str = "Error";
-/// The additive parts of our layers, the last one the one that light of no part goes to.
-pub const PARTS: [&str; 5] = ["Emission", "Volume", "Caustic", "Direct", "Indirect"];
-/// Layers of ours that the picture is finished from, and that the network reads, by the beginnings of their names.
-const PICTURE: [&str; 6] = ["Noisy", "Level", "Variance", "albedo", "normal", "depth"];
-
-/// Whether the picture alone is finished from a layer of ours.
+/// Whether the picture alone is finished from a layer of ours, which the network may read.
 pub fn reads_for_picture(name: &str) -> bool {
-    PICTURE.iter().any(|stem| name.starts_with(stem))
+    kind_of(name).is_some_and(|(kind, _)| kind.finish == Some(Use::Picture))
 }
 
-/// The same of the picture and its error by quarters.
+/// Whether the picture and its error by quarters are finished from a layer of ours.
 pub fn reads_for_error(name: &str) -> bool {
-    reads_for_picture(name) || name.starts_with("Quarter")
+    kind_of(name).is_some_and(|(kind, _)| matches!(kind.finish, Some(Use::Picture | Use::Error)))
 }
 
 /// Whether finishing reads a layer of ours at all: for the picture, its error, and its parts.
 pub fn reads(name: &str) -> bool {
     reads_for_error(name) || finished_part(name).is_some()
-}
-
-/// The layer of a finished part; `None` for layers that are no parts.
-pub fn finished_part(name: &str) -> Option<String> {
-    let part = PARTS.contains(&name) || name.starts_with(LIGHT_GROUP) || name.starts_with(CAUSTIC);
-    part.then(|| format!("{COMBINED}{name}"))
 }
 
 /// A picture with its noise and what guides a denoiser, row by row from the top.
@@ -335,7 +325,7 @@ impl Finish {
         let of_group =
             |prefix| there(&mut set.layers.iter().map(|layer| &*layer.name).filter(|name| name.starts_with(prefix)));
         let any = |parts: &[(String, Vec<[f32; 3]>)]| parts.iter().any(|(name, _)| wanted(name));
-        let (effects, groups, caustics) = (there(&mut PARTS.into_iter()), of_group(LIGHT_GROUP), of_group(CAUSTIC));
+        let (effects, groups, caustics) = (there(&mut part_names()), of_group(LIGHT_GROUP), of_group(CAUSTIC));
         let mut finished = Vec::new();
         if any(&effects) || any(&caustics) {
             finished.extend(self.shared(effects, estimate, (picture, spread))?);

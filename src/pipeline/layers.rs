@@ -4,16 +4,15 @@ use crate::error::Result;
 use crate::estimator::Pixel;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use crate::film::output::{self, Shape};
-use crate::film::{self, CAUSTIC, COMBINED, LIGHT_GROUP, Layer, LayerSet, Naming, Plane, Sample, Selection, describe};
-use crate::finish::{PARTS, finished_part};
+use crate::film::{
+    self, CAUSTIC, COMBINED, CRYPTOMATTES, LIGHT_GROUP, Layer, LayerSet, Naming, Plane, Sample, Selection, describe,
+    finished_part, part_names,
+};
 use crate::image::exr::Attributes;
 use crate::render::Rendered;
 use crate::scene::Scene;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-
-/// Kinds of cryptomattes.
-const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
 
 /// Names of the layers of one kind of cryptomatte.
 fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
@@ -51,9 +50,9 @@ pub fn selection(asked: &str, shape: &Shape, finished: bool) -> Result<Selection
 pub fn dark(selection: &Selection, shape: &Shape, finished: bool) -> Vec<String> {
     let Selection::List(asked) = selection else { return Vec::new() };
     let there = names(shape, finished);
-    let mut dark: Vec<String> = PARTS.iter().map(|part| String::from(*part)).collect();
+    let mut dark: Vec<String> = part_names().map(String::from).collect();
     if finished {
-        dark.extend(PARTS.iter().filter_map(|part| finished_part(part)));
+        dark.extend(part_names().filter_map(finished_part));
     }
     dark.retain(|name| asked.contains(name) && !there.contains(name));
     dark

@@ -4,7 +4,8 @@ use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
 use crate::estimator::Pixel;
 use crate::estimator::rule::{adaptive, chi_squared, local};
-use crate::finish::{self, BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
+use crate::film;
+use crate::finish::{BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
 use crate::memory;
 use crate::photon;
 use crate::render::{BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
@@ -69,7 +70,7 @@ const FINISH_BYTES: u64 = 192 << 20;
 fn finish_bytes((width, height): (u32, u32), groups: usize) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
     // Parts by effect, and those of light groups and their caustics.
-    let parts = (finish::PARTS.len() + 2 * groups) as u64;
+    let parts = (film::part_names().count() + 2 * groups) as u64;
     FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
 }
 

@@ -37,8 +37,8 @@ use shard::Tail;
 
 use crate::camera::Camera;
 use crate::error::{Error, Kind, Result};
-use crate::film::{LayerSet, Naming, Selection, output as film};
-use crate::finish::{Finish, finished_part, reads_for_picture};
+use crate::film::{LayerSet, Naming, Selection, finished_part, output as film};
+use crate::finish::{Finish, reads_for_picture};
 use crate::image::atomic::is_same_file;
 use crate::image::exr;
 use crate::plan::{Plan, Switches};

@@ -5,7 +5,8 @@ use super::checkpoint::difference;
 use super::deliver::FINISHED_PICTURE;
 use crate::error::{Error, Kind, Result};
 use crate::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
-use crate::film::{Layer, LayerSet};
+use crate::film::kind::Merge;
+use crate::film::{CRYPTOMATTES, Layer, LayerSet, kind_of};
 use crate::image::exr::{self, Attributes};
 use crate::math::Vec3;
 use serde_json::{Map, Value, json};
@@ -31,44 +32,21 @@ pub struct Seeds {
     mattes: Vec<(String, Vec<PixelRanks>)>,
 }
 
-/// How a layer's values are put together, from those of one with its weight.
-#[derive(Clone, Copy, PartialEq)]
-enum Rule {
-    /// The mean.
-    Mean,
-    /// Of variances of the mean: independent ones add by squares of weights.
-    Variance,
-    /// Standard errors: their mean square.
-    Error,
-    /// Counts.
-    Sum,
-    /// What the first render has: distances, which the background has none of, and bandwidths.
-    First,
-    /// Ids and their shares.
-    Matte,
+/// How the values of a layer are put together.
+fn rule(name: &str) -> Merge {
+    kind_of(name).map_or(Merge::Mean, |(kind, _)| kind.merge)
 }
 
-impl Rule {
-    fn of(name: &str) -> Rule {
-        match name.trim_end_matches(|c: char| c.is_ascii_digit()) {
-            "Variance" => Rule::Variance,
-            "Error" => Rule::Error,
-            "Rejected" => Rule::Sum,
-            "depth" | "Z" | "P" | "Radius" | "CausticRadius" | "VolumeRadius" => Rule::First,
-            "CryptoObject" | "CryptoMaterial" => Rule::Matte,
-            _ => Rule::Mean,
-        }
-    }
-
+impl Merge {
     /// Adds the value of a render of so many iterations to the sum over others.
     fn add(self, sum: f32, value: f32, iterations: f64) -> f32 {
         let (total, value) = (f64::from(sum), f64::from(value));
         let added = match self {
-            Rule::Mean => total + iterations * value,
-            Rule::Variance => total + iterations * iterations * value,
-            Rule::Error => total + iterations * value * value,
-            Rule::Sum => total + value,
-            Rule::First | Rule::Matte => total,
+            Merge::Mean => total + iterations * value,
+            Merge::Variance => total + iterations * iterations * value,
+            Merge::Error => total + iterations * value * value,
+            Merge::Sum => total + value,
+            Merge::First | Merge::Matte => total,
         };
         added as f32
     }
@@ -77,9 +55,9 @@ impl Rule {
     fn finish(self, sum: f32, iterations: f64) -> f32 {
         let total = f64::from(sum);
         let value = match self {
-            Rule::Mean | Rule::Error => total / iterations,
-            Rule::Variance => total / (iterations * iterations),
-            Rule::Sum | Rule::First | Rule::Matte => total,
+            Merge::Mean | Merge::Error => total / iterations,
+            Merge::Variance => total / (iterations * iterations),
+            Merge::Sum | Merge::First | Merge::Matte => total,
         };
         value as f32
     }
@@ -95,7 +73,7 @@ impl Seeds {
         let iterations = source.iterations;
         self.add_mattes(&set, iterations);
         for layer in &mut set.layers {
-            let rule = Rule::of(&layer.name);
+            let rule = rule(&layer.name);
             let first = self.sum.as_ref().map(|(sum, _)| sum.get(&layer.name));
             for plane in &mut layer.planes {
                 let before = match first {
@@ -108,7 +86,7 @@ impl Seeds {
                 for (index, value) in plane.values.iter_mut().enumerate() {
                     *value = match (before, rule) {
                         (Some(before), _) => rule.add(before.values[index], *value, iterations),
-                        (None, Rule::First | Rule::Matte) => *value,
+                        (None, Merge::First | Merge::Matte) => *value,
                         (None, _) => rule.add(0.0, *value, iterations),
                     };
                 }
@@ -156,7 +134,7 @@ impl Seeds {
     }
 
     fn add_mattes(&mut self, set: &LayerSet, iterations: f64) {
-        for kind in ["CryptoObject", "CryptoMaterial"] {
+        for kind in CRYPTOMATTES {
             let layers: Vec<&Layer> =
                 (0..RANKS / 2).filter_map(|index| set.get(&format!("{kind}{index:02}"))).collect();
             if layers.len() < RANKS / 2 {
@@ -191,7 +169,7 @@ impl Seeds {
         };
         let total: f64 = sources.iter().map(|source| source.iterations).sum();
         for layer in &mut set.layers {
-            let rule = Rule::of(&layer.name);
+            let rule = rule(&layer.name);
             let values = layer.planes.iter_mut().flat_map(|plane| plane.values.iter_mut());
             values.for_each(|value| *value = rule.finish(*value, total));
             if layer.name == "normal" {

@@ -2,6 +2,8 @@
 
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
 use serde::{Deserialize, Serialize};
 
 /// Light paths per iteration: the papers' setting.
@@ -318,6 +320,16 @@ impl Method {
     /// The method that is tried in its place by pilots, where levels must keep the ratio of their bandwidths.
     pub fn pilot(self) -> Method {
         self.row().pilot.unwrap_or(self)
+    }
+}
+
+impl ValueEnum for Method {
+    fn value_variants<'a>() -> &'a [Self] {
+        Method::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.help()))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Checkpoints: a render that was killed and goes on is the render that was not.
 
 use crate::Folder;
+use caustique::render::Method;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
@@ -30,8 +31,8 @@ fn killed(folder: &Folder, arguments: &str, checkpoint: &Path, moment: Duration)
 /// it is asked for as many iterations as in the end.
 #[test]
 fn what_was_killed_goes_on_to_the_same_bytes() {
-    let methods = ["path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "auto"];
-    for (i, method) in methods.into_iter().enumerate() {
+    let methods = Method::ALL.iter().map(|method| method.name()).chain(["auto"]);
+    for (i, method) in methods.enumerate() {
         let folder = Folder::new();
         let common = format!("{COMMON} --method {method}");
         let (first, moment) = if method == "auto" { (400, 0) } else { (1_000_000, 7 * i as u64) };

@@ -13,9 +13,6 @@ use caustique::scene::description::{
 };
 use support::scenes::{add, build, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
-/// Every method that tells light apart.
-const METHODS: [Method; 5] = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm];
-
 /// A floor with a ball of glass and a mirror, seen at an angle: a glowing panel (red), a lamp with a size and a spot
 /// (green), the sky and a sun (blue).
 fn coloured() -> Description {
@@ -63,7 +60,7 @@ const WHOLE: Shard = Shard { index: 0, count: 1 };
 fn each_group_has_its_colour_and_nothing_else_in_all_pixels_by_all_methods() {
     let scene = build(coloured());
     assert_eq!(scene.lights.groups().names, ["panel", "lamps", "sky"]);
-    for method in METHODS {
+    for method in Method::ALL.iter().copied().filter(|method| method.has_techniques()) {
         let rendered = picture(&scene, method, WHOLE);
         let own = rendered.settings.levels.own();
         let mut seen = [[0.0; 2]; 3];

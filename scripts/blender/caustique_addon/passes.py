@@ -1,5 +1,7 @@
 """Which layers of the program become which passes of Blender, and how they get there."""
 
+import json
+import pathlib
 import re
 from collections import namedtuple
 
@@ -10,38 +12,27 @@ import numpy
 Pass = namedtuple("Pass", "name components kind layer switch always")
 
 _COMBINED = "Combined"
-_PARTS = ("Direct", "Indirect", "Caustic", "Emission", "Volume")
-_BANDWIDTHS = 5
-_GROUPS = ("LightGroup_", "Caustic_")
 #: What no layer's name can have.
 _NO_LETTER = re.compile("[^0-9A-Za-z]")
-_CRYPTOMATTES = 3  # layers of two ranks each
-#: Switches that Blender itself has; the others are in `properties.Passes`.
-_BLENDERS = {"use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_cryptomatte_object",
-             "use_pass_cryptomatte_material"}
+#: The program's table of layers: tests/generated.rs writes the file.
+_TABLE = json.loads(pathlib.Path(__file__).with_name("layers.json").read_text("utf-8"))
+_PARTS, _GROUPS = _TABLE["parts"], tuple(_TABLE["groups"])
+#: What Blender's compositor takes other components than colours for.
+_KINDS = {"X": "VALUE", "Z": "VALUE", "XYZ": "VECTOR"}
 
-PASSES = (
-    Pass("Depth", "Z", "VALUE", "Z", "use_pass_z", True),
-    Pass("Position", "XYZ", "VECTOR", "P", "use_pass_position", True),
-    Pass("Normal", "XYZ", "VECTOR", "normal", "use_pass_normal", True),
-    *(Pass(f"CryptoObject{n:02}", "RGBA", "COLOR", "CryptoObject", "use_pass_cryptomatte_object", True)
-      for n in range(_CRYPTOMATTES)),
-    *(Pass(f"CryptoMaterial{n:02}", "RGBA", "COLOR", "CryptoMaterial", "use_pass_cryptomatte_material", True)
-      for n in range(_CRYPTOMATTES)),
-    Pass("Denoising Albedo", "RGB", "COLOR", "albedo", "albedo", True),
-    *(Pass(f"Combined{part}", "RGB", "COLOR", f"Combined{part}", "parts", False) for part in _PARTS),
-    Pass("Noisy", "RGB", "COLOR", "Noisy", "noisy", True),
-    *(Pass(part, "RGB", "COLOR", part, "noisy_parts", False) for part in _PARTS),
-    Pass("Error", "RGB", "COLOR", "Error", "error", True),
-    *(Pass(f"{name}{n}", "RGB", "COLOR", f"{name}{n}", "levels", False)
-      for name in ("Level", "Variance") for n in range(1, _BANDWIDTHS + 1)),
-)
+
+def _pass(name, components, layer, switch, always):
+    return Pass(name, components.upper(), _KINDS.get(components, "COLOR"), layer, switch, always)
+
+
+PASSES = tuple(_pass(**one) for one in _TABLE["passes"])
 
 
 def wanted(view_layer):
     """The passes that a view layer asks for, besides the picture."""
     def asked(switch):
-        return getattr(view_layer if switch in _BLENDERS else view_layer.caustique, switch)
+        # The others are in `properties.Passes`.
+        return getattr(view_layer if switch.startswith("use_pass_") else view_layer.caustique, switch)
 
     return [one for one in PASSES if asked(one.switch)] + _of_groups(view_layer)
 

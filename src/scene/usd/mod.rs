@@ -21,13 +21,14 @@ use std::process::{Command, Output, Stdio};
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
 /// The converter's files.
-const SOURCES: [(&str, &str); 18] = [
+const SOURCES: [(&str, &str); 19] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
     ("document.py", include_str!("../../../scripts/usd/document.py")),
     ("dome.py", include_str!("../../../scripts/usd/dome.py")),
     ("faults.py", include_str!("../../../scripts/usd/faults.py")),
     ("guard.py", include_str!("../../../scripts/usd/guard.py")),
+    ("layers.json", include_str!("../../../scripts/usd/layers.json")),
     ("lights.py", include_str!("../../../scripts/usd/lights.py")),
     ("materials.py", include_str!("../../../scripts/usd/materials.py")),
     ("materialx.py", include_str!("../../../scripts/usd/materialx.py")),
