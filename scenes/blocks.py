@@ -4,7 +4,7 @@ import os
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scripts", "blender"))
-import build as b  # noqa: E402
+import build as b
 
 SIDE = 2.0
 

@@ -4,8 +4,8 @@ import os
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scripts", "blender"))
-import build as b  # noqa: E402
-import numpy as np  # noqa: E402
+import build as b
+import numpy as np
 
 b.start(1280, 720)
 

@@ -4,8 +4,8 @@ import os
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scripts", "blender"))
-import build as b  # noqa: E402
-from mathutils import Vector  # noqa: E402
+import build as b
+from mathutils import Vector
 
 b.start(1280, 720)
 WIDE, DEEP, HIGH = 4.0, 4.2, 2.5

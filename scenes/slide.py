@@ -5,9 +5,9 @@ import os
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "scripts", "blender"))
-import numpy as np  # noqa: E402
+import numpy as np
 
-import build as b  # noqa: E402
+import build as b
 
 b.start(960, 720)
 

@@ -23,6 +23,9 @@ export CAUSTIQUE_HOME=$ROOT
 # Everything that Blender's module links to and a minimal system lacks.
 BPY_LIBRARIES=(libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1)
 
+# Folders whose Python modules import each other by name; the laboratory and the hard cases import from all of them.
+MODULES=$ROOT/scripts/blender:$ROOT/scripts/compare/peers:$ROOT/scripts/farm
+
 say() { printf 'setup: %s\n' "$*" >&2; }
 
 # fail FAULT HINT

@@ -37,7 +37,7 @@ part() {
     printf '\n== %s\n' "$name"
     LOG=$(mktemp)
     "$@" 2>&1 | tee "$LOG" || status=$?
-    read -r good bad skipped < <(awk -f "$ROOT/scripts/test_counts.awk" "$LOG")
+    read -r good bad skipped < <(awk -f "$ROOT/tests/test_counts.awk" "$LOG")
     rm -f "$LOG"
     LOG=
     # A test that is skipped tests nothing, and everything it could lack is installed.
@@ -88,7 +88,7 @@ tests 'cargo test' cargo test --locked --release --workspace --no-fail-fast
 tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
 # HARD_CASES narrows them, for machines whose time is short: HARD_CASES='--methods vcm'.
 # shellcheck disable=SC2086
-tests 'Hard cases' scripts/hard-cases.sh ${HARD_CASES:-}
+tests 'Hard cases' tests/hard-cases.sh ${HARD_CASES:-}
 part 'Python wheel' scripts/python.sh
 tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning -m unittest discover -s tests/python/package
 tests 'Python with USD' .venv-usd/bin/python -m unittest discover -s tests/python -p 'usd_*.py'

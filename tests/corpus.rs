@@ -1,4 +1,4 @@
-//! What was kept of fuzzing (`scripts/fuzz.sh`) is read again, each file by its own reader: none may panic, take long or
+//! What was kept of fuzzing (`tests/fuzz.sh`) is read again, each file by its own reader: none may panic, take long or
 //! take much memory. A folder of `tests/corpus` is called as its reader in `tests/support/readers.rs`.
 
 #[path = "support/mod.rs"]

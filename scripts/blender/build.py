@@ -13,13 +13,13 @@ import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-import bpy  # noqa: E402, first: it brings the others
+import bpy  # first: it brings the others
 
-import bmesh  # noqa: E402
-import numpy  # noqa: E402
-from mathutils import Matrix, Vector  # noqa: E402
+import bmesh
+import numpy
+from mathutils import Matrix, Vector
 
-import export  # noqa: E402
+import export
 
 
 def start(width=1280, height=720):

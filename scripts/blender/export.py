@@ -28,22 +28,22 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 try:
-    import bpy  # noqa: E402, first: it brings numpy
+    import bpy  # first: it brings numpy
 except ModuleNotFoundError as error:
     sys.exit(f"error: {error}\nhint: run this in Blender (blender -b IN.blend --python export.py -- OUT.glb), or in a "
              "Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
 
-import numpy  # noqa: E402
+import numpy
 
-import bake  # noqa: E402
-import cameras  # noqa: E402
-import glb  # noqa: E402
-import lighting  # noqa: E402
-import objects  # noqa: E402
-import shading  # noqa: E402
-import sky  # noqa: E402
-import surfaces  # noqa: E402
-import world  # noqa: E402
+import bake
+import camera_export
+import glb
+import lighting
+import objects
+import shading
+import sky
+import surfaces
+import world
 
 # Scales that differ by less count as even.
 _EVEN = 1.001
@@ -68,15 +68,15 @@ def write(path, scene=None, bake_size=bake.SIZE):
     with contextlib.ExitStack() as undo:
         _look_at(scene, undo)
         said, sun = world.extras(scene, path, warn)
-        said.update(cameras.picture(scene, warn))
+        said.update(camera_export.picture(scene, warn))
         flat = objects.Flat(scene, undo, warn)
         _look_at(flat.scene, undo)
         bpy.context.view_layer.update()
         for thing in flat.things:
             if thing.type == "CAMERA":
-                flat.say(thing, **cameras.extras(thing, flat, warn))
+                flat.say(thing, **camera_export.extras(thing, flat, warn))
         if flat.scene.camera is not None:
-            cameras.warn_of_clipping(flat.scene.camera, flat, warn)
+            camera_export.warn_of_clipping(flat.scene.camera, flat, warn)
         worn = surfaces.Surfaces(flat.things, _worn(flat.things), undo, warn, bake_size)
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.hang(flat, warn)

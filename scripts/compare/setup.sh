@@ -4,7 +4,7 @@
 #   scripts/compare/setup.sh          Mitsuba in .venv-compare, for scripts/compare/mitsuba.py
 #   scripts/compare/setup.sh peers    Mitsuba, LuxCore and Intel OIDN in .venv-peers, Cycles in .venv-bpy (as
 #                                     scripts/setup.sh test makes it), for `caustique converge --with` and
-#                                     scripts/figures/finished.py
+#                                     scripts/lab.sh finished
 #
 # Either also installs the LLVM that Mitsuba's vectorised variant loads. Without one Mitsuba takes its scalar variant, a
 # third as fast.

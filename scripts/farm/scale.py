@@ -4,7 +4,7 @@
   .venv-farm/bin/python scripts/farm/scale.py --cores 1000 --frames 1 --iterations 256
   .venv-farm/bin/python scripts/farm/scale.py --draw docs/scale.svg
 
-Costs are those that `scripts/figures.sh scale` has stored. The formula is `predict`; `simulate` plays the same farm task by
+Costs are those that `scripts/lab.sh farm_scale` has stored. The formula is `predict`; `simulate` plays the same farm task by
 task, and tests hold one to the other. What both take for granted: iterations of a picture cost alike, a task's own cores
 share all work evenly but for loading a scene and writing a shard, and files pass through one store, one after the other.
 """
@@ -201,7 +201,7 @@ def best(costs, cores, frames, iterations, widest=64, **farm):
 
 
 def stored(name="scale"):
-    """What `scripts/figures.sh` has stored under a name."""
+    """What `scripts/lab.sh` has stored under a name."""
     rows = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
     return [row["values"] for row in rows if row["name"] == name][-1]
 
@@ -238,14 +238,22 @@ def draw(path, values):
     points = values["points"]
     left.plot([of["workers"] for of in points], [of["predicted"] for of in points], "-", label="model")
     left.plot([of["workers"] for of in points], [of["seconds"] for of in points], "o", label="measured")
-    left.set(title="320 x 180, this machine", xlabel="workers of one core", ylabel="seconds", xticks=[1, 2, 4], ylim=(0, None))
+    left.set(
+        title="320 x 180, this machine",
+        xlabel="workers of one core",
+        ylabel="seconds",
+        xticks=[1, 2, 4],
+        ylim=(0, None),
+    )
     costs, iterations = costs_of(values["large"]), values["iterations"]
     many = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 10000]
     for frames, label in ((1, "one picture"), (1000, "1,000 frames")):
         chosen = [best(costs, cores, frames, iterations) for cores in many]
         line = middle.loglog(many, [seconds(costs, *one) for one in chosen], "-", label=label)[0]
         some = [(cores, *one) for cores, one in zip(many, chosen) if frames == 1 or one[1].shards * frames <= 16000]
-        middle.loglog([one[0] for one in some], [simulate(costs, *one[1:]) for one in some], "o", color=line.get_color(), ms=4)
+        middle.loglog(
+            [one[0] for one in some], [simulate(costs, *one[1:]) for one in some], "o", color=line.get_color(), ms=4
+        )
         work = frames * iterations * costs.iteration
         middle.loglog(many, [work / cores for cores in many], ":", color=line.get_color())
     middle.set(title="1280 x 720; dots: simulated, dotted: ideal", xlabel="cores", ylabel="seconds")

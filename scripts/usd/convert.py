@@ -17,8 +17,8 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-from faults import Fault, text_of  # noqa: E402, from this folder
-from guard import guarded  # noqa: E402
+from faults import Fault, text_of  # from this folder
+from guard import guarded
 
 
 @contextlib.contextmanager

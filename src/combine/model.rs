@@ -19,13 +19,13 @@ impl Model {
         Model { name: "compact".into(), bytes: Cow::Borrowed(include_bytes!("models/compact.onnx")) }
     }
 
-    /// A network made by `scripts/train/export.py`.
+    /// A network made by `scripts/lab/train/export_network.py`.
     ///
     /// # Errors
     /// [`Kind::Io`] when the file cannot be read. What it holds is checked by [`Combiner::new`](super::Combiner::new).
     pub fn from_file(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|cause| {
-            Error::io(path, &cause).hint("--model takes compact, or an ONNX file made by scripts/train/export.py")
+            Error::io(path, &cause).hint("--model takes compact, or an ONNX file made by scripts/lab/train/export_network.py")
         })?;
         Ok(Model { name: path.display().to_string(), bytes: Cow::Owned(bytes) })
     }
@@ -40,7 +40,7 @@ impl Model {
             "paper" if !Path::new(name).exists() => {
                 let cause = "the paper's network is not part of the program";
                 Err(Error::new(Kind::Model, "paper", cause)
-                    .hint("train it with scripts/train/train.py --arch paper and give the exported file"))
+                    .hint("train it with scripts/lab/train/train.py --arch paper and give the exported file"))
             }
             path => Model::from_file(Path::new(path)),
         }

@@ -35,7 +35,7 @@ impl Network {
     pub fn load(model: &Model, runtime: &Runtime, threads: usize) -> Result<Self> {
         let refuse = |cause: &dyn std::fmt::Display| {
             Error::new(Kind::Model, format!("model {}", model.name), one_line(cause))
-                .hint("make network files with scripts/train/export.py")
+                .hint("make network files with scripts/lab/train/export_network.py")
         };
         let session = open(model, runtime, threads).map_err(|cause| refuse(&cause))?;
         let facts = {

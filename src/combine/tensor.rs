@@ -1,7 +1,7 @@
 //! The network's input: which layer sits in which channel, how each is scaled. No other file knows.
 //!
 //! Version 1, for m levels 4 m + 7 channels (27 for five): the levels' RGB, the levels' deviations, albedo, normal,
-//! depth. `scripts/train/normalise.py` is the same in Python; a fixture holds the two together.
+//! depth. `scripts/lab/train/normalise.py` is the same in Python; a fixture holds the two together.
 
 use rayon::prelude::*;
 

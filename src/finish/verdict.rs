@@ -33,7 +33,7 @@ const UNKNOWN: f64 = 1e30;
 const LEAST: f64 = 0.1;
 
 /// The power of the iterations with which errors of finished pictures fall, usually: between 0.2 and 0.5, what the
-/// scenes of the project show (`docs/measurements.md`, slopes of finished pictures).
+/// scenes of the project show (`docs/lab/measurements.md`, slopes of finished pictures).
 pub const USUAL: f64 = 0.35;
 
 /// The error of a picture finished from half of the iterations.

@@ -9,19 +9,24 @@ use crate::temporary;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// The drivers' files, as they lie below `scripts/compare`.
-const SOURCES: [(&str, &str); 11] = [
-    ("gltf.py", include_str!("../../scripts/compare/gltf.py")),
-    ("lobes.py", include_str!("../../scripts/compare/lobes.py")),
-    ("materials.py", include_str!("../../scripts/compare/materials.py")),
-    ("variant.py", include_str!("../../scripts/compare/variant.py")),
-    ("world.py", include_str!("../../scripts/compare/world.py")),
-    ("peers/cycles_driver.py", include_str!("../../scripts/compare/peers/cycles_driver.py")),
-    ("peers/driver.py", include_str!("../../scripts/compare/peers/driver.py")),
-    ("peers/luxcore_driver.py", include_str!("../../scripts/compare/peers/luxcore_driver.py")),
-    ("peers/mitsuba_driver.py", include_str!("../../scripts/compare/peers/mitsuba_driver.py")),
-    ("peers/pictures.py", include_str!("../../scripts/compare/peers/pictures.py")),
-    ("peers/plain.py", include_str!("../../scripts/compare/peers/plain.py")),
+/// Runs a driver's module with its folder on the search path, which an isolated Python leaves out of it.
+const MAIN: &str = "import runpy, sys
+runpy.run_module(sys.argv.pop(1), run_name='__main__')
+";
+/// The drivers' files, as they lie in `scripts/compare/peers`, and what starts them.
+const SOURCES: [(&str, &str); 12] = [
+    ("__main__.py", MAIN),
+    ("cycles_driver.py", include_str!("../../scripts/compare/peers/cycles_driver.py")),
+    ("driver.py", include_str!("../../scripts/compare/peers/driver.py")),
+    ("gltf.py", include_str!("../../scripts/compare/peers/gltf.py")),
+    ("luxcore_driver.py", include_str!("../../scripts/compare/peers/luxcore_driver.py")),
+    ("mitsuba_driver.py", include_str!("../../scripts/compare/peers/mitsuba_driver.py")),
+    ("mitsuba_lobes.py", include_str!("../../scripts/compare/peers/mitsuba_lobes.py")),
+    ("mitsuba_materials.py", include_str!("../../scripts/compare/peers/mitsuba_materials.py")),
+    ("mitsuba_world.py", include_str!("../../scripts/compare/peers/mitsuba_world.py")),
+    ("pictures.py", include_str!("../../scripts/compare/peers/pictures.py")),
+    ("plain_scene.py", include_str!("../../scripts/compare/peers/plain_scene.py")),
+    ("variant.py", include_str!("../../scripts/compare/peers/variant.py")),
 ];
 
 /// What a render may take beyond its budget: seconds, and so many times the budget. Starting up and converting a large
@@ -110,8 +115,7 @@ impl Drivers {
         let folder = temporary::folder("caustique-peers-")?;
         for (name, source) in SOURCES {
             let path = folder.path().join(name);
-            let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-            made.and_then(|()| std::fs::write(&path, source)).map_err(|cause| Error::io(&path, &cause))?;
+            std::fs::write(&path, source).map_err(|cause| Error::io(&path, &cause))?;
         }
         Ok(Drivers { scene: scene.into(), camera: camera.map(Into::into), size, threads, interpreters, folder })
     }
@@ -133,7 +137,8 @@ impl Drivers {
         let _ = std::fs::remove_file(&file);
         let (width, height) = self.size;
         let mut command = python.command();
-        command.arg(self.folder.path().join("peers").join(peer.renderer.driver())).arg(&self.scene).arg(&file);
+        let module = peer.renderer.driver().trim_end_matches(".py");
+        command.arg(self.folder.path()).arg(module).arg(&self.scene).arg(&file);
         for (name, value) in [
             ("mode", peer.mode.to_string()),
             ("width", width.to_string()),

@@ -18,7 +18,7 @@ const LATEST: usize = 3;
 /// Spread of the logarithm of squared errors from moment to moment, what judges add apart.
 const SCATTER: f64 = 0.2;
 /// Spread of the logarithm of an error that is told from what it is, what judges add apart: fitted on twelve scenes, and
-/// checked on others (`docs/accuracy.md`).
+/// checked on others (`docs/lab/accuracy.md`).
 const MODEL: f64 = 0.25;
 /// Squared bias over what levels tell of it, where it grows with the bandwidth and not with its square, as it does at
 /// edges and on things narrower than the kernel: the next larger level has sqrt(2) times the bias then, not twice.

@@ -1,5 +1,5 @@
 //! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on
-//! (`scripts/figures.sh cost`); choices depend on their ratios.
+//! (`scripts/lab.sh cost`); choices depend on their ratios.
 
 use super::method::BandwidthRule;
 use super::settings::Settings;

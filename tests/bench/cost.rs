@@ -1,7 +1,7 @@
 //! What `--method auto` takes an iteration to cost, by counted work, beside what it costs.
 //!
 //! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the
-//! last line is JSON for `scripts/figures`.
+//! last line is JSON for `scripts/lab`.
 
 use caustique::render::Strategy;
 use caustique::render::auto::counted_cost;

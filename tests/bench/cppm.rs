@@ -1,7 +1,7 @@
 //! The chi-squared rule on its own: how often it rejects uniform photons, at how many of them and over how many looks,
 //! and what it costs.
 //!
-//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`; the last line is JSON for `scripts/figures`.
+//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`; the last line is JSON for `scripts/lab`.
 //! With scenes named, only what the rule costs there.
 
 use caustique::camera::Camera;

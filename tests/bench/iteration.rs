@@ -1,7 +1,7 @@
 //! What an iteration costs, and what levels and the second eye path add: variants interleaved in one run, core-seconds
 //! per phase.
 //!
-//! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/figures`.
+//! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/lab`.
 
 use caustique::camera::Camera;
 use caustique::combine::{Combiner, LevelStack, Model, Runtime};

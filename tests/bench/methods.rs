@@ -1,6 +1,6 @@
 //! What methods cost: processor seconds of an iteration at 512 x 512 and of a million light and eye paths, in a Cornell
 //! box with a mirror sphere, and of path tracing in one where all is diffuse. The last line is JSON for
-//! `scripts/figures`.
+//! `scripts/lab`.
 
 #[path = "../support/mod.rs"]
 mod support;

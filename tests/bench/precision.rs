@@ -1,7 +1,7 @@
 //! What f32 loses where f64 or sums in two parts could stand, and what each costs: both in one run, errors against the
 //! same numbers with more digits.
 //!
-//! `cargo bench --bench precision`; figures of the section "Precision" in `docs/hard-cases.md`.
+//! `cargo bench --bench precision`; figures of the section "Precision" in `docs/lab/hard-cases.md`.
 
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{Affine3A, DAffine3, DVec3, Vec3};

@@ -1,6 +1,6 @@
 //! Rays, photon maps and EXR files against what bounds them, as ratios in one run.
 //!
-//! `cargo bench --bench spine -- [SCENE.glb]`; the last line is JSON for `scripts/figures`.
+//! `cargo bench --bench spine -- [SCENE.glb]`; the last line is JSON for `scripts/lab`.
 
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 

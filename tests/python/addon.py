@@ -16,8 +16,7 @@ import numpy
 
 import support
 
-sys.path.insert(0, str(support.ROOT / "scripts" / "blender"))
-import package  # noqa: E402
+import package
 
 _REPOSITORY = "caustique_test"
 ADDON = f"bl_ext.{_REPOSITORY}.caustique"

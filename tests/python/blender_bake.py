@@ -8,17 +8,18 @@ import tempfile
 import unittest
 from unittest import mock
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
-import torture_stage  # noqa: E402, first: it brings bpy
+import support
 
-import bpy  # noqa: E402
-import numpy  # noqa: E402
+import bpy
+import numpy
 
-import bake  # noqa: E402
-import closures  # noqa: E402
-import export  # noqa: E402
-import glb  # noqa: E402
+import bake
+import closures
+import export
+import glb
+from lab.features import torture_stage
+
+ROOT = str(support.ROOT)
 
 SIZE = 64
 

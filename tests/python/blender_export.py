@@ -7,17 +7,19 @@ import sys
 import tempfile
 import unittest
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
-import bpy  # noqa: E402
-import build  # noqa: E402
-import export  # noqa: E402
-import glb  # noqa: E402
-import lighting  # noqa: E402
-import objects  # noqa: E402
-import sky  # noqa: E402
-import numpy  # noqa: E402
-from contextlib import ExitStack  # noqa: E402
+import support
+
+import bpy
+import build
+import export
+import glb
+import lighting
+import objects
+import sky
+import numpy
+from contextlib import ExitStack
+
+ROOT = str(support.ROOT)
 
 
 def node_material(name, *shaders, mix=None, volume=None, **values):
@@ -319,11 +321,11 @@ class Export(unittest.TestCase):
         body = cube(material)
         modifier = body.modifiers.new("smooth", "SUBSURF")
         modifier.levels, modifier.render_levels = 0, 3
-        links = [(l.from_node.name, l.to_node.name, l.to_socket.identifier) for l in material.node_tree.links]
+        links = [(link.from_node.name, link.to_node.name, link.to_socket.identifier) for link in material.node_tree.links]
         document, _ = self.write()
         self.assertEqual(document["accessors"][document["meshes"][0]["primitives"][0]["indices"]]["count"], 6 * 4 ** 3 * 6)
         self.assertEqual(modifier.levels, 0)
-        self.assertEqual(sorted(links), sorted((l.from_node.name, l.to_node.name, l.to_socket.identifier) for l in material.node_tree.links))
+        self.assertEqual(sorted(links), sorted((link.from_node.name, link.to_node.name, link.to_socket.identifier) for link in material.node_tree.links))
         self.assertEqual(len(material.node_tree.nodes), 4)
 
     def world(self, image, turn=None, strength=1.0):

@@ -1,15 +1,13 @@
-"""Features of Blender materials rendered by Cycles and by caustique: a part of docs/blender-table.md, which must not get worse."""
+"""Features of Blender materials rendered by Cycles and by caustique: a part of docs/lab/blender-table.md, which must not get worse."""
 
 import os
-import sys
-import tempfile
 import unittest
 from unittest import mock
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
-import torture  # noqa: E402
-import torture_stage  # noqa: E402
+import support
+
+from lab.features import torture_stage
+from lab.figures import torture
 
 SHORT = (
     "principled_coat", "principled_glass_tinted", "image_alpha", "noise_roughness", "image_box", "bump",
@@ -17,11 +15,10 @@ SHORT = (
 )
 
 
-class Torture(unittest.TestCase):
+class Torture(support.Scratch):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=folder.name))
+        super().setUp()
+        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=str(self.dir)))
 
     def test_no_feature_is_worse_than_in_the_table(self):
         stored = torture.rows()

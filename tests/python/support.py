@@ -2,11 +2,15 @@
 
 import os
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+#: Folders whose modules tests import. Scripts themselves start in their own folder.
+MODULES = ("", "scripts", "scripts/blender", "scripts/compare/peers", "scripts/farm", "scripts/usd")
+sys.path += [str(ROOT / folder) for folder in MODULES]
 
 
 def binary():

@@ -1,6 +1,5 @@
 """What the comparison with Mitsuba rests on: its glTF reader, its scenes, its statistics. Mitsuba itself is not needed."""
 
-import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -9,10 +8,9 @@ import numpy as np
 
 import support
 
-sys.path.append(str(support.ROOT / "scripts" / "compare"))
-import gltf  # noqa: E402
-import scenes  # noqa: E402
-import tiles  # noqa: E402
+import gltf
+import tiles
+from lab import compare_scenes as scenes
 
 
 def renders(seed, count=8, shape=(48, 64), noise=0.2, scale=1.0):

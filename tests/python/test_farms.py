@@ -1,23 +1,20 @@
 """Farms: the scripts that their tasks run, what is submitted, the job template, and the model of scale. Slurm and Ray
-themselves run in scripts/figures/farms.py."""
+themselves run in scripts/lab/figures/farms.py."""
 
 import contextlib
 import itertools
 import os
 import signal
 import subprocess
-import sys
 import time
 import unittest
 from dataclasses import replace
 
 import OpenEXR
 import support
+import scale
 
 FARM = support.ROOT / "scripts" / "farm"
-sys.path.insert(0, str(FARM))
-import scale  # noqa: E402
-
 OPTIONS = ["--width", "24", "--method", "path"]
 
 

@@ -1,7 +1,6 @@
 """What the figures of finished pictures rest on: errors against noisy references, goals, scenes in other terms."""
 
 import json
-import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -11,13 +10,10 @@ import numpy as np
 
 import support
 
-sys.path.append(str(support.ROOT / "scripts" / "figures"))
-import _goals  # noqa: E402
-import _pictures  # noqa: E402
-import _twins  # noqa: E402
-import gltf  # noqa: E402
-import pictures  # noqa: E402
-import plain  # noqa: E402
+import gltf
+import pictures
+import plain_scene
+from lab import goals, picture_errors, twins
 
 SCENES = support.ROOT / "scenes"
 
@@ -31,7 +27,7 @@ class Errors(unittest.TestCase):
         return self.truth + size * self.random.standard_normal(self.truth.shape)
 
     def test_noise_of_the_reference_drops_out(self):
-        reference = _pictures.Reference(self.noisy(0.2), self.noisy(0.2))
+        reference = picture_errors.Reference(self.noisy(0.2), self.noisy(0.2))
         found = reference.measure(self.noisy(0.1))
         # 57600 values: five standard errors of a product of two errors are 8 %.
         self.assertAlmostEqual(found["relmse"] / (0.01 / 4.01), 1, delta=0.08)
@@ -40,7 +36,7 @@ class Errors(unittest.TestCase):
         self.assertLess(abs(found["mean_ratio"] - 1), 5 * found["mean_ratio_error"])
 
     def test_an_offset_has_no_grain(self):
-        found = _pictures.Reference(self.truth, self.truth).measure(self.truth + 0.3)
+        found = picture_errors.Reference(self.truth, self.truth).measure(self.truth + 0.3)
         self.assertAlmostEqual(found["relmse"], 0.09 / 4.01)
         self.assertLess(found["grain"], 1e-20)
 
@@ -48,7 +44,7 @@ class Errors(unittest.TestCase):
         picture = self.truth + 0.3
         picture[3, 4] = 1e3
         picture[7, 8] = np.nan
-        found = _pictures.Reference(self.truth, self.truth).measure(picture)
+        found = picture_errors.Reference(self.truth, self.truth).measure(picture)
         self.assertAlmostEqual(found["relmse_trimmed"], 0.09 / 4.01)
         self.assertLess(found["grain_trimmed"], 1e-20)
         self.assertGreater(found["relmse"], 1)
@@ -56,11 +52,11 @@ class Errors(unittest.TestCase):
 
     def test_the_program_says_the_same(self):
         picture, truth = self.noisy(0.1).astype(np.float32), self.truth.astype(np.float32)
-        found = _pictures.Reference(truth, truth).measure(picture)
+        found = picture_errors.Reference(truth, truth).measure(picture)
         with tempfile.TemporaryDirectory() as folder:
             paths = [Path(folder) / name for name in ("a.exr", "b.exr")]
-            _pictures.write(paths[0], picture=picture)
-            _pictures.write(paths[1], picture=truth)
+            picture_errors.write(paths[0], picture=picture)
+            picture_errors.write(paths[1], picture=truth)
             said = json.loads(support.run(["compare", *paths, "--json"]).stdout)
         for key in ("relmse", "grain", "mean_ratio"):
             self.assertAlmostEqual(found[key] / said[key], 1, delta=1e-5, msg=key)
@@ -70,7 +66,7 @@ class Errors(unittest.TestCase):
 class Goals(unittest.TestCase):
     def test_ratios_are_counted(self):
         def figures(value):
-            return dict.fromkeys(_goals.FIGURES, value)
+            return dict.fromkeys(goals.FIGURES, value)
 
         ours = {
             "auto": {
@@ -86,7 +82,7 @@ class Goals(unittest.TestCase):
             "ours": ours,
             "peers": {"other": {"oidn": figures(0.05)}, "worse": {"oidn": figures(0.5)}},
         }
-        found = _goals.goals([cell], "auto")
+        found = goals.goals([cell], "auto")
         self.assertEqual(found["auto / best peer with OIDN: flip"]["geometric_mean"], 0.4)
         self.assertEqual(found["auto / OIDN alone: grain"], {"geometric_mean": 0.5, "worst": 0.5, "within": 1, "of": 1})
         self.assertEqual(found["all methods / OIDN alone: grain"]["of"], 2)
@@ -98,7 +94,7 @@ class Goals(unittest.TestCase):
 class Translation(unittest.TestCase):
     def test_what_drivers_lack_is_named(self):
         def blockers(name):
-            return plain.Scene(SCENES / f"{name}.glb").blockers
+            return plain_scene.Scene(SCENES / f"{name}.glb").blockers
 
         self.assertEqual(blockers("cornell"), [])
         self.assertEqual(blockers("torus"), [])
@@ -106,7 +102,7 @@ class Translation(unittest.TestCase):
         self.assertIn("KHR_materials_dispersion", blockers("prism")[0])
 
     def test_glass_keeps_what_it_absorbs(self):
-        found = plain.Scene(SCENES / "torus.glb")
+        found = plain_scene.Scene(SCENES / "torus.glb")
         document, _ = gltf.chunks((SCENES / "torus.glb").read_bytes())
         volumes = [gltf.extension(material, "KHR_materials_volume") for material in document["materials"]]
         volume = next(volume for volume in volumes if volume and "attenuationColor" in volume)
@@ -115,23 +111,23 @@ class Translation(unittest.TestCase):
         np.testing.assert_allclose(passed, volume["attenuationColor"], rtol=1e-12)
 
     def test_twins_are_what_drivers_take(self):
-        with tempfile.TemporaryDirectory() as folder, mock.patch.object(_twins, "CACHE", Path(folder)):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(twins, "CACHE", Path(folder)):
             for name in ("torus", "prism", "interior", "cornell"):
-                twin = _twins.twin(SCENES / f"{name}.glb")
-                found = plain.Scene(twin)
+                twin = twins.twin(SCENES / f"{name}.glb")
+                found = plain_scene.Scene(twin)
                 self.assertEqual(found.blockers, [], name)
                 self.assertFalse([text for text in found.approximations if "material" in text], name)
                 kinds = {m["name"]: m.get("extensions", {}) for m in found.document["materials"]}
-                self.assertEqual(set.union(*map(set, kinds.values())) - plain.PLAIN, set())
+                self.assertEqual(set.union(*map(set, kinds.values())) - plain_scene.PLAIN, set())
                 said = json.loads(support.run(["info", twin, "--json"], check=0).stdout)
                 original = json.loads(support.run(["info", SCENES / f"{name}.glb", "--json"], check=0).stdout)
                 self.assertEqual(said["triangles"], original["triangles"], name)
             # Nothing is to be taken from the one, no driver has what is left of the other.
-            self.assertIsNone(_twins.twin(SCENES / "blocks.glb"))
-            self.assertIsNone(_twins.twin(SCENES / "fog.glb"))
+            self.assertIsNone(twins.twin(SCENES / "blocks.glb"))
+            self.assertIsNone(twins.twin(SCENES / "fog.glb"))
 
     def test_a_lamp_keeps_its_light_as_a_ball(self):
-        found = plain.Scene(SCENES / "interior.glb")
+        found = plain_scene.Scene(SCENES / "interior.glb")
         self.assertEqual(found.lights, [])
         balls = [(mesh, of) for mesh, of in found.meshes if mesh.name == "lamp" and len(mesh.triangles) == 1280]
         before = gltf.read(SCENES / "interior.glb").lights
@@ -144,13 +140,13 @@ class Translation(unittest.TestCase):
             np.testing.assert_allclose(ball.positions.mean(0), light.to_world[:3, 3], atol=1e-5)
 
     def test_a_ball_is_closed_and_faces_outward(self):
-        points, triangles = plain.icosphere(2)
+        points, triangles = plain_scene.icosphere(2)
         self.assertEqual(len(triangles), 320)
         self.assertGreater(np.linalg.det(points[triangles]).min(), 0)
 
     def test_the_sun_stands_where_it_shines_from(self):
         toward = np.array([0.6, 0.64, -0.48])
-        sun = plain.disc(toward, np.radians(0.265), np.array([1.0, 2.0, 3.0]), 512, 1024)
+        sun = plain_scene.disc(toward, np.radians(0.265), np.array([1.0, 2.0, 3.0]), 512, 1024)
         polar, turn = (np.arange(512) + 0.5) / 512 * np.pi, (np.arange(1024) + 0.5) / 1024 * 2 * np.pi
         solid = np.sin(polar)[:, None] * (np.pi / 512) * (2 * np.pi / 1024)
         np.testing.assert_allclose((sun * solid[..., None]).sum((0, 1)), [1, 2, 3])

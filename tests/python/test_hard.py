@@ -4,24 +4,18 @@ import contextlib
 import io
 import json
 import math
-import sys
 import tempfile
 import unittest
 from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "scripts" / "hard"))
-import answers  # noqa: E402
-import families  # noqa: E402
-import judge  # noqa: E402
-import run as suite  # noqa: E402
-import scene as s  # noqa: E402
-import shapes  # noqa: E402
-from case import Case  # noqa: E402
-from stage import Stage  # noqa: E402
-from tests.python import support  # noqa: E402
+import support
+from tests.hard import answers, families, judge, shapes
+from tests.hard import run as suite
+from tests.hard import scene as s
+from tests.hard.case import Case
+from tests.hard.stage import Stage
 
 SHAPE = (8, 16, 16, 3)
 
@@ -129,7 +123,7 @@ class Closed(unittest.TestCase):
     """Closed forms against sums that know nothing of them."""
 
     def test_form_factor_of_a_square(self):
-        import lights
+        from tests.hard import lights
 
         at = (np.arange(800) + 0.5) / 800 - 0.5
         x, z = np.meshgrid(at, at)
@@ -137,18 +131,18 @@ class Closed(unittest.TestCase):
         self.assertAlmostEqual(lights.form_factor(0.5, 2.0), summed, delta=1e-6)
 
     def test_line_lamp(self):
-        import grazing
+        from tests.hard import grazing
 
         at = (np.arange(20000) + 0.5) / 20000 - 0.5
         self.assertAlmostEqual(grazing.lit_by_slit(), 0.5 / math.pi * np.mean(0.01 / (at**2 + 0.01) ** 2), delta=1e-4)
 
     def test_ggx_lobe_holds_all_its_light(self):
-        import roughness
+        from tests.hard import roughness
 
         self.assertAlmostEqual(roughness.lobe_share(0.1, half=40.0, count=4000), 1.0, delta=0.015)
 
     def test_half_space_is_what_walks_find(self):
-        import media
+        from tests.hard import media
 
         random, walks, albedo, back = np.random.default_rng(7), 200_000, 0.5, 0.0
         depth, cosine, alive = np.zeros(walks), np.ones(walks), np.ones(walks)
@@ -177,10 +171,10 @@ class Suite(unittest.TestCase):
                 self.assertTrue(all((Path(folder) / file).is_file() for file in said["scenes"].values()))
 
     def test_the_page_of_docs_lists_the_cases(self):
-        import table
+        from tests.hard import table
 
         text = table.DOCS.read_text()
-        self.assertEqual(table.filled(text), text, "run .venv/bin/python scripts/hard/table.py")
+        self.assertEqual(table.filled(text), text, "run tests/hard-cases.sh --table")
         self.assertIn("| `furnace-albedo-0.5` |", text)
 
     def play(self, folder, case):
@@ -189,7 +183,7 @@ class Suite(unittest.TestCase):
         return suite.play(Stage(support.binary(), folder, case, "path"))
 
     def case(self, answer, fails=None):
-        import furnace
+        from tests.hard import furnace
 
         return Case(
             "planted",
@@ -221,7 +215,7 @@ class Suite(unittest.TestCase):
             self.assertIn("White.", shown)
 
     def test_refused_wants_an_error_that_names_the_fault(self):
-        import geometry
+        from tests.hard import geometry
 
         with tempfile.TemporaryDirectory() as name:
             for match, made, state in (

@@ -1,15 +1,15 @@
 """The drivers of other renderers, where `scripts/compare/setup.sh peers` has installed them, on a small scene each; and
 what all of them share."""
 
-import json
-import os
 import subprocess
-import sys
 import unittest
 
 import numpy as np
 
 import support
+import caller
+import driver
+import pictures
 
 COMPARE = support.ROOT / "scripts" / "compare"
 DRIVERS = COMPARE / "peers"
@@ -17,22 +17,16 @@ PEERS = support.ROOT / ".venv-peers"
 BPY = support.ROOT / ".venv-bpy"
 SIZE = (48, 27)
 
-sys.path.append(str(DRIVERS))
-import driver  # noqa: E402
-import pictures  # noqa: E402
-
 
 def drive(name, scene, target, mode="path", budget=2.0):
     """Runs a driver; returns what it says."""
-    python, env = PEERS / "bin" / "python", None
-    if name == "cycles":
-        python, env = BPY / "bin" / "python", {**os.environ, "PYTHONPATH": str(PEERS / "bpy")}
-    command = [python, "-B", DRIVERS / f"{name}_driver.py", scene, target, "--mode", mode, "--budget", budget]
-    command += ["--width", SIZE[0], "--height", SIZE[1], "--threads", 2, "--clock", "cpu"]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, env=env, timeout=300)
-    said = [line for line in done.stdout.splitlines() if line.startswith("PEER ")]
+    size = {"width": SIZE[0], "height": SIZE[1]}
+    command = caller.command(f"{name}_driver.py", scene, target, mode=mode, budget=budget, **size, threads=2, clock="cpu")
+    env = {**caller.environment(f"{name}_driver.py"), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=300)
+    said = caller.answer(done.stdout)
     assert said, done.stdout + done.stderr
-    return json.loads(said[-1][5:])
+    return said
 
 
 def off(picture, truth):
@@ -66,10 +60,10 @@ class Shared(unittest.TestCase):
 
     def test_no_driver_is_left_out_of_the_program(self):
         source = (support.ROOT / "src" / "peers" / "drivers.rs").read_text()
-        used = {"gltf", "lobes", "materials", "variant", "world"}
-        used |= {f"peers/{path.stem}" for path in DRIVERS.glob("*.py")} - {"peers/oidn"}
-        for name in used:
-            self.assertIn(f'"../../scripts/compare/{name}.py"', source)
+        # What only scripts run: comparisons, translations of scenes, the denoiser.
+        others = {"__main__", "caller", "from_xml", "oidn", "tiles", "to_xml"}
+        for name in {path.stem for path in DRIVERS.glob("*.py")} - others:
+            self.assertIn(f'"../../scripts/compare/peers/{name}.py"', source)
 
 
 if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():

@@ -6,9 +6,10 @@ import subprocess
 import unittest
 
 import support
+import lab.options
 
 README = support.ROOT / "README.md"
-DOCS = sorted((support.ROOT / "docs").glob("*.md"))
+DOCS = sorted((support.ROOT / "docs").rglob("*.md"))
 PAGES = [README, *DOCS]
 PROGRAM = "target/release/caustique"
 #: What sets everything up: it is there, and too much for a test.
@@ -148,13 +149,14 @@ class Text(unittest.TestCase):
     def test_every_page_of_the_documentation_is_linked_from_the_readme(self):
         text = prose(README)
         for page in DOCS:
-            self.assertIn(f"(docs/{page.name}", text)
+            self.assertIn(f"(docs/{page.relative_to(support.ROOT / 'docs')}", text)
 
     def test_options_that_are_named_exist(self):
         names = ("render", "plan", "combine", "merge", "compare", "converge", "info", "doctor")
         known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
-        for script in ("blender/export.py", "farm/ray_render.py", "farm/slurm.sh", "hard/run.py"):
-            known += (support.ROOT / "scripts" / script).read_text(encoding="utf-8")
+        for script in ("scripts/blender/export.py", "scripts/farm/ray_render.py", "scripts/farm/slurm.sh", "tests/hard/run.py"):
+            known += (support.ROOT / script).read_text(encoding="utf-8")
+        known += "".join(f"--{name.replace('_', '-')} " for name in lab.options.KNOWN)
         known = set(re.findall(r"--[a-z][a-z-]*", known))
         for page in PAGES:
             if page.name in ("measurements.md", "architecture.md"):  # They name options of cargo and of scripts, too.

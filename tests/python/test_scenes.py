@@ -4,12 +4,12 @@ import glob
 import math
 import os
 import struct
-import sys
 import unittest
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "scripts", "blender"))
-import glb  # noqa: E402
+import support
+import glb as container
+
+ROOT = str(support.ROOT)
 
 SCENES = os.path.join(ROOT, "scenes")
 NAMES = sorted(f[:-4] for f in [*glob.glob("*.glb", root_dir=SCENES), *glob.glob("second/*.glb", root_dir=SCENES)])
@@ -84,7 +84,7 @@ def each_scene(check):
     def run(self):
         for name in NAMES:
             with self.subTest(scene=name):
-                check(self, name, *glb.read(os.path.join(SCENES, name + ".glb")))
+                check(self, name, *container.read(os.path.join(SCENES, name + ".glb")))
     return run
 
 
@@ -108,7 +108,7 @@ class EveryScene(unittest.TestCase):
             self.assertIn("bufferView", image)
 
     def test_interior_is_large(self):
-        document, _ = glb.read(os.path.join(SCENES, "interior.glb"))
+        document, _ = container.read(os.path.join(SCENES, "interior.glb"))
         self.assertGreaterEqual(sum(triangles(document, m) for m in document["meshes"]), 100_000)
         self.assertGreaterEqual(sum(triangles(document, document["meshes"][i]) for i in instances(document)), 200_000)
 
@@ -136,7 +136,7 @@ class EveryScene(unittest.TestCase):
                 self.assertEqual(open_edges(document, buffer, mesh), 0, mesh["name"])
 
     def test_a_missing_triangle_is_found(self):
-        document, buffer = glb.read(os.path.join(SCENES, "cornell.glb"))
+        document, buffer = container.read(os.path.join(SCENES, "cornell.glb"))
         sphere = next(m for m in document["meshes"] if m["name"] == "glass sphere")
         document["accessors"][sphere["primitives"][0]["indices"]]["count"] -= 3
         self.assertEqual(open_edges(document, buffer, sphere), 3)
@@ -177,7 +177,7 @@ class EveryScene(unittest.TestCase):
                     self.assertGreater(said[key], 0, node["name"])
 
     def test_every_kind_of_light_occurs(self):
-        documents = [glb.read(os.path.join(SCENES, name + ".glb"))[0] for name in NAMES]
+        documents = [container.read(os.path.join(SCENES, name + ".glb"))[0] for name in NAMES]
         kinds = {light["type"] for d in documents for light in d.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])}
         self.assertEqual(kinds, {"point", "spot", "directional"})
 
@@ -192,7 +192,7 @@ class EveryScene(unittest.TestCase):
             self.assertTrue(0.1 < camera["perspective"]["yfov"] < 2, camera)
 
     def test_gems_disperse(self):
-        document, _ = glb.read(os.path.join(SCENES, "gems.glb"))
+        document, _ = container.read(os.path.join(SCENES, "gems.glb"))
         spread = [m["extensions"]["KHR_materials_dispersion"]["dispersion"] for m in document["materials"]
                   if "KHR_materials_dispersion" in m.get("extensions", {})]
         self.assertGreaterEqual(len(spread), 5)

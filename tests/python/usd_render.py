@@ -49,7 +49,7 @@ class Program(usd_support.Stages):
     def endless(self):
         """Makes the path that of a stage of 2^30 prims, by references to references."""
         both = "".join(f'def "{side}" (\nreferences = </A{{1}}>\n) {{{{}}}}\n' for side in "lr")
-        levels = "".join('def "A{0}" {{\n'.format(at) + both.format(at, at + 1) + "}\n" for at in range(30))
+        levels = "".join(f'def "A{at}" {{\n' + both.format(at, at + 1) + "}\n" for at in range(30))
         self.path = self.dir / "endless.usda"
         self.path.write_text("#usda 1.0\n" + levels + 'def Sphere "A30" {}\n')
 

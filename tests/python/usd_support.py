@@ -2,18 +2,15 @@
 
 import json
 import struct
-import sys
 
 import numpy
 import OpenEXR
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import support
+import convert
 
 SCRIPTS = support.ROOT / "scripts" / "usd"
-sys.path.insert(0, str(SCRIPTS))
-
-import convert  # noqa: E402, from scripts/usd
 
 
 class Stages(support.Scratch):

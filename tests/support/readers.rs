@@ -1,5 +1,5 @@
 //! Every reader of files that come from anywhere, called with the bytes of one file as the program calls it. What is
-//! fuzzed (`fuzz/`) and what replays the corpus that was kept of it call the same functions.
+//! fuzzed (`tests/fuzz/`) and what replays the corpus that was kept of it call the same functions.
 
 use super::promises;
 use caustique::combine::network::Network;

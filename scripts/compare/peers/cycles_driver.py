@@ -13,10 +13,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))  # which Python, run with -I, leaves out
 import driver
 import pictures
-import plain
+import plain_scene
 
 #: From +Y up to +Z up.
 TURN = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -63,8 +62,14 @@ def material(of, folder):
             volume = nodes.add("VolumeAbsorption", Color=(*(1 - of.absorption / most), 1.0), Density=most)
             nodes.link(volume.outputs[0], output.inputs["Volume"])
     else:
-        shader = nodes.add("BsdfPrincipled", Base_Color=colour, Roughness=of.roughness, IOR=of.ior,
-                           Metallic=float(of.kind == "metal"), Specular_IOR_Level=of.specular / 2)
+        shader = nodes.add(
+            "BsdfPrincipled",
+            Base_Color=colour,
+            Roughness=of.roughness,
+            IOR=of.ior,
+            Metallic=float(of.kind == "metal"),
+            Specular_IOR_Level=of.specular / 2,
+        )
         shader.distribution = "MULTI_GGX"
     if of.texture:
         file = os.path.join(folder, f"{made.name}.image")
@@ -230,7 +235,7 @@ def render(scene, seconds, seed, folder):
 
 def main():
     options = driver.options(["path", "path_guiding"])
-    of = plain.Scene(options.scene, options.camera)
+    of = plain_scene.Scene(options.scene, options.camera)
     if of.blockers:
         driver.say(cannot=of.blockers)
         return

@@ -19,12 +19,13 @@ sampling, no denoiser, linear colours.
 import argparse
 import json
 import os
-import sys
+import site
 import time
 from pathlib import Path
 
-# Last, because a file there has the name of Mitsuba's module. The program names packages for a Python that lacks some.
-sys.path += [str(Path(__file__).resolve().parents[1]), *filter(None, [os.environ.get("CAUSTIQUE_PEERS_PACKAGES")])]
+# The program names packages for a Python that lacks some.
+if "CAUSTIQUE_PEERS_PACKAGES" in os.environ:
+    site.addsitedir(os.environ["CAUSTIQUE_PEERS_PACKAGES"])
 
 #: The longest path, in segments, where a renderer needs a limit; caustique has none.
 DEPTH = 32
@@ -88,5 +89,11 @@ def passes(watch, render):
 
 def done(watch, samples, version, approximations):
     """Says what was rendered; called before the picture is written."""
-    say(seconds=round(watch.seconds(), 4), core_seconds=round(watch.core_seconds(), 4),
-        startup_seconds=round(watch.startup, 4), passes=samples, version=version, approximations=approximations)
+    say(
+        seconds=round(watch.seconds(), 4),
+        core_seconds=round(watch.core_seconds(), 4),
+        startup_seconds=round(watch.startup, 4),
+        passes=samples,
+        version=version,
+        approximations=approximations,
+    )

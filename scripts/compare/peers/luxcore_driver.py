@@ -12,19 +12,17 @@ LuxCore's ways that this file minds, each measured against a closed form or agai
 """
 
 import os
-import sys
 import tempfile
 import time
 
 import numpy as np
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))  # which Python, run with -I, leaves out
 # LuxCore brings an allocator of its own: what loads after it has two.
 import driver
 import pictures
-import plain
+import plain_scene
 
-import pyluxcore as lux  # isort: skip
+import pyluxcore as lux
 
 ENGINES = {"path": "PATHCPU", "path_cache": "PATHCPU", "bidir": "BIDIRCPU", "bidirvm": "BIDIRVMCPU"}
 #: From +Y up to +Z up.
@@ -52,10 +50,18 @@ def camera(of, width, height):
     x, y = max(width / height, 1), max(height / width, 1)
     row = 2 * y / height
     return {
-        "type": "perspective", "lookat.orig": text(eye), "lookat.target": text(eye + ahead), "up": text(matrix[:3, 1]),
-        "fieldofview": text(np.degrees(2 * np.arctan(half))), "screenwindow": text([-x, x, -y - row, y - row]),
-        "lensradius": text(of.aperture_radius), "focaldistance": text(of.focus_distance), "autofocus.enable": 0,
-        "cliphither": 0.001, "clipyon": 1e6}
+        "type": "perspective",
+        "lookat.orig": text(eye),
+        "lookat.target": text(eye + ahead),
+        "up": text(matrix[:3, 1]),
+        "fieldofview": text(np.degrees(2 * np.arctan(half))),
+        "screenwindow": text([-x, x, -y - row, y - row]),
+        "lensradius": text(of.aperture_radius),
+        "focaldistance": text(of.focus_distance),
+        "autofocus.enable": 0,
+        "cliphither": 0.001,
+        "clipyon": 1e6,
+    }
 
 
 def material(of, name, folder):
@@ -67,36 +73,79 @@ def material(of, name, folder):
         with open(file, "wb") as sink:
             sink.write(of.texture)
         texture = f"scene.textures.{base}."
-        found.update({texture + "type": "imagemap", texture + "file": file, texture + "gamma": 2.2,
-                      texture + "mapping.type": "uvmapping2d", texture + "mapping.uvscale": "1 -1"})
+        found.update(
+            {
+                texture + "type": "imagemap",
+                texture + "file": file,
+                texture + "gamma": 2.2,
+                texture + "mapping.type": "uvmapping2d",
+                texture + "mapping.uvscale": "1 -1",
+            }
+        )
     if of.kind == "matte":
         found.update({own + "type": "matte", own + "kd": base})
     elif of.kind == "coated":
         # The lobe called disney is a fifth darker.
         shine = of.specular * ((of.ior - 1) / (of.ior + 1)) ** 2
-        found.update({own + "type": "glossy2", own + "kd": base, own + "ks": text([shine] * 3), own + "multibounce": 0,
-                      own + "uroughness": alpha, own + "vroughness": alpha})
+        found.update(
+            {
+                own + "type": "glossy2",
+                own + "kd": base,
+                own + "ks": text([shine] * 3),
+                own + "multibounce": 0,
+                own + "uroughness": alpha,
+                own + "vroughness": alpha,
+            }
+        )
     elif of.kind == "glass":
         smooth = of.roughness == 0
-        found.update({own + "type": "glass" if smooth else "roughglass", own + "kr": "1 1 1", own + "kt": base,
-                      own + "interiorior": of.ior, own + "exteriorior": 1})
+        found.update(
+            {
+                own + "type": "glass" if smooth else "roughglass",
+                own + "kr": "1 1 1",
+                own + "kt": base,
+                own + "interiorior": of.ior,
+                own + "exteriorior": 1,
+            }
+        )
         if not smooth:
             found.update({own + "uroughness": alpha, own + "vroughness": alpha})
         if of.absorption.any():
             volume = f"scene.volumes.volume_{name}."
-            found.update({volume + "type": "clear", volume + "absorption": text(of.absorption), volume + "ior": of.ior,
-                          own + "volume.interior": f"volume_{name}"})
+            found.update(
+                {
+                    volume + "type": "clear",
+                    volume + "absorption": text(of.absorption),
+                    volume + "ior": of.ior,
+                    own + "volume.interior": f"volume_{name}",
+                }
+            )
     elif of.roughness == 0:
         found.update({own + "type": "mirror", own + "kr": base})
     else:
         fresnel = f"scene.textures.fresnel_{name}."
-        found.update({fresnel + "type": "fresnelcolor", fresnel + "kr": base, own + "type": "metal2",
-                      own + "fresnel": f"fresnel_{name}", own + "uroughness": alpha, own + "vroughness": alpha})
+        found.update(
+            {
+                fresnel + "type": "fresnelcolor",
+                fresnel + "kr": base,
+                own + "type": "metal2",
+                own + "fresnel": f"fresnel_{name}",
+                own + "uroughness": alpha,
+                own + "vroughness": alpha,
+            }
+        )
     if of.emission.any():
         most = of.emission.max()
-        found.update({own + "emission": text(of.emission / most), own + "emission.gain": text([most] * 3),
-                      own + "emission.power": 0, own + "emission.efficency": 0, own + "emission.theta": 90,
-                      own + "emission.gain.normalizebycolor": 0})
+        found.update(
+            {
+                own + "emission": text(of.emission / most),
+                own + "emission.gain": text([most] * 3),
+                own + "emission.power": 0,
+                own + "emission.efficency": 0,
+                own + "emission.theta": 90,
+                own + "emission.gain.normalizebycolor": 0,
+            }
+        )
     return found
 
 
@@ -117,27 +166,55 @@ def build(scene, width, height, folder):
         file = os.path.join(folder, "environment.exr")
         pictures.write(file, pictures.sample(scene.environment, columns / len(columns), rows / len(rows)))
         own = "scene.lights.environment."
-        found.update({own + "type": "infinite", own + "file": file, own + "gamma": 1, own + "storage": "float",
-                      own + "gain": "1 1 1", own + "transformation": ENVIRONMENT})
+        found.update(
+            {
+                own + "type": "infinite",
+                own + "file": file,
+                own + "gamma": 1,
+                own + "storage": "float",
+                own + "gain": "1 1 1",
+                own + "transformation": ENVIRONMENT,
+            }
+        )
     for number, light in enumerate(scene.lights):
         own, matrix = f"scene.lights.light{number}.", TURN @ light.to_world
         if light.kind == "point":
-            found.update({own + "type": "point", own + "position": text(matrix[:3, 3]), own + "color": "1 1 1",
-                          own + "gain": text(4 * np.pi * light.intensity), own + "power": 0, own + "efficency": 0})
+            found.update(
+                {
+                    own + "type": "point",
+                    own + "position": text(matrix[:3, 3]),
+                    own + "color": "1 1 1",
+                    own + "gain": text(4 * np.pi * light.intensity),
+                    own + "power": 0,
+                    own + "efficency": 0,
+                }
+            )
         else:
-            found.update({own + "type": "sharpdistant", own + "direction": text(-matrix[:3, 2]),
-                          own + "color": text(light.intensity), own + "gain": "1 1 1"})
+            found.update(
+                {
+                    own + "type": "sharpdistant",
+                    own + "direction": text(-matrix[:3, 2]),
+                    own + "color": text(light.intensity),
+                    own + "gain": "1 1 1",
+                }
+            )
     made, names = lux.Scene(), {}
     for number, (mesh, of) in enumerate(scene.meshes):
         if id(of) not in names:
             names[id(of)] = f"material{len(names)}"
             found.update(material(of, names[id(of)], folder))
-        rows = [None if values is None else [tuple(map(float, row)) for row in values] for values in
-                (turned(mesh.positions), None if mesh.normals is None else turned(mesh.normals), mesh.uvs)]
+        rows = [
+            None if values is None else [tuple(map(float, row)) for row in values]
+            for values in (turned(mesh.positions), None if mesh.normals is None else turned(mesh.normals), mesh.uvs)
+        ]
         triangles = [tuple(map(int, row)) for row in mesh.triangles]
         made.DefineMesh(f"mesh{number}", rows[0], triangles, rows[1], rows[2], None, None)
-        found.update({f"scene.objects.object{number}.shape": f"mesh{number}",
-                      f"scene.objects.object{number}.material": names[id(of)]})
+        found.update(
+            {
+                f"scene.objects.object{number}.shape": f"mesh{number}",
+                f"scene.objects.object{number}.material": names[id(of)],
+            }
+        )
     made.Parse(properties(found))
     return made
 
@@ -154,29 +231,51 @@ def settings(scene, options):
     """Properties of the render."""
     depth, mode = options.depth, options.mode
     found = {
-        "renderengine.type": ENGINES[mode], "renderengine.seed": options.seed + 1,
-        "native.threads.count": options.threads, "sampler.type": "RANDOM" if mode == "bidirvm" else "SOBOL", "sampler.random.bucketsize": 1,
-        "film.width": options.width, "film.height": options.height, "film.filter.type": "NONE",
-        "film.imagepipelines.0.0.type": "NOP", "film.outputs.0.type": "RGB", "film.outputs.0.filename": "unused.exr",
-        "path.pathdepth.total": depth, "path.pathdepth.diffuse": depth, "path.pathdepth.glossy": depth,
-        "path.pathdepth.specular": depth, "path.maxdepth": depth, "light.maxdepth": depth,
-        "path.clamping.variance.maxvalue": 0, "path.russianroulette.depth": 10 if mode.startswith("bidir") else 5}
+        "renderengine.type": ENGINES[mode],
+        "renderengine.seed": options.seed + 1,
+        "native.threads.count": options.threads,
+        "sampler.type": "RANDOM" if mode == "bidirvm" else "SOBOL",
+        "sampler.random.bucketsize": 1,
+        "film.width": options.width,
+        "film.height": options.height,
+        "film.filter.type": "NONE",
+        "film.imagepipelines.0.0.type": "NOP",
+        "film.outputs.0.type": "RGB",
+        "film.outputs.0.filename": "unused.exr",
+        "path.pathdepth.total": depth,
+        "path.pathdepth.diffuse": depth,
+        "path.pathdepth.glossy": depth,
+        "path.pathdepth.specular": depth,
+        "path.maxdepth": depth,
+        "light.maxdepth": depth,
+        "path.clamping.variance.maxvalue": 0,
+        "path.russianroulette.depth": 10 if mode.startswith("bidir") else 5,
+    }
     if mode == "path_cache":
         casters = [mesh.positions for mesh, of in scene.meshes if of.kind in ("glass", "metal")]
         points = np.concatenate(casters or [mesh.positions for mesh, _ in scene.meshes])
         size = float(np.linalg.norm(points.max(0) - points.min(0)))
         cache = "path.photongi."
-        found.update({
-            cache + "caustic.enabled": 1, cache + "indirect.enabled": 0, cache + "photon.maxcount": 400000,
-            cache + "photon.maxdepth": depth, cache + "caustic.maxsize": 100000,
-            cache + "caustic.lookup.radius": 0.005 * size, cache + "caustic.lookup.normalangle": 10, cache + "caustic.updatespp": 24,
-            cache + "caustic.updatespp.radiusreduction": 0.96, cache + "caustic.updatespp.minradius": 0.0005 * size})
+        found.update(
+            {
+                cache + "caustic.enabled": 1,
+                cache + "indirect.enabled": 0,
+                cache + "photon.maxcount": 400000,
+                cache + "photon.maxdepth": depth,
+                cache + "caustic.maxsize": 100000,
+                cache + "caustic.lookup.radius": 0.005 * size,
+                cache + "caustic.lookup.normalangle": 10,
+                cache + "caustic.updatespp": 24,
+                cache + "caustic.updatespp.radiusreduction": 0.96,
+                cache + "caustic.updatespp.minradius": 0.0005 * size,
+            }
+        )
     return found
 
 
 def main():
     options = driver.options(list(ENGINES))
-    scene = plain.Scene(options.scene, options.camera)
+    scene = plain_scene.Scene(options.scene, options.camera)
     if scene.blockers:
         driver.say(cannot=scene.blockers)
         return

@@ -1,21 +1,17 @@
-"""Mitsuba 3 as a peer (see driver.py): path tracing, its scene as world.py says it.
+"""Mitsuba 3 as a peer (see driver.py): path tracing, its scene as mitsuba_world.py says it.
 
-Its rough surfaces get what they lack of ours (lobes.py), so that materials mean the same. The vectorised variant where
+Its rough surfaces get what they lack of ours (mitsuba_lobes.py), so that materials mean the same. The vectorised variant where
 there is an LLVM that it takes, thrice as fast as the scalar one.
 """
-
-import os
-import sys
 
 import mitsuba as mi
 import numpy as np
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))  # which Python, run with -I, leaves out
 import driver
 import pictures
 
-import gltf  # isort: skip
-import variant  # isort: skip
+import gltf
+import variant
 
 #: Samples that a pass takes at most: what a wave of them needs of memory stays below a gibibyte.
 WAVE = 1 << 22
@@ -26,12 +22,14 @@ SHARE = 1 / 16
 def main():
     options = driver.options(["path"])
     name = variant.choose(options.threads)
-    import world
+    # Its classes are made of the variant's.
+    import mitsuba_world
+
     try:
         scene = gltf.read(options.scene)
         if options.camera:
             scene.cameras = [camera for camera in scene.cameras if camera.name == options.camera]
-        built = world.build(scene, options.width, options.height, correct=True)
+        built = mitsuba_world.build(scene, options.width, options.height, correct=True)
     except gltf.Unsupported as unsupported:
         driver.say(cannot=[str(unsupported)])
         return

@@ -1,4 +1,4 @@
-//! Agreement with the training code (`scripts/train/fixture.py` writes the numbers), and what network files may say.
+//! Agreement with the training code (`scripts/lab/train/fixture.py` writes the numbers), and what network files may say.
 
 use super::map::Map;
 use super::model::{Contract, Facts};

@@ -1,6 +1,6 @@
 //! The progressive rules beside one another: SPPM, APPM and CPPM on scenes of ours.
 //!
-//! `cargo bench --bench rules -- FIGURE [KEY=VALUE...]`; stdout is one JSON object for `scripts/figures`.
+//! `cargo bench --bench rules -- FIGURE [KEY=VALUE...]`; stdout is one JSON object for `scripts/lab`.
 
 mod ground;
 mod neighbours;

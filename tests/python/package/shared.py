@@ -1,5 +1,6 @@
 """Scenes of numpy arrays that the tests of the package share."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,8 @@ import numpy as np
 import caustique as cq
 
 ROOT = Path(__file__).resolve().parents[3]
+#: Translation of scenes to Mitsuba and from it.
+sys.path.append(str(ROOT / "scripts" / "compare" / "peers"))
 TORUS = ROOT / "scenes" / "torus.glb"
 
 

@@ -2,20 +2,11 @@
 
 import contextlib
 import io
-import sys
 import tempfile
 import unittest
 from pathlib import Path
 
-import mitsuba as mi
-
-mi.set_variant("scalar_rgb")
-ROOT = Path(__file__).resolve().parents[3]
-# Behind all else: a file in there has the name of Mitsuba's module.
-sys.path.append(str(ROOT / "scripts" / "compare"))
-import from_xml  # noqa: E402
-import gltf  # noqa: E402
-import to_xml  # noqa: E402
+from translation import ROOT, from_xml, gltf, to_xml
 
 CAMERA = '<sensor type="perspective"><float name="fov" value="45"/></sensor>'
 LIGHT = '<emitter type="point"><rgb name="intensity" value="1"/></emitter>'

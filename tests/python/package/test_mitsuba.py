@@ -4,7 +4,6 @@ import contextlib
 import io
 import json
 import struct
-import sys
 import tempfile
 import unittest
 import warnings
@@ -12,16 +11,9 @@ from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
-from shared import ROOT
+from translation import ROOT, from_xml, gltf, to_xml
 
 import caustique as cq
-
-mi.set_variant("scalar_rgb")
-# Behind all else: a file in there has the name of Mitsuba's module.
-sys.path.append(str(ROOT / "scripts" / "compare"))
-import from_xml  # noqa: E402
-import gltf  # noqa: E402
-import to_xml  # noqa: E402
 
 SCENE = """<scene version="3.0.0">
     <default name="size" value="24"/>

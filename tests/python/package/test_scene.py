@@ -364,7 +364,6 @@ class Faults(unittest.TestCase):
             cq.Scene.from_meshes([cq.Mesh(vertices=vertices * np.nan, triangles=triangles)])
 
     def test_messages_name_arguments_not_options(self):
-        scene = ground([])
         with tempfile.TemporaryDirectory() as folder:
             for options in ({"width": 10**5}, {"crop": (0, 0, 99, 99)}, {"layers": "Nosy"}, {"method": "sppm", "knn": 0},
                             {"resume": f"{folder}/no"}, {"shard": (0, 2), "method": "cppm"}):
@@ -374,7 +373,7 @@ class Faults(unittest.TestCase):
                     self.assertNotRegex(text, r"(^|[ '(])--[a-z]")
         with self.assertWarns(cq.SceneWarning) as caught:
             pane = cq.Mesh(vertices=square()[0], triangles=square()[1], material=cq.Material(transmission=1.0))
-            scene = cq.Scene.from_meshes([pane])
+            cq.Scene.from_meshes([pane])
         self.assertNotIn(" --", " ".join(str(one.message) for one in caught.warnings))
 
     def test_threads_have_a_bound(self):

@@ -1,0 +1,39 @@
+"""The comparison scenes in caustique and in Mitsuba 3: ratios of means and of tiles.
+
+The last two lines hold what --correct is about: the scene of wide lobes with Mitsuba's own models, and with what they
+lack. Pictures of the differences land in out/compare.
+"""
+
+import json
+import subprocess
+
+import tiles
+
+from ..options import options
+from ..record import ROOT, record
+
+VENV = ".venv-compare"
+ARGUMENTS = {"width": 160, "seeds": 8}
+FOLDER = ROOT / "out" / "compare"
+# Scene, Mitsuba's samples per pixel, more options.
+RUNS = [
+    ("glass", 144, []),
+    ("frosted", 112, ["--correct"]),
+    ("metal", 40, ["--correct"]),
+    ("textures", 112, ["--correct"]),
+    ("wide", 40, ["--correct"]),
+    ("wide", 40, []),
+]
+
+
+def main():
+    python = ROOT / VENV / "bin" / "python"
+    subprocess.run([python, "-m", "lab.compare_scenes", FOLDER], check=True)
+    for scene, spp, more in RUNS:
+        name = f"{scene}-corrected" if more else scene
+        command = [ROOT / "scripts" / "compare" / "mitsuba.py", FOLDER / f"{scene}.glb", "--width", options.width]
+        command += ["--seeds", options.seeds, "--spp", spp, "--png", FOLDER / f"{name}.png", "--json", *more]
+        done = subprocess.run(list(map(str, command)), check=True, stdout=subprocess.PIPE, text=True)
+        values = json.loads(done.stdout)
+        print(tiles.table(values), flush=True)
+        record("mitsuba", values)

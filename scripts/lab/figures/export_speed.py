@@ -1,0 +1,95 @@
+"""What scripts/blender/export.py takes for a scene of 1,000 balls of 1,280 triangles in ten materials, half of them glass:
+balls that share ten meshes, and balls with a mesh each. The least of --rounds, seconds and core-seconds.
+"""
+
+import contextlib
+import math
+import os
+import sys
+import tempfile
+import time
+
+import bpy  # First, because it brings the others.
+
+import bmesh
+import export
+
+from ..options import options
+from ..record import record
+
+VENV = ".venv-bpy"
+ARGUMENTS = {"rounds": 3}
+OBJECTS, KINDS, SIDE = 1000, 10, 10
+
+
+def material(index):
+    """A Principled material of its own colour, glass if the index is odd."""
+    made = bpy.data.materials.new(f"kind {index}")
+    if bpy.app.version < (5, 0, 0):
+        made.use_nodes = True
+    shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (0.2 + 0.05 * index, 0.5, 0.4, 1)
+    shader.inputs["Transmission Weight"].default_value = index % 2
+    return made
+
+
+def ball(worn):
+    """A mesh of 1,280 triangles."""
+    form = bmesh.new()
+    form.loops.layers.uv.new("UVMap")
+    bmesh.ops.create_icosphere(form, subdivisions=4, radius=0.4, calc_uvs=True)
+    mesh = bpy.data.meshes.new("ball")
+    form.to_mesh(mesh)
+    form.free()
+    mesh.shade_smooth()
+    mesh.materials.append(worn)
+    return mesh
+
+
+def build(meshes):
+    """A cube of balls that share so many meshes, a camera and a sun; the number of triangles."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+
+    def put(name, data, at, turn=(0, 0, 0)):
+        thing = bpy.data.objects.new(name, data)
+        scene.collection.objects.link(thing)
+        thing.location, thing.rotation_euler = at, turn
+        return thing
+
+    kinds = [material(index) for index in range(KINDS)]
+    shapes = [ball(kinds[index % KINDS]) for index in range(meshes)]
+    for i in range(OBJECTS):
+        put(f"ball {i}", shapes[i % meshes], (i % SIDE, i // SIDE % SIDE, i // SIDE**2))
+    scene.camera = put("eye", bpy.data.cameras.new("eye"), (5, -20, 5), (math.pi / 2, 0, 0))
+    put("sun", bpy.data.lights.new("sun", "SUN"), (0, 0, 20))
+    return sum(len(thing.data.polygons) for thing in scene.objects if thing.type == "MESH")
+
+
+def main():
+    print(f"{'meshes':>6} {'triangles':>10} {'seconds':>8} {'core-s':>7} {'MB':>6}", file=sys.stderr)
+    for name, meshes in (("shared", KINDS), ("unshared", OBJECTS)):
+        triangles, times, cores = build(meshes), [], []
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "scene.glb")
+            for _ in range(options.rounds):
+                began, spent = time.perf_counter(), time.process_time()
+                with contextlib.redirect_stdout(None):
+                    export.write(path)
+                times.append(time.perf_counter() - began)
+                cores.append(time.process_time() - spent)
+            size = os.path.getsize(path)
+        print(f"{meshes:>6} {triangles:>10} {min(times):>8.2f} {min(cores):>7.2f} {size / 1e6:>6.1f}", file=sys.stderr)
+        record(
+            "export",
+            {
+                "scene": name,
+                "objects": OBJECTS,
+                "meshes": meshes,
+                "triangles": triangles,
+                "seconds": min(times),
+                "core_seconds": min(cores),
+                "bytes": size,
+                "blender": bpy.app.version_string,
+            },
+        )

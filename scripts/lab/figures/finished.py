@@ -1,0 +1,204 @@
+"""The finished picture at equal time: our methods as delivered, what they were finished from, Intel OIDN alone on that,
+and public renderers with OIDN.
+
+Every picture is measured against two independent halves of a reference, so that the reference's own noise drops out:
+relMSE of all pixels and without the worst 0.5 %, HDR-FLIP (which keeps the noise of the reference), and grain (see
+`caustique compare`) of all pixels and without the worst 0.5 %. All that takes long is kept: a run that was cut off
+goes on.
+
+CAUSTIQUE_BIN names the program, CAUSTIQUE_CACHE where all is kept (caustique/finished in the cache of the user).
+
+scripts/compare/setup.sh peers installs the peers, and OIDN; their drivers are scripts/compare/peers. Peers always have
+the budget in core-seconds (seconds times threads), ours on the wall clock at most as many: rows say what was spent.
+"""
+
+import sys
+
+from .. import peer_runs, references, renders
+from ..cache import CACHE, Failed, load, program, save
+from ..goals import FIGURES, goals, inputs
+from ..options import options
+from ..picture_errors import Reference
+from ..record import record
+
+ARGUMENTS = references.ARGUMENTS | {
+    "budgets": [15.0, 60.0, 240.0],
+    "seeds": 1,
+    "methods": ["auto", "path", "bdpt", "vcm", "sppm", "cppm"],
+    "denoise": ["default"],
+    "render_options": [],
+    "clock": "wall",
+    "peers": peer_runs.DEFAULT,
+}
+SHORT = {"width": 240, "budgets": [10.0], "methods": ["auto", "path", "bdpt", "sppm", "vcm"], "reference_seconds": 60.0}
+# A render on the wall clock that got a smaller share of its cores than this is told apart.
+LITTLE = 0.8
+KINDS = {"second": "second", "twin": "twins"}
+COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}{'mean':>8}"
+
+
+def denoisers():
+    """What --denoise is given; nothing for the default."""
+    return ["" if name == "default" else name for name in options.denoise]
+
+
+def mean(runs):
+    """The figures of some seeds' pictures, averaged."""
+    names = set.intersection(*(set(run) for run in runs))
+    average = {}
+    for name in sorted(names):
+        keys = [key for key, value in runs[0][name].items() if value is not None]
+        average[name] = {key: sum(run[name][key] for run in runs) / len(runs) for key in keys}
+    return average
+
+
+def line(label, spent, figures, note=""):
+    """A row of the table."""
+    values = "".join(f"{figures[key]:>9.4f}" if key == "flip" else f"{figures[key]:>11.3g}" for key in FIGURES)
+    values += f"{figures.get('mean_ratio', 1):>8.3f}"
+    print(f"    {label:<32}{spent:>8.1f}{values}{'  ' + note if note else ''}", flush=True)
+
+
+def seeds(make, figures):
+    """Renders every seed; returns the averaged figures by picture, the mean core-seconds, and what was approximated."""
+    runs, spent = [], []
+    for seed in range(1, options.seeds + 1):
+        folder = make(seed)
+        runs.append(figures(folder))
+        spent.append(load(folder / "run.json"))
+    return mean(runs), sum(of["cpu_seconds"] for of in spent) / len(spent), spent[0].get("approximations")
+
+
+def ours(scene, budget, reference, halves, cell):
+    """Our renders of a scene at a budget."""
+    for denoise in denoisers():
+        for method in options.methods:
+            name = f"{method} {denoise}".strip()
+            try:
+                pictures, spent, _ = seeds(
+                    lambda seed: renders.render(scene, method, denoise, budget, seed),
+                    lambda folder: renders.figures(folder, reference, halves, renders.pictures),
+                )
+            except Failed as failed:
+                cell["notes"][name] = str(failed)
+                print(f"    {name:<32}{failed}", flush=True)
+                continue
+            cell["ours"][name], cell["core_seconds"][name] = pictures, spent
+            if spent < LITTLE * budget * options.threads:
+                cell["notes"][name] = f"spent {spent:.1f} of {budget * options.threads:g} core-seconds: try --clock cpu"
+            line(name, spent, pictures["delivered"], cell["notes"].get(name, ""))
+            line("  its input", spent, pictures["noisy"])
+            if len(inputs(pictures)) > 1:
+                line("  best level", spent, min(inputs(pictures), key=lambda figures: figures["relmse_trimmed"]))
+            if "oidn" in pictures:
+                line("  OIDN alone", spent, pictures["oidn"])
+
+
+def others(peers, names, budget, reference, halves, cell):
+    """The peers' renders of a scene at a budget."""
+    for name in names:
+        try:
+            pictures, spent, approximated = seeds(
+                lambda seed: peers.render(name, budget, seed),
+                lambda folder: renders.figures(folder, reference, halves, peers.pictures),
+            )
+        except Failed as failed:
+            cell["notes"][name] = str(failed)
+            print(f"    {name:<32}{failed}", flush=True)
+            continue
+        note = peer_runs.stranger(pictures["noisy"])
+        if note:
+            cell["notes"][name] = note
+        else:
+            cell["peers"][name] = pictures
+            if approximated:
+                cell["notes"][f"{name} approximates"] = "; ".join(approximated)
+        cell["core_seconds"][name] = spent
+        line(name, spent, pictures["noisy"], note or "")
+        if "oidn" in pictures:
+            line("  with OIDN", spent, pictures["oidn"])
+
+
+def short(cell):
+    """A cell for the record: the figures of a picture, to four digits."""
+
+    def pictures(some):
+        return {
+            name: {picture: [float(f"{figures[key]:.4g}") for key in FIGURES] for picture, figures in found.items()}
+            for name, found in some.items()
+        }
+
+    spent = {name: round(value, 1) for name, value in cell["core_seconds"].items()}
+    return {**cell, "ours": pictures(cell["ours"]), "peers": pictures(cell["peers"]), "core_seconds": spent}
+
+
+def measure(scene, names):
+    """All of a scene: a cell for each budget, and what its reference is."""
+    halves, made = references.reference(scene)
+    reference = Reference.read(halves)
+    known = {"error": reference.error, **{key: made[key] for key in ("options", "core_seconds", "program")}}
+    peers = peer_runs.Peers(scene, reference.mean.shape[0]) if names else None
+    cells = []
+    for budget in options.budgets:
+        # Errors below a fiftieth of the reference's own are taken for that.
+        cell = {"scene": references.name(scene), "budget": budget, "floor": max(reference.error / 50, 1e-9)}
+        cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes")})
+        own = f"reference by {made['options'][1]}, its own relMSE {reference.error:.2g}"
+        print(f"\n{cell['scene']}, {budget:g} s, {own}\n{COLUMNS}", flush=True)
+        ours(scene, budget, reference, halves, cell)
+        if peers:
+            others(peers, names, budget, reference, halves, cell)
+        cells.append(cell)
+    return cells, known
+
+
+def count(cells):
+    """The goals of each set and budget, printed and returned."""
+    counts = {}
+    delivered = f"{'auto' if 'auto' in options.methods else options.methods[0]} {denoisers()[0]}".strip()
+    for kind in ("first", "second", "twins"):
+        for budget in options.budgets:
+            chosen = [cell for cell in cells if cell["budget"] == budget]
+            chosen = [cell for cell in chosen if KINDS.get(cell["scene"].partition("/")[0], "first") == kind]
+            found = goals(chosen, delivered)
+            if found:
+                title = f"{kind} set, {budget:g} s"
+                counts[title] = found
+                print(f"\n{title:<66}{'geometric mean':>15}{'worst':>9}{'within':>9}")
+            for text, value in found.items():
+                within = f"{value['within']}/{value['of']}"
+                print(f"    {text:<62}{value['geometric_mean']:>15.3f}{value['worst']:>9.2f}{within:>9}")
+    return counts
+
+
+def main():
+    scenes = references.scenes()
+    names, reason = peer_runs.chosen()
+    if reason:
+        print(reason, file=sys.stderr)
+    if not renders.PYTHON:
+        print(
+            "OIDN alone is left out: there is no .venv-peers; make it by scripts/compare/setup.sh peers",
+            file=sys.stderr,
+        )
+    if not scenes:
+        print(f"--set {options.set} has no scenes yet", file=sys.stderr)
+        return
+    cells, known = [], {}
+    for scene in scenes:
+        try:
+            found, known[references.name(scene)] = measure(scene, names)
+            cells += found
+        except Failed as failed:
+            print(f"\n{references.name(scene)}: no reference: {failed}", flush=True)
+    said = {
+        "program": program(),
+        "width": options.width,
+        "threads": options.threads,
+        "clock": options.clock,
+        "seeds": options.seeds,
+    }
+    said["set"] = ",".join(options.scenes or []) or options.set
+    said.update({"options": options.render_options, "figures": FIGURES, "counts": count(cells), "references": known})
+    save(CACHE / "last.json", {**said, "cells": cells})
+    record("finished", {**said, "cells": [short(cell) for cell in cells]})

@@ -1,0 +1,131 @@
+"""Finished pictures at equal time beside Mitsuba, LuxCore and Cycles with OIDN, a scene at a time, in one run; and the
+pictures of docs/gallery.md: ours, the best of each renderer by trimmed relMSE, and the reference.
+
+The first of the budgets counts.
+
+Start-up of the peers (reading, compiling kernels, caches) is not part of their budget. Ours is all of it but reading the
+scene, with the finish.
+"""
+
+import sys
+
+import numpy as np
+from PIL import Image
+
+from .. import peer_runs, references, renders
+from ..accuracy import geometric
+from ..cache import Failed, program
+from ..goals import FIGURES
+from ..options import options
+from ..picture_errors import Reference
+from ..record import ROOT, record
+from . import finished
+
+ARGUMENTS = finished.ARGUMENTS | {"set": "all", "budgets": [6.0], "methods": ["auto"], "clock": "cpu"}
+GALLERY = ROOT / "docs" / "gallery"
+# The width of a picture in a strip, and the share of the pixels that are not brighter than white in it.
+SHOWN, BRIGHT = 240, 0.97
+COMPARED = ("relmse_trimmed", "flip", "grain_trimmed")
+RENDERERS = {"mitsuba": "Mitsuba", "lux": "LuxCore", "cycles": "Cycles"}
+
+
+def strip(name, pictures):
+    """Pictures side by side, as bright as the last one asks for."""
+    white = max(float(np.quantile(pictures[-1].max(-1), BRIGHT)), 1e-9)
+    shown = []
+    for picture in pictures:
+        linear = np.clip(np.nan_to_num(picture) / white, 0, 1)
+        display = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
+        image = Image.fromarray((255 * display + 0.5).astype(np.uint8))
+        shown.append(image.resize((SHOWN, round(SHOWN * image.height / image.width)), Image.Resampling.LANCZOS))
+    sheet = Image.new("RGB", (SHOWN * len(shown) + 4 * (len(shown) - 1), shown[0].height), "white")
+    for index, image in enumerate(shown):
+        sheet.paste(image, (index * (SHOWN + 4), 0))
+    GALLERY.mkdir(exist_ok=True)
+    sheet.save(GALLERY / f"{name.replace('/', '-')}.jpg", quality=85, optimize=True)
+
+
+def pictures(scene, peers, cell, halves):
+    """Ours, the best of each renderer, and the reference; and their names."""
+    found = [renders.pictures(renders.render(scene, "auto", "", options.budgets[0], 1))["delivered"]]
+    names = ["caustique"]
+    for prefix, renderer in RENDERERS.items():
+        of = {peer: made["oidn"] for peer, made in cell["peers"].items() if peer.startswith(prefix) and "oidn" in made}
+        if of:
+            best = min(of, key=lambda peer: of[peer]["relmse_trimmed"])
+            found.append(peers.pictures(peers.render(best, options.budgets[0], 1))["oidn"])
+            names.append(f"{renderer} ({best.removeprefix(prefix).strip('_').replace('_', ' ')})")
+    return [*found, halves.mean.astype(np.float32)], [*names, "reference"]
+
+
+def compared(scene, names):
+    """A scene's row, and its strip."""
+    halves, made = references.reference(scene)
+    reference = Reference.read(halves)
+    peers = peer_runs.Peers(scene, reference.mean.shape[0])
+    cell = {"scene": references.name(scene), "budget": options.budgets[0], "floor": max(reference.error / 50, 1e-9)}
+    cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes")})
+    print(f"\n{cell['scene']}\n{finished.COLUMNS}", flush=True)
+    finished.ours(scene, options.budgets[0], reference, halves, cell)
+    finished.others(peers, names, options.budgets[0], reference, halves, cell)
+    ours = cell["ours"]["auto"]["delivered"]
+    theirs = {peer: made["oidn"] for peer, made in cell["peers"].items() if "oidn" in made}
+    ratios = {
+        peer: {key: max(ours[key], 1e-9) / max(figures[key], 1e-9) for key in COMPARED}
+        for peer, figures in theirs.items()
+    }
+    shown, titles = pictures(scene, peers, cell, reference)
+    strip(cell["scene"], shown)
+    figures = {"auto": ours, **theirs}
+    return {
+        "scene": cell["scene"],
+        "reference": made["options"][1],
+        "titles": titles,
+        "figures": {peer: [float(f"{of[key]:.4g}") for key in COMPARED] for peer, of in figures.items()},
+        "ratios": {peer: {key: round(value, 3) for key, value in of.items()} for peer, of in ratios.items()},
+        "core_seconds": {peer: round(spent, 1) for peer, spent in cell["core_seconds"].items()},
+        "notes": cell["notes"],
+    }
+
+
+def summary(rows):
+    """Ours over each peer, and over the best of all in each figure: geometric mean, worst, and how many are better."""
+    found = {}
+    peers = list(dict.fromkeys(peer for row in rows for peer in row["ratios"]))
+    for peer in [*peers, "best of all"]:
+        for key in COMPARED:
+            values = [
+                max(of[key] for of in row["ratios"].values()) if peer == "best of all" else row["ratios"][peer][key]
+                for row in rows
+                if row["ratios"] and (peer == "best of all" or peer in row["ratios"])
+            ]
+            if values:
+                better = sum(value < 1 for value in values)
+                of = found.setdefault(peer, {})
+                of[key] = [round(geometric(values), 3), round(max(values), 2), better, len(values)]
+    return found
+
+
+def main():
+    names, reason = peer_runs.chosen()
+    if reason:
+        sys.exit(f"peers: error: {reason}")
+    rows = []
+    for scene in references.scenes():
+        try:
+            rows.append(compared(scene, names))
+        except Failed as failed:
+            print(f"\n{references.name(scene)}: {failed}", flush=True)
+    found = summary(rows)
+    print(f"\n{'ours over':<22}{'':<16}{'geometric mean':>15}{'worst':>8}{'better':>9}")
+    for peer, of in found.items():
+        for key, (mean, worst, better, count) in of.items():
+            print(f"{peer:<22}{key:<16}{mean:>15.3f}{worst:>8.2f}{better:>6}/{count}")
+    said = {
+        "program": program(),
+        "width": options.width,
+        "threads": options.threads,
+        "seconds": options.budgets[0],
+        "clock": options.clock,
+    }
+    record("peers", {**said, "compared": list(COMPARED), "all_figures": FIGURES, "summary": found, "rows": rows})

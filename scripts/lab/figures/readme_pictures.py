@@ -1,0 +1,35 @@
+"""Makes the README's pictures again: docs/pool.png, and docs/scenes.png from six scenes."""
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+from ..cache import BIN
+from ..options import options
+from ..record import ROOT
+
+ARGUMENTS = {"seconds": 60.0}
+SHEET = ["interior", "lamp", "cornell", "gems", "torus", "stadium"]
+
+
+def picture(folder, scene, width, height):
+    """Renders a scene; its PNG."""
+    file = Path(folder) / f"{scene}.png"
+    command = [BIN, "render", ROOT / "scenes" / f"{scene}.glb", "-o", file.with_suffix(".exr"), "--png", file]
+    command += ["--width", width, "--height", height, "--layers", "beauty", "--time", options.seconds]
+    subprocess.run(list(map(str, [*command, "--progress", "plain"])), check=True)
+    return Image.open(file).convert("RGB")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        picture(folder, "pool", 640, 360)
+        (ROOT / "docs" / "pool.png").write_bytes((Path(folder) / "pool.png").read_bytes())
+        pictures = [picture(folder, scene, 480, 270) for scene in SHEET]
+    width, height = pictures[0].size
+    sheet = Image.new("RGB", (2 * width, 3 * height))
+    for index, one in enumerate(pictures):
+        sheet.paste(one, (index % 2 * width, index // 2 * height))
+    sheet.save(ROOT / "docs" / "scenes.png", optimize=True)

@@ -1,0 +1,63 @@
+"""Write src/combine/testdata/contract.f32, which holds Rust and Python to the same combiner.
+
+Little-endian float32: m, h, w, F, K; the stack (levels, variances, albedo, normal, depth); the network's input; random
+features and equation (6) with them (window 15); the shipped network's image; then, for the top left h/2 x w/2 pixels,
+random explicit weights of a window of K and equation (6) with them.
+"""
+
+import argparse
+import pathlib
+
+import numpy as np
+import torch
+
+from . import combination
+from . import export_network
+from . import model
+from . import normalise
+from . import synthetic
+
+HERE = pathlib.Path(__file__).parent
+TARGET = HERE / "../../src/combine/testdata/contract.f32"
+H, W, K = 16, 22, 5
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--checkpoint", help="of the shipped network; without it the untrained one of export.py")
+    args = parser.parse_args()
+    whole = synthetic.stack(7)
+    crop = {
+        k: (v[:, 40 : 40 + H, 50 : 50 + W] if v.ndim == 4 else v[40 : 40 + H, 50 : 50 + W]) for k, v in whole.items()
+    }
+    if args.checkpoint:
+        net, _ = export_network.load(args.checkpoint)
+    else:
+        torch.manual_seed(1)
+        net = model.build("compact")
+    net.eval()
+    torch.manual_seed(2)
+    m, f = net.levels, net.features
+    levels = torch.from_numpy(crop["levels"]).permute(0, 3, 1, 2)[None].double()
+    image = normalise.tensor(crop)
+    features = torch.randn(1, (m - 1) * (f + 3), H, W)
+    features[:, -(m - 1) :] -= 3.0  # falloffs of about 0.05
+    expected = combination.combine(features.double(), levels, "features", model.WINDOW, f)
+    with torch.no_grad():
+        padded = torch.nn.functional.pad(torch.from_numpy(image)[None], [0, -W % net.stride, 0, -H % net.stride])
+        output = net(padded)[..., :H, :W].double()
+        network = combination.combine(output, levels, net.kind, net.window, f)
+    h, w = H // 2, W // 2
+    weights = torch.randn(1, (m - 1) * K * K, h, w).exp()
+    kernel = combination.combine(weights.double(), levels[..., :h, :w], "weights", K)
+    rgb = lambda x: x[0].permute(1, 2, 0).numpy()
+    parts = [np.array([m, H, W, f, K]), *(crop[k] for k in ("levels", "variances", "albedo", "normal", "depth"))]
+    parts += [image, features.numpy(), rgb(expected), rgb(network), weights.numpy(), rgb(kernel)]
+    data = np.concatenate([np.asarray(p, "<f4").ravel() for p in parts])
+    TARGET.parent.mkdir(exist_ok=True)
+    data.astype("<f4").tofile(TARGET)
+    print(f"{TARGET.resolve()}: {data.nbytes} bytes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""The networks that choose the weights of [Choi and Moon 2021, equation (6)].
+
+`Compact` gives per pixel and level pair a point phi in a small feature space and three scalars; combination.py makes the
+pairwise weights of equation (6) from them. `Paper` is the paper's own kernel-predicting network: ten 5x5 convolutions of
+50 filters and a weight for every pixel of the window and level pair.
+"""
+
+import torch
+from torch import nn
+
+from . import normalise
+
+# The paper's is 19, at 1.6 times the cost.
+WINDOW = 15
+FEATURES = 4
+# Bound of the logarithms of explicit weights: keeps every sum of weights well inside float32.
+LOG_WEIGHT_BOUND = 8.0
+
+
+def conv(inputs, outputs, size=3, stride=1):
+    return nn.Conv2d(inputs, outputs, size, stride, size // 2)
+
+
+class Block(nn.Module):
+    """Two 3x3 convolutions with ReLU."""
+
+    def __init__(self, inputs, outputs):
+        super().__init__()
+        self.first, self.second = conv(inputs, outputs), conv(outputs, outputs)
+
+    def forward(self, x):
+        return torch.relu(self.second(torch.relu(self.first(x))))
+
+
+class Compact(nn.Module):
+    """A U-Net at full, half and quarter resolution, its skips added; 0.07 MFLOP a pixel.
+
+    Widths are multiples of 16, which ONNX Runtime's convolutions like.
+
+    Its output, [b, (levels - 1) (features + 3), h, w], holds for all pairs phi, then source, centre and log falloff.
+    """
+
+    kind, output = "features", "features"
+    stride = 4
+    # Receptive radius 32 of the layers below (a test looks for seams), rounded up to the stride.
+    halo = 32
+
+    def __init__(self, levels=5, window=WINDOW, features=FEATURES, widths=(16, 32, 64), last=32):
+        super().__init__()
+        self.levels, self.window, self.features = levels, window, features
+        full, half, quarter = widths
+        self.stem = conv(normalise.channels(levels), full)
+        self.down1, self.enc1 = conv(full, half, stride=2), Block(half, half)
+        self.down2, self.enc2, self.middle = (
+            conv(half, quarter, stride=2),
+            Block(quarter, quarter),
+            Block(quarter, quarter),
+        )
+        # Narrowed before it is enlarged: a 1x1 convolution commutes with nearest-neighbour enlargement.
+        self.up1, self.dec1 = conv(quarter, half, 1), Block(half, half)
+        self.up0, self.skip0, self.dec0 = conv(half, last, 1), conv(full, last, 1), conv(last, last)
+        self.head = conv(last, (levels - 1) * (features + 3), 1)
+        # Begin as a filter of about a pixel: near the best level already, and wide enough to learn from.
+        pairs = levels - 1
+        with torch.no_grad():
+            self.head.bias.zero_()
+            self.head.bias[-pairs:] = -1.0
+
+    def forward(self, x):
+        full = torch.relu(self.stem(x))
+        half = self.enc1(torch.relu(self.down1(full)))
+        quarter = self.enc2(torch.relu(self.down2(half)))
+        quarter = quarter + self.middle(quarter)
+        half = self.dec1(torch.relu(half + up(self.up1(quarter))))
+        full = torch.relu(self.skip0(full) + up(self.up0(half)))
+        return self.head(torch.relu(self.dec0(full)))
+
+
+class Paper(nn.Module):
+    """[Choi and Moon 2021, 4.3]: ten convolutions, 2.4 M parameters, 4.7 MFLOP a pixel."""
+
+    kind, output = "weights", "weights"
+    stride = 1
+    halo = 20
+
+    def __init__(self, levels=5, window=WINDOW, filters=50, depth=10):
+        super().__init__()
+        self.levels, self.window, self.features = levels, window, 0
+        sizes = [normalise.channels(levels)] + [filters] * (depth - 1)
+        self.layers = nn.ModuleList(conv(a, b, 5) for a, b in zip(sizes, sizes[1:]))
+        self.last = conv(filters, (levels - 1) * window * window, 5)
+        for layer in [*self.layers, self.last]:
+            nn.init.xavier_uniform_(layer.weight)
+            nn.init.zeros_(layer.bias)
+
+    def forward(self, x):
+        for layer in self.layers:
+            x = torch.relu(layer(x))
+        return torch.exp(LOG_WEIGHT_BOUND * torch.tanh(self.last(x) / LOG_WEIGHT_BOUND))
+
+
+def up(x):
+    return nn.functional.interpolate(x, scale_factor=2.0, mode="nearest")
+
+
+def build(arch, levels=5, window=WINDOW):
+    return {"compact": Compact, "paper": Paper}[arch](levels=levels, window=window)

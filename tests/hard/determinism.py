@@ -1,0 +1,52 @@
+"""12. Determinism: the same bytes from any number of threads, from shards merged in any order, and after a kill."""
+
+from . import magnitude
+from .answers import Resumed, Shards, Threads
+from .case import Case
+
+TITLE = "Determinism"
+ALL = ("path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "mlt")
+DIVIDED = ("path", "bdpt", "sppm", "vcm", "mlt")
+SCENE = {"scene": magnitude.room}
+
+CASES = [
+    Case(
+        "threads",
+        "1, 2, 3 and 7 threads",
+        SCENE,
+        Threads("What a pixel and a photon are follows from their numbers alone, and sums have a fixed order."),
+        ALL,
+        size=24,
+        iterations=2,
+        photons=5000,
+    ),
+    Case(
+        "shards",
+        "Three shards, merged in all six orders, and the whole",
+        SCENE,
+        Shards("Iterations are numbered; a sum has a fixed order whoever made its parts."),
+        DIVIDED,
+        size=16,
+        iterations=6,
+        photons=3000,
+    ),
+    Case(
+        "shards-files",
+        "The files of merges in all six orders",
+        SCENE,
+        Shards("With --reproducible a merge writes no clocks and no names.", files=True),
+        ("path", "vcm"),
+        size=16,
+        iterations=6,
+    ),
+    Case(
+        "resumed",
+        "A render that is killed, and goes on",
+        SCENE,
+        Resumed("A checkpoint is the whole state."),
+        ("path", "sppm", "vcm", "cppm"),
+        size=48,
+        iterations={None: 60, "path": 200},
+        photons=20000,
+    ),
+]

@@ -1,0 +1,120 @@
+"""7. Furnaces: what is lit from everywhere alike, and takes no light away, looks like the light."""
+
+from functools import partial
+
+from . import scene as s
+from . import shapes
+from .answers import Value, Values
+from .case import FEW, METHODS, Case
+
+TITLE = "Furnace"
+WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
+ROUGHNESS = (0.0, 0.05, 0.3, 1.0)
+
+
+def closed(albedo, emitted=1.0):
+    """A closed box whose walls all emit and reflect; the camera in it looks at a wall."""
+    walls = shapes.box((-1, -1, -1), (1, 1, 1)).flipped()
+    return s.Scene().add(walls, s.glowing(s.diffuse(albedo), emitted)).seen((0.1, 0.2, 0.3), (1, 0.1, 0), 30)
+
+
+def white(material, mesh=None):
+    """A sphere in a white environment, which the picture's middle shows."""
+    return s.Scene().within(1).add(mesh or shapes.sphere((0, 0, 0), 1), material).seen((0, 0.5, 4), (0, 0, 0), 12)
+
+
+def mirrors():
+    """A closed room of perfect mirrors around a black ball that glows."""
+    walls = shapes.box((-1, -1, -1), (1, 1, 1)).flipped()
+    lamp = s.Scene().add(shapes.sphere((0.2, 0.1, -0.3), 0.5, smooth=False), s.emitter(1))
+    return lamp.add(walls, s.metal(1, 0)).seen((0.8, 0.7, 0.75), (-1, 0.1, 0), 60)
+
+
+#: Light is the same all over the wall, so that wide bandwidths blur nothing.
+WIDE = {None: (), "sppm": ("--initial-bandwidth", "0.3"), "vcm": ("--initial-bandwidth", "0.3")}
+
+
+def _closed(albedo, iterations, photons, resolves=0.1, methods=METHODS, name="", long=False):
+    return Case(
+        f"furnace-albedo-{albedo}{name}",
+        f"A closed box of albedo {albedo} whose walls emit",
+        {"scene": partial(closed, albedo)},
+        Value(
+            1 / (1 - albedo),
+            f"L = 1 + {albedo} L on every wall, so L = 1 / (1 - {albedo}).",
+            bound=0.005,
+            resolves=resolves,
+        ),
+        methods,
+        iterations=iterations,
+        photons=photons,
+        options=WIDE,
+        size=8,
+        long=long,
+    )
+
+
+def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, iterations=32):
+    scenes = {f"roughness-{r:g}": partial(white, material(r)) for r in ROUGHNESS}
+    return Case(
+        f"furnace-{name}",
+        f"{title} in a white furnace, roughness 0 to 1",
+        scenes,
+        Values({label: 1.0 for label in scenes}, WHITE, bound=bound, resolves=0.06),
+        methods=methods,
+        iterations=iterations,
+    )
+
+
+def _with(material, layer, roughness, strength):
+    """A material below a layer (clearcoat or sheen) of this roughness and strength."""
+    key = {"clearcoat": "clearcoatFactor", "sheen": "sheenColorFactor"}[layer]
+    told = {key: strength, f"{layer}RoughnessFactor": roughness}
+    return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{layer}": told}}
+
+
+CASES = [
+    Case(
+        "furnace-mirrors",
+        "A closed room of perfect mirrors, in which a ball glows",
+        {"scene": mirrors},
+        Value(
+            1.0,
+            "Mirrors lose nothing, and a ray goes on until it meets the ball, but for a set of measure zero: radiance is the"
+            " ball's along every ray.",
+            bound=0.005,
+            resolves=0.1,
+        ),
+        ("path", "bdpt", "vcm", "sppm"),
+        iterations=8,
+        photons=1000,
+    ),
+    _closed(0.5, {None: 32, "sppm": 12}, 10000),
+    _closed(0.9, {None: 32, "sppm": 4}, 5000),
+    _closed(0.99, {None: 48, "sppm": 8}, 500, 0.1, ("path", "sppm")),
+    _closed(0.99, 48, 500, 0.1, ("bdpt", "vcm"), "-connected", long=True),
+    _closed(0.999, 8, 100, 0.3, ("path",)),
+    _closed(0.999, {None: 48, "sppm": 2}, 100, 0.3, ("bdpt", "vcm", "sppm"), "-connected", long=True),
+    Case(
+        "furnace-diffuse",
+        "A white Lambertian sphere in a white furnace",
+        {"scene": partial(white, s.diffuse(1))},
+        Value(1.0, WHITE, resolves=0.05),
+        iterations=32,
+        photons=1000,
+    ),
+    _lobe("metal", "White metal", lambda r: s.metal(1, r), bound=0.01),
+    _lobe("glass", "Clear glass", lambda r: s.glass(1.5, r), bound=0.01),
+    _lobe("plastic", "A dielectric coat over a white base", lambda r: s.plastic(1, r), bound=0.01),
+    _lobe(
+        "clearcoat", "A clear coat over white metal", lambda r: _with(s.metal(1, 0.5), "clearcoat", r, 1.0), bound=0.01
+    ),
+    _lobe("sheen", "White sheen over a white base", lambda r: _with(s.diffuse(1), "sheen", r, [1, 1, 1]), bound=0.01),
+    Case(
+        "furnace-glass-box",
+        "A closed box of clear glass, through its edges and corners",
+        {"scene": partial(white, s.glass(1.5), shapes.box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3)))},
+        Value(1.0, WHITE),
+        seeds=FEW,
+    ),
+]

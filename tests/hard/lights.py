@@ -1,0 +1,180 @@
+"""2. Lights: as small as points, as weak and as strong as numbers go, many, and black."""
+
+from functools import partial
+from math import atan, pi, radians, cos, sin, sqrt
+
+import numpy as np
+
+from . import scene as s
+from . import shapes
+from .answers import Equal, Exact, Value, Values
+from .case import FEW, Case
+
+TITLE = "Lights"
+ALBEDO, HEIGHT = 0.8, 2.0
+
+
+def ground(field_deg=0.5):
+    """A Lambertian floor, of whose middle a small patch is seen from the side."""
+    return s.Scene().add(shapes.floor(5), s.diffuse(ALBEDO)).seen((3, 3, 0), (0, 0, 0), field_deg)
+
+
+def form_factor(half, height):
+    """That of a point to a parallel square above it, with edges of twice `half` [e.g. Howell, B-3, four corners]."""
+    x = half / height
+    return 4 * x / sqrt(1 + x * x) * atan(x / sqrt(1 + x * x)) / pi
+
+
+def lit_by_square(radiance, half):
+    """Radiance of the floor below a square lamp: albedo times radiance times form factor."""
+    return ALBEDO * radiance * form_factor(half, HEIGHT)
+
+
+def shrinking(half):
+    """A square lamp with the intensity of one of a metre and radiance 1, whatever its size."""
+    return ground().add(shapes.ceiling(half, HEIGHT), s.emitter(0.25 / half**2))
+
+
+def strong(power):
+    """The floor, a glass sphere on it, and a lamp of radiance 2^power."""
+    return (
+        s.Scene()
+        .add(shapes.floor(1.5), s.diffuse(ALBEDO))
+        .add(shapes.ceiling(0.3, HEIGHT), s.emitter(2.0**power))
+        .add(shapes.sphere((0, 0.5, 0), 0.4), s.glass(1.5))
+        .seen((0, 1.5, 3), (0, 0.2, 0), 30)
+    )
+
+
+def many(count):
+    """count x count tiny lamps in a square of 2 m, with the power of a square of radiance 1."""
+    at = (np.arange(count) + 0.5) / count * 2 - 1
+    x, z = (v.ravel() for v in np.meshgrid(at, at))
+    half = 0.05 / count
+    corners = np.array([(-half, 0, -half), (half, 0, -half), (half, 0, half), (-half, 0, half)])
+    positions = (np.stack([x, np.full_like(x, HEIGHT), z], 1)[:, None] + corners).reshape(-1, 3)
+    first = 4 * np.arange(len(x))[:, None, None]
+    triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    return ground().add(shapes.Mesh(positions, triangles), s.emitter((1 / count / half) ** 2))
+
+
+def crowd(black):
+    """Four lamps, and with `black` one that emits nothing, seen from below through a sphere of glass."""
+    made = s.Scene().add(shapes.floor(1.5), s.diffuse(ALBEDO)).seen((0, 1.5, 3), (0, 0.2, 0), 30)
+    for i in range(4):
+        lamp = shapes.quad((0.6 * i - 0.9, HEIGHT, 0), (0.1, 0, 0), (0, 0, 0.1))
+        made = made.add(lamp, s.emitter(2.0 + i))
+    dark = shapes.quad((0, HEIGHT, 0.6), (0.3, 0, 0), (0, 0, 0.3))
+    # A strength of zero, as an exporter writes it for a lamp that is turned down.
+    lamp = {
+        **s.diffuse(0),
+        "emissiveFactor": [1, 1, 1],
+        "extensions": {**s.diffuse(0)["extensions"], "KHR_materials_emissive_strength": {"emissiveStrength": 0}},
+    }
+    return made.add(dark, lamp if black else s.diffuse(0))
+
+
+def sunny(angle_deg):
+    """A sun 60 degrees from the zenith; irradiance across it is 3."""
+    return ground().sun((-sin(radians(60)), -cos(radians(60)), 0), 3.0, angle_deg)
+
+
+def pane(angle_deg):
+    """A sun in the zenith through a pane of glass a metre above the floor."""
+    glass = shapes.box((-0.1, 1, -0.1), (0.1, 1.02, 0.1))
+    return (
+        s.Scene()
+        .add(shapes.floor(1), s.diffuse(0.5))
+        .add(glass, s.glass(1.5))
+        .sun((0, -1, 0), 3.0, angle_deg)
+        .seen((1.2, 0.5, 0), (0, 0, 0), 1)
+    )
+
+
+SIZES = {f"{half:g}": half for half in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)}
+POWERS = {"2^-40": -40, "2^40": 40}
+SUN = ALBEDO / pi * 3.0 * cos(radians(60))
+PANE = 0.5 / pi * 3.0 * (1 - 0.04) / (1 + 0.04)
+
+CASES = [
+    Case(
+        "light-shrinks",
+        "A square lamp of the same intensity, from 20 cm to 2 µm",
+        {label: partial(shrinking, half) for label, half in SIZES.items()},
+        Values(
+            {label: lit_by_square(0.25 / half**2, half) for label, half in SIZES.items()},
+            "Albedo times radiance times the form factor of a square parallel to a point below its middle.",
+        ),
+        ("path", "bdpt", "vcm", "sppm"),
+        size=8,
+        iterations=8,
+        photons=2000,
+    ),
+    Case(
+        "light-point",
+        "A point light of the intensity that the shrinking lamp tends to",
+        {"scene": lambda: ground().point((0, HEIGHT, 0), 1.0)},
+        Value(ALBEDO / pi / HEIGHT**2, "Albedo / pi times I / d²."),
+        size=8,
+        seeds=FEW,
+    ),
+    Case(
+        "light-strength",
+        "Radiance 2^-40 and 2^40 (about 1e-12 and 1e12), with a caustic, to the last bit",
+        {"2^0": partial(strong, 0), **{label: partial(strong, p) for label, p in POWERS.items()}},
+        Exact("2^0", POWERS, "Light transport is linear; a power of two changes exponents alone."),
+        ("path", "bdpt", "vcm", "sppm", "ppm", "appm", "cppm", "bpm", "pm", "light"),
+        seeds=1,
+    ),
+    Case(
+        "light-sun",
+        "A delta sun, and one of 0.5 degrees, with the same irradiance",
+        {"delta": partial(sunny, 0), "half": partial(sunny, 0.5)},
+        Values(
+            {"delta": SUN, "half": SUN},
+            "L = albedo / pi E cos 60°. A disc of uniform radiance has the irradiance of "
+            "its middle on every plane that it is wholly above.",
+        ),
+        size=8,
+    ),
+    Case(
+        "light-sun-pane",
+        "The same suns through a pane of glass: light that photons carry",
+        {"delta": partial(pane, 0), "half": partial(pane, 0.5)},
+        Values(
+            {"delta": PANE, "half": PANE},
+            "Perpendicular Fresnel reflectance is R = 0.04; with all inner reflections a pane passes (1 - R) / (1 + R)."
+            " L = albedo / pi E times that. The floor's own light that the pane returns is below 0.05 %.",
+            resolves=0.1,
+        ),
+        ("vcm", "sppm"),
+        size=16,
+        iterations={None: 4, "vcm": 300},
+        photons=25000,
+        options={None: ("--initial-bandwidth", "0.06"), "vcm": ("--initial-bandwidth", "0.06", "--guide", "on")},
+    ),
+    Case(
+        "light-many",
+        "100,489 tiny lamps with the power of one square",
+        {"scene": partial(many, 317)},
+        Value(
+            lit_by_square(1.0, 1.0),
+            "Lamps this dense are an even square: the sum over them is the integral but for "
+            "1e-5. Albedo times the form factor.",
+            bound=0.005,
+            resolves=0.06,
+        ),
+        ("path", "vcm", "sppm"),
+        size=8,
+        seeds=8,
+        iterations=32,
+        photons=1000,
+    ),
+    Case(
+        "light-black",
+        "A lamp of radiance zero among four bright ones",
+        {"without": partial(crowd, False), "with": partial(crowd, True)},
+        Equal("without", ("with",), "What emits nothing adds nothing: it is a black surface."),
+        seeds=FEW,
+    ),
+]

@@ -1,0 +1,103 @@
+"""1. Scale and place: a scene that is a thousand times as large, or far from the origin, looks the same."""
+
+from . import scene as s
+from . import shapes
+from .answers import Equal, Exact
+from .case import FEW, Case
+
+TITLE = "Scale"
+METHODS = ("path", "bdpt", "vcm", "sppm")
+
+
+def room():
+    """An open room of two metres: a coloured wall, a lamp, a glass sphere that throws a caustic, a rough metal one."""
+    sides = shapes.box((-1, 0, -1), (1, 2, 1)).flipped().without([8, 9])
+    return (
+        s.Scene()
+        .add(sides, s.diffuse((0.6, 0.5, 0.4)))
+        .add(shapes.ceiling(0.25, 1.98), s.emitter((8, 9, 10)))
+        .add(shapes.sphere((0.35, 0.4, 0.2), 0.3), s.glass(1.5))
+        .add(shapes.sphere((-0.4, 0.3, -0.2), 0.3), s.metal((0.9, 0.7, 0.4), 0.4))
+        .seen((0, 1, 4), (0, 0.75, 0), 35)
+    )
+
+
+def _scales(factors):
+    return {
+        "one": lambda: room().scaled(1),
+        **{name: lambda f=factor: room().scaled(f) for name, factor in factors.items()},
+    }
+
+
+def _places(metres):
+    """Rooms on a node that stands so far away, in a direction that is along no axis."""
+    return {"here": room, "there": lambda: room().moved((metres, 0.3 * metres, -0.6 * metres))}
+
+
+SAME = "Radiance does not depend on the unit of length: without media nothing in the scene has a length of its own."
+PLACE = "Physics is the same everywhere. Single precision holds {0} to {1} there, which is the bound's reason."
+#: Exponents of two; of powers above one, and of one below.
+LARGE, SMALL = {"2^1": 1, "2^10": 10, "2^20": 20}, {"2^-10": -10}
+EXACT = SAME + " A power of two changes exponents alone, so no rounding."
+
+
+def _binary(name, title, powers, **more):
+    return Case(
+        name,
+        title,
+        _scales({label: 2.0**power for label, power in powers.items()}),
+        Exact("one", {label: 0 for label in powers}, EXACT),
+        METHODS,
+        seeds=2,
+        iterations=4,
+        **more,
+    )
+
+
+CASES = [
+    Case(
+        "scale-decimal",
+        "The same room times 1e-3, 1e3 and 1e6",
+        _scales({"milli": 1e-3, "kilo": 1e3, "mega": 1e6}),
+        Equal("one", ("milli", "kilo", "mega"), SAME, resolves=0.05),
+        METHODS,
+        iterations=4,
+        seeds=FEW,
+    ),
+    _binary(
+        "scale-binary-large",
+        "The same room times 2, 2^10 and 2^20, to the last bit",
+        LARGE,
+        fails={"bdpt": "One number in 3072 differs at factor 2, by one unit in its last place."},
+    ),
+    _binary(
+        "scale-binary-small",
+        "The same room times 2^-10, 2 mm across, to the last bit",
+        SMALL,
+    ),
+    Case(
+        "far-10km",
+        "The room 13 km from the origin",
+        _places(1e4),
+        Equal("here", ("there",), PLACE.format("13 km", "0.5 mm"), bound=0.005, resolves=0.05),
+        METHODS,
+        iterations=4,
+        seeds=FEW,
+    ),
+    Case(
+        "far-1000km",
+        "The room 1,300 km from the origin",
+        _places(1e6),
+        Equal(
+            "here",
+            ("there",),
+            PLACE.format("1,300 km", "6 cm") + " A renderer that composes matrices in double "
+            "precision and moves the origin loses nothing, which is what is asked.",
+            bound=0.02,
+            resolves=0.1,
+        ),
+        METHODS,
+        iterations=4,
+        seeds=FEW,
+    ),
+]

@@ -1,0 +1,173 @@
+"""11. Media: none at all, as dense as stone, without absorption, and scattering forwards and backwards alone."""
+
+from functools import partial
+from math import exp, pi
+
+import numpy as np
+
+from . import scene as s
+from . import shapes
+from .answers import Equal, Value, Values
+from .case import FEW, Case
+
+TITLE = "Media"
+WHITE = "Light of radiance 1 comes from everywhere and nothing absorbs, so radiance is 1 along every ray."
+METHODS = ("path", "bdpt", "vcm", "sppm")
+EYE = METHODS[:3]
+
+
+def cloud(of, half=0.5, eye=(0, 0, 4), field_deg=8):
+    """A box of a medium without a border of its own, in a white environment; the eye sees its middle."""
+    return (
+        s.Scene()
+        .within(1)
+        .add(shapes.box((-half,) * 3, (half,) * 3), s.glass(1.0, medium=of))
+        .seen(eye, (0, 0, 0), field_deg)
+    )
+
+
+def lantern(of):
+    """A point light of 1 W/sr a metre above a matte floor, in the middle of a ball of a medium, of radius 0.3."""
+    made = s.Scene().add(shapes.floor(1.5), s.diffuse(0.5))
+    made = made.add(shapes.sphere((0, 1, 0), 0.3, 64), s.glass(1.0, medium=of))
+    return made.point((0, 1, 0), 1.0).seen((1, 0.5, 0), (0, 0, 0), 1)
+
+
+def lit(of):
+    """A lamp, a floor and a box of a medium, or none."""
+    made = (
+        s.Scene()
+        .add(shapes.floor(1.5), s.diffuse(0.8))
+        .add(shapes.ceiling(0.3, 2), s.emitter(6))
+        .seen((0, 1.5, 3), (0, 0.3, 0), 30)
+    )
+    return made if of is None else made.add(shapes.box((-0.4, 0.1, -0.4), (0.4, 0.9, 0.4)), s.glass(1.0, medium=of))
+
+
+def half_space(albedo):
+    """Radiance of a half-space that scatters evenly, in a white furnace, seen along its normal:
+    1 - H(1) sqrt(1 - albedo) [Chandrasekhar 1950, the albedo of a plane; by reciprocity the furnace shows it]."""
+    node, weight = np.polynomial.legendre.leggauss(64)
+    mu, weight = (node + 1) / 2, weight / 2
+    at = np.append(mu, 1.0)
+    h = np.ones_like(at)
+    for _ in range(2000):
+        # 1 / H = sqrt(1 - albedo) + albedo / 2 times the integral of mu' H(mu') / (mu + mu'), which converges for all.
+        h = 1 / (np.sqrt(1 - albedo) + albedo / 2 * (weight * mu * h[:-1] / (at[:, None] + mu)).sum(axis=1))
+    return float(1 - h[-1] * np.sqrt(1 - albedo))
+
+
+G = (0.0, 0.999, -0.999)
+FIREFLIES = (
+    "Connections between vertices this near to each other leave fireflies: pixels of 50 among ones after 32 iterations."
+)
+PEAK = (
+    "The phase function's peak at g = 0.999 is 1e-3 radians wide: hardly a photon arrives within it, and most of the"
+    " light is missing at 80,000 photons."
+)
+FINER = (
+    " Free paths are shorter than positions resolve, half a µm: the medium is taken to be as dense as those, and named."
+)
+CLEAR = s.medium(0, 0)
+
+CASES = [
+    Case(
+        "media-none",
+        "A medium of density zero is no medium",
+        {"without": partial(lit, None), "with": partial(lit, CLEAR)},
+        Equal("without", ("with",), "Coefficients of zero neither absorb nor scatter.", resolves=0.06),
+        METHODS,
+        iterations=4,
+        seeds=FEW,
+    ),
+    Case(
+        "media-absorbing",
+        "A box that absorbs, of optical depth 0.001, 1 and 20",
+        {f"{depth:g}": partial(cloud, s.medium(depth, 0)) for depth in (0.001, 1, 20)},
+        Values(
+            {f"{depth:g}": exp(-depth) for depth in (0.001, 1, 20)},
+            "Beer and Lambert: exp(-depth), along rays that differ in length by less than the bound.",
+            bound=0.06,
+        ),
+        ("path", "bdpt", "vcm", "sppm"),
+        iterations=8,
+        photons=2000,
+        seeds=FEW,
+    ),
+    Case(
+        "media-colour",
+        "A box that absorbs red, green and blue differently",
+        {"scene": partial(cloud, s.medium((0.1, 1, 3), 0))},
+        Value([exp(-0.1), exp(-1), exp(-3)], "Beer and Lambert by channel.", bound=0.01),
+        METHODS,
+        iterations=8,
+        photons=2000,
+        seeds=FEW,
+    ),
+    Case(
+        "media-eye-inside",
+        "The eye in the middle of a box that scatters, and of one that absorbs",
+        {
+            "scatters": partial(cloud, s.medium(0, 3), 0.5, (0, 0, 0.2)),
+            "absorbs": partial(cloud, s.medium(1, 0), 0.5, (0, 0, 0.2)),
+        },
+        Values(
+            {"scatters": 1.0, "absorbs": exp(-0.7)},
+            WHITE
+            + " An absorbing way of 0.7 leaves exp(-0.7). Photons' kernels reach out of the box, within the bound.",
+            bound=0.03,
+            resolves=0.25,
+        ),
+        METHODS,
+        iterations={None: 16, "sppm": 4},
+        photons=100000,
+    ),
+    Case(
+        "media-lamp-inside",
+        "A point light in a ball that absorbs",
+        {"scene": partial(lantern, s.medium(2, 0))},
+        Value(0.5 / pi * exp(-0.6), "Albedo / pi times I / d², and exp(-2 0.3) of the way in the ball.", bound=0.005),
+        METHODS,
+        size=8,
+        seeds=FEW,
+    ),
+    Case(
+        "media-albedo-1",
+        "A box that scatters and absorbs nothing, g = 0, 0.999 and -0.999, in a white furnace",
+        {f"g{g:g}": partial(cloud, s.medium(0, 3, g)) for g in G},
+        Values({f"g{g:g}": 1.0 for g in G}, WHITE, bound=0.005, resolves=0.1),
+        METHODS,
+        iterations={None: 20, "sppm": 2},
+        fails={"sppm": PEAK},
+    ),
+    Case(
+        "media-dense",
+        "Albedo 1 at 10^6 scatterings a metre, in a box of 0.1 mm, in a white furnace",
+        {"scene": partial(cloud, s.medium(0, 1e6), 5e-5, (0, 0, 4e-4))},
+        Value(1.0, WHITE, bound=0.005, resolves=0.15),
+        ("path", "bdpt", "vcm"),
+        iterations={None: 4, "path": 32},
+        fails=dict.fromkeys(("bdpt", "vcm"), FIREFLIES),
+        size=8,
+    ),
+    *(
+        Case(
+            f"media-half-space-{density:.0e}".replace("e+0", "e"),
+            f"A metre of {density:g} scatterings and absorptions a metre, albedo 0.5 and 0.9",
+            {f"{a:g}": partial(cloud, s.medium((1 - a) * density, a * density)) for a in (0.5, 0.9)},
+            Values(
+                {f"{a:g}": half_space(a) for a in (0.5, 0.9)},
+                "So dense, a metre is as good as infinite depth: a plane in "
+                "a white furnace shows 1 - H(1) sqrt(1 - albedo), with Chandrasekhar's H for even scattering."
+                + FINER
+                * (density > 1e2),
+                bound=0.01,
+                resolves=0.1,
+            ),
+            EYE,
+            iterations={None: 32, "vcm": 48, "bdpt": 48},
+            size=8,
+        )
+        for density in (1e2, 1e4, 1e6, 1e30)
+    ),
+]

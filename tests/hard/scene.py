@@ -1,0 +1,253 @@
+"""Scenes as glTF, from meshes and a few materials, in the terms of docs/scene-format.md."""
+
+from dataclasses import dataclass, field, replace
+
+import glb
+import numpy as np
+
+FLOAT, UNSIGNED = 5126, 5125
+
+
+def diffuse(albedo):
+    """A Lambertian surface; albedo: a number, or three."""
+    return {
+        "pbrMetallicRoughness": {"baseColorFactor": [*_rgb(albedo), 1], "metallicFactor": 0, "roughnessFactor": 1},
+        "extensions": {"KHR_materials_specular": {"specularFactor": 0}},
+    }
+
+
+def metal(colour, roughness):
+    """GGX facets of this reflectance; their alpha is the squared roughness."""
+    return {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_rgb(colour), 1],
+            "metallicFactor": 1,
+            "roughnessFactor": roughness,
+        }
+    }
+
+
+def plastic(colour, roughness, ior=1.5):
+    """A dielectric coat over a diffuse base."""
+    return {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_rgb(colour), 1],
+            "metallicFactor": 0,
+            "roughnessFactor": roughness,
+        },
+        "extensions": {"KHR_materials_ior": {"ior": ior}},
+    }
+
+
+def glass(ior, roughness=0.0, priority=None, medium=None):
+    """A solid of clear glass; medium: sigma_a, sigma_s (1/m, three numbers each) and g."""
+    keys = {key: value for key, value in (("priority", priority), ("medium", medium)) if value is not None}
+    return {
+        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": roughness},
+        "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_ior": {"ior": ior},
+            "KHR_materials_volume": {"thicknessFactor": 1},
+        },
+        **_extras(keys),
+    }
+
+
+def emitter(radiance):
+    """A black surface that emits from its front; radiance: W/(sr m²), a number or three."""
+    return glowing(diffuse(0), radiance)
+
+
+def glowing(material, radiance):
+    """A material that emits as well."""
+    rgb = np.array(_rgb(radiance), float)
+    strength = float(rgb.max())
+    if strength == 0:
+        return material
+    extensions = {**material.get("extensions", {}), "KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    return {**material, "emissiveFactor": (rgb / strength).tolist(), "extensions": extensions}
+
+
+def medium(absorbed, scattered, g=0.0):
+    """The coefficients of a medium, 1/m."""
+    return {"sigma_a": _rgb(absorbed), "sigma_s": _rgb(scattered), "g": g}
+
+
+def _rgb(value):
+    return [float(c) for c in np.broadcast_to(np.asarray(value, float), 3)]
+
+
+def _extras(keys):
+    return {"extras": {"caustique": keys}} if keys else {}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """objects: (mesh, material, keys of its node); lights: (light of KHR_lights_punctual, matrix of its node, keys);
+    camera: (eye, target, vertical field of view in degrees, up); keys: those of the scene; root: the matrix of a node
+    that everything stands on."""
+
+    objects: tuple = ()
+    lights: tuple = ()
+    camera: tuple = ((0, 0, 1), (0, 0, 0), 10, (0, 1, 0))
+    keys: dict = field(default_factory=dict)
+    root: np.ndarray | None = None
+
+    def add(self, mesh, material, **node):
+        """With one more object. `node`: entries of its node, such as scale."""
+        return replace(self, objects=(*self.objects, (mesh, material, node)))
+
+    def sun(self, direction, irradiance, angle_deg=0.0):
+        """With a sun that shines along `direction`; irradiance: W/m² across it."""
+        light = {"type": "directional", "color": [1, 1, 1], "intensity": irradiance}
+        return self._lit(light, (0, 0, 0), direction, {"angle_deg": angle_deg} if angle_deg else {})
+
+    def point(self, place, intensity):
+        """With a point light; intensity: W/sr."""
+        light = {"type": "point", "color": [1, 1, 1], "intensity": intensity}
+        return self._lit(light, place, (0, 0, -1), {})
+
+    def _lit(self, light, place, direction, keys):
+        matrix = _turned(place, -np.asarray(direction, float), _across(direction))
+        return replace(self, lights=(*self.lights, (light, matrix, keys)))
+
+    def seen(self, eye, target, field_deg, up=(0, 1, 0)):
+        """With this camera."""
+        return replace(self, camera=(eye, target, field_deg, up))
+
+    def within(self, radiance):
+        """With light of this radiance from everywhere."""
+        return replace(self, keys={**self.keys, "environment": {"color": _rgb(radiance)}})
+
+    def scaled(self, factor):
+        """All lengths times a factor, radiance kept. Single precision throughout, so powers of two are exact."""
+        objects = tuple(
+            (replace(mesh, positions=np.float32(mesh.positions) * np.float32(factor)), material, node)
+            for mesh, material, node in self.objects
+        )
+        eye, target, *rest = self.camera
+        eye, target = (tuple(float(np.float32(c) * np.float32(factor)) for c in v) for v in (eye, target))
+        # The view keeps its direction to the last bit.
+        lights = tuple((light, _moved(matrix, factor), keys) for light, matrix, keys in self.lights)
+        return replace(self, objects=objects, lights=lights, camera=(eye, target, *rest))
+
+    def moved(self, offset):
+        """Everything on a node that stands at `offset`."""
+        return self.under(_translation(offset))
+
+    def under(self, matrix):
+        """Everything on a node with this matrix."""
+        return replace(self, root=matrix)
+
+    def write(self, path):
+        """Writes the scene as a .glb."""
+        _Writer(self).write(path)
+
+
+def _across(direction):
+    """An up vector that is not along `direction`."""
+    return (0, 1, 0) if abs(direction[1]) < 0.9 * np.linalg.norm(direction) else (0, 0, -1)
+
+
+def _turned(place, back, up):
+    """The matrix of a node at `place` whose +Z is `back`."""
+    back = np.asarray(back, float)
+    back = back / np.linalg.norm(back)
+    right = np.cross(up, back)
+    right = right / np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = right, np.cross(back, right), back, place
+    return matrix
+
+
+def _translation(offset):
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def _moved(matrix, factor):
+    scaled = matrix.copy()
+    scaled[:3, 3] *= factor
+    return scaled
+
+
+class _Writer:
+    """The glTF document of a scene, while it grows."""
+
+    def __init__(self, scene):
+        self.buffer = bytearray()
+        self.document = {"asset": {"version": "2.0", "generator": "caustique hard cases"}, "scene": 0, "nodes": []}
+        keys = {"light_units": "radiometric", **scene.keys}
+        nodes = [
+            self._camera(scene.camera),
+            *(self._light(*light) for light in scene.lights),
+            *(self._object(*made) for made in scene.objects),
+        ]
+        if scene.root is not None:
+            nodes = [self._append("nodes", {"matrix": _columns(scene.root), "children": nodes})]
+        self.document["scenes"] = [{"nodes": nodes, **_extras(keys)}]
+        self.document["extensionsUsed"] = sorted(self._extensions(self.document))
+        self.document["buffers"] = [{"byteLength": len(self.buffer) + -len(self.buffer) % 4}]
+
+    def write(self, path):
+        if not self.buffer:
+            del self.document["buffers"]
+        glb.write(path, self.document, bytes(self.buffer))
+
+    def _append(self, key, part):
+        parts = self.document.setdefault(key, [])
+        parts.append(part)
+        return len(parts) - 1
+
+    def _extensions(self, part):
+        inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+        own = set(part.get("extensions", ())) if isinstance(part, dict) else set()
+        return own.union(*(self._extensions(one) for one in inner))
+
+    def _camera(self, camera):
+        eye, target, field_deg, up = camera
+        lens = {"type": "perspective", "perspective": {"yfov": np.radians(field_deg), "aspectRatio": 1, "znear": 1e-6}}
+        matrix = _turned(eye, np.subtract(eye, target), up)
+        return self._append("nodes", {"camera": self._append("cameras", lens), "matrix": _columns(matrix)})
+
+    def _light(self, light, matrix, keys):
+        lights = self.document.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"]
+        lights.append(light)
+        return self._append(
+            "nodes",
+            {
+                "extensions": {"KHR_lights_punctual": {"light": len(lights) - 1}},
+                "matrix": _columns(matrix),
+                **_extras(keys),
+            },
+        )
+
+    def _object(self, mesh, material, node):
+        attributes = {"POSITION": self._accessor(mesh.positions.astype("<f4"), "VEC3", FLOAT)}
+        if mesh.normals is not None:
+            attributes["NORMAL"] = self._accessor(mesh.normals.astype("<f4"), "VEC3", FLOAT)
+        indices = self._accessor(mesh.triangles.astype("<u4").ravel(), "SCALAR", UNSIGNED)
+        materials = self.document.get("materials", [])
+        worn = materials.index(material) if material in materials else self._append("materials", material)
+        part = {"attributes": attributes, "indices": indices, "material": worn}
+        return self._append("nodes", {"mesh": self._append("meshes", {"primitives": [part]}), **node})
+
+    def _accessor(self, values, kind, component):
+        accessor = {"componentType": component, "count": len(values), "type": kind}
+        if len(values):
+            view = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": values.nbytes}
+            self.buffer += values.tobytes()
+            accessor["bufferView"] = self._append("bufferViews", view)
+        if kind == "VEC3" and len(values):
+            accessor.update(min=_finite(values.min(axis=0)), max=_finite(values.max(axis=0)))
+        return self._append("accessors", accessor)
+
+
+def _finite(values):
+    return [float(v) for v in np.nan_to_num(values)]
+
+
+def _columns(matrix):
+    """A 4 x 4 matrix as glTF writes it."""
+    return [float(v) for v in np.asarray(matrix).T.ravel()]

@@ -1,0 +1,126 @@
+"""The Python of the project: lints, no circle of imports, and module names that are unique."""
+
+import ast
+import re
+import subprocess
+import sys
+import unittest
+from collections import Counter
+from pathlib import Path
+
+import support
+
+SCRIPTS = support.ROOT / "scripts"
+#: Scripts that Blender or an isolated Python (-I) starts without their folder on the search path.
+STARTED_ELSEWHERE = {
+    "blender/build.py",
+    "blender/caustique_addon/export_job.py",
+    "blender/export.py",
+    "usd/convert.py",
+}
+
+
+def sources():
+    """The Python files below scripts."""
+    return sorted(path for path in SCRIPTS.rglob("*.py") if "__pycache__" not in path.parts)
+
+
+def imported(path, module_level=True):
+    """The files that a file imports, by all their possible paths; `module_level`: what it imports when it is loaded."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    if module_level:
+        inside = {id(n) for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)}
+        nodes = [node for node in nodes if id(node) not in inside]
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from ([path.parent, *alias.name.split(".")] for alias in node.names)
+        elif node.level:
+            folder = path.parents[node.level - 1]
+            parts = node.module.split(".") if node.module else []
+            if parts:
+                yield [folder, *parts]
+            yield from ([folder, *parts, alias.name] for alias in node.names)
+        else:
+            yield [path.parent, *node.module.split(".")]
+
+
+def graph(paths, module_level=False):
+    """The imports among some files: {file: files}."""
+    names = {}
+    for path in paths:
+        names.setdefault(path.stem, path)
+    found = {}
+    for path in paths:
+        found[path] = set()
+        for folder, *parts in imported(path, module_level):
+            near = Path(folder, *parts).with_suffix(".py")
+            package = Path(folder, *parts, "__init__.py")
+            targets = [
+                one
+                for one in (near, package, names.get(parts[-1]) if parts and len(parts) == 1 else None)
+                if one in paths
+            ]
+            found[path].update(one for one in targets[:1] if one != path)
+    return found
+
+
+def circles(edges):
+    """The circles of a graph, as lists of files."""
+    found, done = [], set()
+
+    def walk(file, trail):
+        if file in trail:
+            found.append([*trail[trail.index(file) :], file])
+        elif file not in done:
+            for other in sorted(edges[file]):
+                walk(other, [*trail, file])
+            done.add(file)
+
+    for file in edges:
+        walk(file, [])
+    return found
+
+
+class Sources(unittest.TestCase):
+    def test_lints_pass(self):
+        done = subprocess.run(
+            [sys.executable, "-m", "ruff", "check", "--no-cache", support.ROOT],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_no_lint_is_silenced_and_no_script_changes_the_search_path(self):
+        for path in sources():
+            text, name = path.read_text(encoding="utf-8"), str(path.relative_to(SCRIPTS))
+            self.assertNotIn("# noqa", text, name)
+            if name not in STARTED_ELSEWHERE:
+                self.assertIsNone(re.search(r"sys\.path(\.| *\+?=|\[.*\] *=)", text), name)
+
+    def test_no_scripts_import_each_other_in_a_circle(self):
+        named = [[str(path.relative_to(SCRIPTS)) for path in circle] for circle in circles(graph(sources()))]
+        self.assertEqual(named, [])
+
+    def test_a_circle_is_found(self):
+        a, b, c = (Path(name) for name in "abc")
+        self.assertEqual(circles({a: {b}, b: {c}, c: {b}}), [[b, c, b]])
+        self.assertEqual(circles({a: {b, c}, b: {c}, c: set()}), [])
+
+    def test_imports_of_scripts_are_followed(self):
+        edges = graph(sources())
+        names = {
+            str(path.relative_to(SCRIPTS)): {str(o.relative_to(SCRIPTS)) for o in of} for path, of in edges.items()
+        }
+        self.assertIn("usd/faults.py", names["usd/convert.py"])
+        self.assertIn("lab/cache.py", names["lab/figures/sizes.py"])
+        self.assertIn("compare/peers/plain_scene.py", names["lab/twins.py"])
+
+    def test_names_of_modules_are_unique(self):
+        counts = Counter(path.stem for path in sources() if not path.stem.startswith("__"))
+        self.assertEqual([name for name, count in counts.items() if count > 1], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
