@@ -160,6 +160,11 @@ fn following(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Stack
     others
 }
 
+/// What is met at a place, in order.
+fn surfaces<'a>(scene: &'a Scene, stack: &'a Stack) -> impl Iterator<Item = Surface> + 'a {
+    stack.iter().filter_map(|(_, hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric))
+}
+
 #[cold]
 #[inline(never)]
 fn next(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Option<Hit> {
@@ -170,8 +175,7 @@ fn next(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Option<Hit
 #[cold]
 #[inline(never)]
 pub fn after(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
-    let surface = |(_, hit): &(Place, Hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
-    following(scene, place, direction, token).iter().filter_map(surface).collect()
+    surfaces(scene, &following(scene, place, direction, token)).collect()
 }
 
 /// Surfaces at a place that a ray along `direction` has to pass before it reaches the one there, in order.
@@ -187,8 +191,7 @@ pub fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Smal
 #[inline(never)]
 pub fn on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token: u32) -> Option<Surface> {
     let others = others(scene, &Place::of(culled), token);
-    let surface = |(_, hit): &(Place, Hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
-    others.iter().filter_map(surface).find(|other| !scene.culls(other, direction))
+    surfaces(scene, &others).find(|other| !scene.culls(other, direction))
 }
 
 /// The surfaces along a ray, one after the other.
