@@ -7,7 +7,7 @@ use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::flat::flattened;
 use super::materials::{Library, tangent_coordinates};
 use super::mesh::FARTHEST;
-use super::shells::{self, Found};
+use super::shells;
 use super::topology::Solid;
 use super::transform::{Worlds, can_be_inverted, compose, finite, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
@@ -94,6 +94,18 @@ struct Instancing {
 struct Part {
     mesh: u32,
     material: u32,
+}
+
+/// A primitive that has been read.
+struct Worn {
+    primitive: usize,
+    mesh: Mesh,
+    /// Its material in the file.
+    of_file: Option<usize>,
+    /// Index into the library.
+    material: u32,
+    /// What it bounds, with the other primitives unless it is closed alone.
+    bounds: Solid,
 }
 
 struct Reader<'r> {
@@ -357,6 +369,30 @@ impl Reader<'_> {
         if let Some(parts) = self.meshes.get(&(index, owner)) {
             return Ok(parts.clone());
         }
+        let (mut worn, whole) = self.worn(index, shape)?;
+        let source = get(&self.document.meshes, index, "mesh")?;
+        let is_glass = |material: u32| self.library.list[material as usize].is_solid_glass();
+        let glass = worn.iter_mut().filter(|part| is_glass(part.material) && part.bounds.closed).collect();
+        check_shells(glass, whole, &named("mesh", source.name.as_deref(), index), &mut self.out.warnings);
+        let mut parts = Vec::new();
+        for Worn { mut mesh, material, .. } in worn {
+            if mesh.tangents.is_empty()
+                && let Some(coordinates) = tangent_coordinates(&self.library.list[material as usize])
+            {
+                shading_frame::make_tangents(&mut mesh, &coordinates);
+            }
+            parts.push(Part { mesh: self.out.meshes.len() as u32, material });
+            let points = || mesh.positions.iter().map(|p| p.as_dvec3());
+            let low = points().fold(DVec3::INFINITY, DVec3::min);
+            self.bounds.push((low, points().fold(DVec3::NEG_INFINITY, DVec3::max)));
+            self.out.meshes.push(mesh);
+        }
+        self.meshes.insert((index, owner), parts.clone());
+        Ok(parts)
+    }
+
+    /// The primitives of a mesh that have triangles, and what all of them bound together.
+    fn worn(&mut self, index: usize, shape: &Deformation) -> Result<(Vec<Worn>, Solid)> {
         let document = self.document;
         let source = get(&document.meshes, index, "mesh")?;
         let mut read: Vec<(usize, Mesh)> = Vec::new();
@@ -367,7 +403,7 @@ impl Reader<'_> {
         }
         // A solid may wear several materials: what counts for glass is the surface as a whole.
         let whole = topology::solid(&read.iter().map(|(_, m)| m).collect::<Vec<_>>());
-        let mut parts = Vec::new();
+        let mut worn = Vec::new();
         let alone = read.len() == 1;
         for (i, mut mesh) in read {
             let own = if alone { whole } else { topology::solid(&[&mesh]) };
@@ -383,30 +419,15 @@ impl Reader<'_> {
                 self.out.warnings.push(format!("{place}: it has no triangle to render"));
                 continue;
             }
-            let warnings = &mut self.out.warnings;
-            let index = source.primitives[i].material.map(|m| m.value());
+            let of_file = source.primitives[i].material.map(|m| m.value());
             let bounds = if own.closed { own } else { whole };
             let material = self
                 .library
-                .wear(document, index, &mesh, bounds, warnings)
+                .wear(document, of_file, &mesh, bounds, &mut self.out.warnings)
                 .map_err(|e| if e.place.is_empty() { e.within(&place) } else { e })?;
-            let worn = &self.library.list[material as usize];
-            if worn.is_solid_glass() && bounds.closed {
-                check_shells(&mut mesh, own, whole, &place, warnings);
-            }
-            if mesh.tangents.is_empty()
-                && let Some(coordinates) = tangent_coordinates(worn)
-            {
-                shading_frame::make_tangents(&mut mesh, &coordinates);
-            }
-            parts.push(Part { mesh: self.out.meshes.len() as u32, material });
-            let points = || mesh.positions.iter().map(|p| p.as_dvec3());
-            let low = points().fold(DVec3::INFINITY, DVec3::min);
-            self.bounds.push((low, points().fold(DVec3::NEG_INFINITY, DVec3::max)));
-            self.out.meshes.push(mesh);
+            worn.push(Worn { primitive: i, mesh, of_file, material, bounds });
         }
-        self.meshes.insert((index, owner), parts.clone());
-        Ok(parts)
+        Ok((worn, whole))
     }
 
     /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing): itself without the extension.
@@ -449,17 +470,32 @@ impl Reader<'_> {
     }
 }
 
-/// Makes the shells of a solid bound what they were meant to, and says which were turned the other way.
-fn check_shells(mesh: &mut Mesh, own: Solid, whole: Solid, place: &str, warnings: &mut Vec<String>) {
-    let found = if own.closed { shells::turn_inner(mesh) } else { Found::default() };
-    if found.inverted > 0 || (!own.closed && whole.volume < 0.0) {
-        warnings
-            .push(format!("{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"));
-    }
-    if found.turned > 0 {
-        let shells = counted(found.turned, "closed shell lies", "closed shells lie");
-        warnings.push(format!(
-            "{place}: {shells} inside another and looked the same way, which would make no hollow: turned over (flip the normals of one of the two)"
-        ));
+/// Makes the shells of solids bound what they were meant to, and says which were turned the other way. Primitives of one
+/// material are one glass, and looked at together.
+fn check_shells(mut glass: Vec<&mut Worn>, whole: Solid, name: &str, warnings: &mut Vec<String>) {
+    while let Some(of_file) = glass.first().map(|part| part.of_file) {
+        let (mut same, others) = glass.into_iter().partition::<Vec<_>, _>(|part| part.of_file == of_file);
+        glass = others;
+        let numbers: Vec<String> = same.iter().map(|part| part.primitive.to_string()).collect();
+        let noun = if numbers.len() == 1 { "primitive" } else { "primitives" };
+        let place = format!("{name}, {noun} {}", numbers.join(", "));
+        let mut open = false;
+        if same.iter().any(|part| !part.mesh.closed) {
+            open = !topology::solid(&same.iter().map(|part| &part.mesh).collect::<Vec<_>>()).closed;
+            // Others make these whole, and are of another material.
+            same.retain(|part| part.mesh.closed || !open);
+        }
+        let found = shells::turn_inner(&mut same.into_iter().map(|part| &mut part.mesh).collect::<Vec<_>>());
+        if found.inverted > 0 || (open && whole.volume < 0.0) {
+            warnings.push(format!(
+                "{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"
+            ));
+        }
+        if found.turned > 0 {
+            let shells = counted(found.turned, "closed shell lies", "closed shells lie");
+            warnings.push(format!(
+                "{place}: {shells} inside another and looked the same way, which would make no hollow: turned over (flip the normals of one of the two)"
+            ));
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The connected parts of a closed mesh of glass: which lies inside which, and which way they look.
+//! The connected parts of closed glass, one mesh or several: which lies inside which, and which way they look.
 
 use super::topology::welded;
 use crate::geometry::Mesh;
@@ -7,7 +7,7 @@ use rstar::RTree;
 use rstar::primitives::{GeomWithData, Rectangle};
 use std::collections::HashSet;
 
-/// What has been found of the shells of a mesh.
+/// What has been found of the shells of glass.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Found {
     /// Outermost shells whose faces look inwards.
@@ -16,19 +16,22 @@ pub(super) struct Found {
     pub(super) turned: usize,
 }
 
-/// A connected part of a closed mesh.
+/// A triangle: its mesh and its number in there.
+type Face = (u32, u32);
+
+/// A connected part of closed glass.
 struct Shell {
-    triangles: Vec<u32>,
+    triangles: Vec<Face>,
     /// Negative where its faces look inwards.
     volume: f64,
     low: DVec3,
     high: DVec3,
 }
 
-/// Turns over the shells of a closed mesh that lie inside another and look the same way as that: a second surface of the
-/// same glass would have no effect, so it was meant to bound a hollow.
-pub(super) fn turn_inner(mesh: &mut Mesh) -> Found {
-    let mut shells = shells(mesh);
+/// Turns over the shells of meshes, closed together, that lie inside another and look the same way as that: a second
+/// surface of the same glass would have no effect, so it was meant to bound a hollow.
+pub(super) fn turn_inner(meshes: &mut [&mut Mesh]) -> Found {
+    let mut shells = shells(&meshes.iter().map(|mesh| &**mesh).collect::<Vec<_>>());
     // The larger come first, so that what holds a shell is decided before it.
     shells.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
     let boxes = shells
@@ -38,17 +41,18 @@ pub(super) fn turn_inner(mesh: &mut Mesh) -> Found {
     let boxes = RTree::bulk_load(boxes.collect());
     let mut found = Found::default();
     for i in 0..shells.len() {
-        let start = corner(mesh, shells[i].triangles[0]);
+        let all: Vec<&Mesh> = meshes.iter().map(|mesh| &**mesh).collect();
+        let start = corners(&all, shells[i].triangles[0])[0];
         let around = boxes.locate_all_at_point(start.to_array()).map(|other| other.data).filter(|&other| other < i);
         // The smallest of those that hold it.
         let mut around: Vec<usize> = around.collect();
         around.sort_unstable_by_key(|&other| std::cmp::Reverse(other));
-        let holder = around.into_iter().find(|&other| holds(mesh, &shells[other], &shells[i]));
+        let holder = around.into_iter().find(|&other| holds(&all, &shells[other], &shells[i]));
         let inwards = shells[i].volume < 0.0;
         match holder {
             None => found.inverted += usize::from(inwards),
             Some(holder) if inwards == (shells[holder].volume < 0.0) => {
-                turn(mesh, &shells[i].triangles);
+                turn(meshes, &shells[i].triangles);
                 shells[i].volume = -shells[i].volume;
                 found.turned += 1;
             }
@@ -58,37 +62,42 @@ pub(super) fn turn_inner(mesh: &mut Mesh) -> Found {
     found
 }
 
-fn corner(mesh: &Mesh, triangle: u32) -> DVec3 {
-    mesh.positions[mesh.triangles[triangle as usize][0] as usize].as_dvec3()
+fn corners(meshes: &[&Mesh], (mesh, triangle): Face) -> [DVec3; 3] {
+    let mesh = meshes[mesh as usize];
+    mesh.triangles[triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3())
 }
 
-fn shells(mesh: &Mesh) -> Vec<Shell> {
-    let (places, count) = welded(&[mesh]);
-    let places = &places[0];
+fn shells(meshes: &[&Mesh]) -> Vec<Shell> {
+    let (places, count) = welded(meshes);
+    let faces = || {
+        (0u32..).zip(meshes).zip(&places).flat_map(|((number, mesh), places)| {
+            (0u32..).zip(&mesh.triangles).map(move |(i, t)| ((number, i), t.map(|i| places[i as usize])))
+        })
+    };
     // Each place points towards the first of its shell.
     let mut towards: Vec<u32> = (0..count as u32).collect();
-    for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| root(&mut towards, places[i as usize]));
+    for (_, places) in faces() {
+        let [a, b, c] = places.map(|place| root(&mut towards, place));
         let first = a.min(b).min(c);
         [a, b, c].iter().for_each(|&place| towards[place as usize] = first);
     }
     let mut numbers = vec![u32::MAX; count];
     let mut shells: Vec<Shell> = Vec::new();
-    for (i, t) in mesh.triangles.iter().enumerate() {
-        let number = &mut numbers[root(&mut towards, places[t[0] as usize]) as usize];
+    for (face, places) in faces() {
+        let number = &mut numbers[root(&mut towards, places[0]) as usize];
         if *number == u32::MAX {
             *number = shells.len() as u32;
             shells.push(Shell { triangles: Vec::new(), volume: 0.0, low: DVec3::INFINITY, high: DVec3::NEG_INFINITY });
         }
         let shell = &mut shells[*number as usize];
-        let corners = t.map(|i| mesh.positions[i as usize].as_dvec3());
-        let origin = shell.triangles.first().map_or(corners[0], |&first| corner(mesh, first));
-        let [p, q, r] = corners.map(|p| p - origin);
+        let own = corners(meshes, face);
+        let origin = shell.triangles.first().map_or(own, |&first| corners(meshes, first))[0];
+        let [p, q, r] = own.map(|p| p - origin);
         shell.volume += p.dot(q.cross(r)) / 6.0;
-        for p in corners {
+        for p in own {
             (shell.low, shell.high) = (shell.low.min(p), shell.high.max(p));
         }
-        shell.triangles.push(i as u32);
+        shell.triangles.push(face);
     }
     shells
 }
@@ -102,19 +111,19 @@ fn root(towards: &mut [u32], mut place: u32) -> u32 {
 }
 
 /// Whether a shell holds another whole, as far as a few of its corners tell: shells that cut each other do not.
-fn holds(mesh: &Mesh, outer: &Shell, inner: &Shell) -> bool {
+fn holds(meshes: &[&Mesh], outer: &Shell, inner: &Shell) -> bool {
     const CORNERS: usize = 3;
     let step = inner.triangles.len().div_ceil(CORNERS);
     inner.low.cmpgt(outer.low).all()
         && inner.high.cmplt(outer.high).all()
-        && inner.triangles.iter().step_by(step).all(|&t| is_inside(mesh, outer, corner(mesh, t)))
+        && inner.triangles.iter().step_by(step).all(|&t| is_inside(meshes, outer, corners(meshes, t)[0]))
 }
 
 /// Whether a ray from `p` along +X meets an odd number of the shell's triangles. Edges and corners count for one of the
 /// triangles that share them.
-fn is_inside(mesh: &Mesh, shell: &Shell, p: DVec3) -> bool {
-    let met = |&t: &u32| {
-        let [a, b, c] = mesh.triangles[t as usize].map(|i| mesh.positions[i as usize].as_dvec3() - p);
+fn is_inside(meshes: &[&Mesh], shell: &Shell, p: DVec3) -> bool {
+    let met = |&face: &Face| {
+        let [a, b, c] = corners(meshes, face).map(|corner| corner - p);
         let crossed = [(a, b), (b, c), (c, a)].into_iter().filter(|&(from, to)| crosses(from, to)).count();
         let n = (b - a).cross(c - a);
         // Where the ray meets the triangle's plane: x n.x = a.n.
@@ -130,14 +139,15 @@ fn crosses(from: DVec3, to: DVec3) -> bool {
     low.y <= 0.0 && high.y > 0.0 && low.z * high.y > high.z * low.y
 }
 
-fn turn(mesh: &mut Mesh, triangles: &[u32]) {
+fn turn(meshes: &mut [&mut Mesh], triangles: &[Face]) {
     let mut vertices = HashSet::new();
-    for &t in triangles {
-        let triangle = &mut mesh.triangles[t as usize];
+    for &(mesh, triangle) in triangles {
+        let triangle = &mut meshes[mesh as usize].triangles[triangle as usize];
         triangle.swap(1, 2);
-        vertices.extend(triangle.iter().map(|&i| i as usize));
+        vertices.extend(triangle.map(|i| (mesh as usize, i as usize)));
     }
-    for i in vertices {
+    for (mesh, i) in vertices {
+        let mesh = &mut *meshes[mesh];
         if let Some(n) = mesh.normals.get_mut(i) {
             *n = -*n;
         }
@@ -173,7 +183,7 @@ mod tests {
     }
 
     fn volumes(mesh: &Mesh) -> Vec<bool> {
-        shells(mesh).iter().map(|shell| shell.volume > 0.0).collect()
+        shells(&[mesh]).iter().map(|shell| shell.volume > 0.0).collect()
     }
 
     /// A hollow ball with a ball in its hollow: the shells look out, in, out.
@@ -184,7 +194,7 @@ mod tests {
             let inwards: Vec<bool> = (0..3).map(|i| mask >> i & 1 == 1).collect();
             let all = [(o, 3.0, inwards[0]), (o + 0.1, 2.0, inwards[1]), (o, 1.0, inwards[2])];
             let mut mesh = octahedra(&all);
-            let found = turn_inner(&mut mesh);
+            let found = turn_inner(&mut [&mut mesh]);
             // The outermost says which way is out.
             let expected = right.map(|inwards_of_right| inwards_of_right != inwards[0]);
             let turned = inwards.iter().zip(expected).filter(|(was, is)| **was != *is).count();
@@ -204,7 +214,29 @@ mod tests {
         let beside = [(Vec3::ZERO, 3.0, false), (Vec3::X * 9.0, 1.0, true), (Vec3::Y * 2.5, 1.0, false)];
         let mut mesh = octahedra(&beside);
         let before = mesh.triangles.clone();
-        assert_eq!(turn_inner(&mut mesh), Found { inverted: 1, turned: 0 });
+        assert_eq!(turn_inner(&mut [&mut mesh]), Found { inverted: 1, turned: 0 });
         assert_eq!(mesh.triangles, before);
+    }
+
+    /// The same shells, divided among meshes in whatever way, are turned as those of one mesh.
+    #[test]
+    fn shells_are_turned_alike_in_several_meshes() {
+        let mut whole = octahedra(&[(Vec3::ZERO, 3.0, false), (Vec3::ZERO, 2.0, false), (Vec3::X * 9.0, 1.0, true)]);
+        let belongs = |divisor: usize, part: usize, i: usize| i / divisor % 2 == part;
+        let divided = |mesh: &Mesh, divisor: usize| {
+            [0, 1].map(|part| {
+                let triangles = mesh.triangles.iter().enumerate().filter(|(i, _)| belongs(divisor, part, *i));
+                Mesh { triangles: triangles.map(|(_, t)| *t).collect(), ..mesh.clone() }
+            })
+        };
+        // By shells, and across each of them.
+        let parts = [8, 3].map(|divisor| (divisor, divided(&whole, divisor)));
+        let found = turn_inner(&mut [&mut whole]);
+        assert_eq!(found, Found { inverted: 1, turned: 1 });
+        for (divisor, [mut a, mut b]) in parts {
+            assert_eq!(turn_inner(&mut [&mut a, &mut b]), found);
+            let expected = divided(&whole, divisor);
+            assert_eq!([a.triangles, b.triangles], expected.map(|mesh| mesh.triangles), "{divisor}");
+        }
     }
 }
