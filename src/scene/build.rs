@@ -128,7 +128,8 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
 }
 
 /// Names solids whose alpha differs from place to place: where a ray enters them decides about its exit, too, so light
-/// and its way back may differ.
+/// and its way back may differ. And glowing ones with any alpha: each of their faces is there or not by itself, so that
+/// lamps and what is hit of them agree, and a ray may pass one wall of glass alone.
 fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
     let mut named = vec![false; materials.list.len()];
     for instance in &shapes.instances {
@@ -136,14 +137,17 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
         let colors = &shapes.meshes[instance.mesh as usize].colors;
         let texture = material.base_color_texture.map(|t| &materials.textures[t.texture as usize]);
         let varies = || texture.is_some_and(Texture::has_alpha) || colors.iter().any(|color| color.w < 1.0);
-        if material.has_alpha_per_entry()
-            && varies()
-            && !std::mem::replace(&mut named[instance.material as usize], true)
-        {
-            warnings.push(format!(
-                "material \"{}\": its alpha cuts holes into solid glass, and a ray that enters through one leaves through one (model the holes, or give it no thickness)",
-                material.name
-            ));
+        let least = if let Alpha::Mask(cutoff) = material.alpha { cutoff } else { 1.0 };
+        let glows = material.is_solid_glass() && material.emits() && material.alpha != Alpha::Opaque;
+        let said = if glows && (varies() || material.base_color[3] < least) {
+            "its alpha takes walls of solid glass that glows one by one, so light that passes two of them is not what it should be (give the glow to an object of its own, or set its alpha to opaque)"
+        } else if material.has_alpha_per_entry() && varies() {
+            "its alpha cuts holes into solid glass, and a ray that enters through one leaves through one (model the holes, or give it no thickness)"
+        } else {
+            continue;
+        };
+        if !std::mem::replace(&mut named[instance.material as usize], true) {
+            warnings.push(format!("material \"{}\": {said}", material.name));
         }
     }
 }

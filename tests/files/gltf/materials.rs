@@ -230,6 +230,58 @@ fn inner_shells_that_look_outwards_are_turned_over() {
     assert!((0..24).all(|t| area(&right, t) == area(&turned, t)));
 }
 
+/// The same where the shells are primitives of a mesh, if they are of one material: a drink within glass stays.
+#[test]
+fn inner_shells_of_other_primitives_are_turned_over() {
+    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
+    let volumes = |inner_material: usize| {
+        let mut file = Glb::new();
+        for name in ["glass", "drink"] {
+            file.push("materials", json!({"name": name, "extensions": clear}));
+        }
+        for (size, material) in [(1.0, 0), (0.5, inner_material)] {
+            let corner = |i: u32| [0, 1, 2].map(|k| if i >> k & 1 == 1 { size } else { -size });
+            file.mesh("hollow", &(0..8).map(corner).collect::<Vec<_>>(), &super::glb::CUBE, Some(material));
+        }
+        let inner = file.json["meshes"][1]["primitives"][0].take();
+        file.json["meshes"][0]["primitives"].as_array_mut().expect("a list").push(inner);
+        file.json["meshes"].as_array_mut().expect("a list").pop();
+        file.node(json!({"mesh": 0}));
+        let scene = read(&file);
+        let volume = |mesh: &caustique::geometry::Mesh| -> f32 {
+            mesh.triangles
+                .iter()
+                .map(|t| t.map(|i| mesh.positions[i as usize]))
+                .map(|[a, b, c]| a.dot(b.cross(c)))
+                .sum()
+        };
+        (scene.meshes.iter().map(|mesh| volume(mesh) > 0.0).collect::<Vec<_>>(), scene.warnings)
+    };
+    let turned = "mesh \"hollow\", primitives 0, 1: 1 closed shell lies inside another and looked the same way, which would make no \
+                  hollow: turned over (flip the normals of one of the two)";
+    assert_eq!(volumes(0), (vec![true, false], vec![turned.to_owned()]));
+    assert_eq!(volumes(1), (vec![true, true], vec![]));
+}
+
+/// Solid glass that glows is there or not face by face, which is said.
+#[test]
+fn glowing_glass_with_alpha_is_named() {
+    let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
+    let warnings = |alpha: f32, glow: f32| {
+        let mut file = Glb::new();
+        let material = file.push(
+            "materials",
+            json!({"name": "glass", "extensions": clear, "alphaMode": "BLEND",
+            "emissiveFactor": [glow, glow, glow], "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, alpha]}}),
+        );
+        let cube = file.cube("lamp", Some(material));
+        file.node(json!({"mesh": cube}));
+        caustique::scene::Scene::build(read(&file), 1).expect("a scene").warnings
+    };
+    let walls = |alpha: f32, glow: f32| warnings(alpha, glow).iter().filter(|w| w.contains("one by one")).count();
+    assert_eq!([walls(0.5, 1.0), walls(1.0, 1.0), walls(0.5, 0.0)], [1, 0, 0]);
+}
+
 #[test]
 fn glass_that_is_inside_out_is_reported() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
