@@ -1,7 +1,7 @@
 //! Random scenes whose pictures are known: integrals of double precision over the film.
 
 use super::picture::{
-    CONFIRMING, Difference, MEANS, SEEDS, SIGNIFICANCE, SIZE, Shot, TILES, TOLERANCE, differences, pictures,
+    Difference, Found, MEANS, SIGNIFICANCE, SIZE, Shot, TILES, TOLERANCE, confirmed, differences, pictures,
 };
 use super::random::Random;
 use super::relation::similar;
@@ -88,17 +88,10 @@ impl Form {
 pub fn check(form: Form, known: &Known, method: Method) -> Result<Option<Vec<Difference>>, String> {
     let shot = Shot { max_depth: known.max_depth, ..Shot::new(method, CAMERA) };
     let expected = vec![known.expected.clone(); 2];
-    let found = |seeds: std::ops::Range<u64>| -> Result<Vec<Difference>, String> {
-        let set = pictures(&known.world, &shot, seeds)?;
-        Ok(differences(&set, &expected, form.tolerance(method), SIGNIFICANCE))
-    };
-    let first = found(0..SEEDS)?;
-    if first.is_empty() {
-        return Ok(None);
-    }
-    let mut again = found(SEEDS..SEEDS * (1 + CONFIRMING))?;
-    again.retain(|difference| first.iter().any(|other| other.index == difference.index));
-    Ok((!again.is_empty()).then_some(again))
+    confirmed(|effort, seeds| {
+        let set = pictures(&known.world, &Shot { effort, ..shot.clone() }, seeds)?;
+        Ok(Found::new(differences(&set, &expected, form.tolerance(method), SIGNIFICANCE), &[&set]))
+    })
 }
 
 /// A room with black walls whose floor is the plane y = -1, and a camera that sees nothing but the floor.
@@ -262,8 +255,14 @@ fn bounce(random: &mut Random) -> Known {
     // From the side that the camera's part of the floor sees, and no light passes the ball.
     let seen = world.things[0].to_world();
     let seen = on_floor(seen.translation, seen.transform_vector3(DVec3::NEG_Z)) - middle;
-    let from = (seen.normalize() + random.vector(-0.5, 0.5) + 0.3 * DVec3::Y).normalize();
-    let p = middle + from * random.within(2.0, 3.0) * size;
+    let (from, p) = loop {
+        let from = (seen.normalize() + random.vector(-0.5, 0.5) + 0.3 * DVec3::Y).normalize();
+        let p = middle + from * random.within(2.0, 3.0) * size;
+        // Walls and floor hide the ball from a spot behind them.
+        if p.abs().max_element() < 0.95 {
+            break (from, p);
+        }
+    };
     let outer = (0.5 * size / p.distance(middle)).asin();
     let color = random.vector(1.0, 5.0) / (size * size);
     let up = if from.y.abs() > 0.9 { DVec3::X } else { DVec3::Y };

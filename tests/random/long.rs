@@ -14,14 +14,16 @@ mod random;
 mod relation;
 mod shapes;
 mod shrink;
+mod usd;
 mod world;
 mod write;
 
+use caustique::render::Method;
 use clap::Parser;
 use forms::FORMS;
 use generate::generate;
 use picture::Shot;
-use relation::{Broken, check};
+use relation::{Broken, Relation, check};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -105,6 +107,14 @@ fn scene(options: &Options, state: &mut State) -> io::Result<()> {
             println!("seed {seed}: {broken}");
             state.failures.push(save(&options.output, &world, broken)?.display().to_string());
         }
+    }
+    let reduced = usd::reduced(&world);
+    let cameras = reduced.cameras();
+    let shot = Shot::new(Method::Path, cameras[seed as usize % cameras.len()]);
+    state.checks += 1;
+    if let Some(broken) = check(&reduced, Relation::Usd, &shot) {
+        println!("seed {seed}: {broken}");
+        state.failures.push(save(&options.output, &reduced, broken)?.display().to_string());
     }
     let form = FORMS[seed as usize % FORMS.len()];
     let known = form.known(seed);

@@ -1,5 +1,6 @@
 //! Pictures of several seeds, and when two sets of them differ.
 
+use super::usd;
 use super::world::World;
 use super::write::glb;
 use crate::support::stats::mean_and_error;
@@ -7,7 +8,7 @@ use caustique::plan::switch::Removed;
 use caustique::plan::{Asked, Plan, Switches};
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{Crop, Scene, View};
+use caustique::scene::{Crop, Description, Scene, View};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
 
@@ -21,6 +22,8 @@ pub const MEANS: usize = (3 * TILES * TILES + 3) as usize;
 pub const SEEDS: u64 = 8;
 /// Seeds of the set that confirms a difference, relative to the first.
 pub const CONFIRMING: u64 = 4;
+/// Most iterations of sparse pictures, relative to others'.
+const MAX_EFFORT: f64 = 16.0;
 /// Probability with which one comparison of means of two equal sets exceeds the critical value.
 pub const SIGNIFICANCE: f64 = 1e-6;
 /// Relative difference of means that is a fault if it is significant.
@@ -40,11 +43,13 @@ pub struct Shot {
     pub effort: f64,
     /// Longest path in segments.
     pub max_depth: u32,
+    /// The scene is read as a stage of USD.
+    pub usd: bool,
 }
 
 impl Shot {
     pub fn new(method: Method, camera: &str) -> Shot {
-        Shot { method, camera: camera.into(), window: None, effort: 1.0, max_depth: u32::MAX }
+        Shot { method, camera: camera.into(), window: None, effort: 1.0, max_depth: u32::MAX, usd: false }
     }
 
     pub fn settings(&self, seed: u64) -> Settings {
@@ -72,7 +77,7 @@ impl Shot {
     fn view(&self) -> View {
         let tile = SIZE / TILES;
         View {
-            camera: Some(self.camera.clone()),
+            camera: Some(if self.usd { usd::camera(&self.camera) } else { self.camera.clone() }),
             width: Some(SIZE),
             height: Some(SIZE),
             crop: self.window.map(|window| Crop::Pixels(window.map(|side| side * tile))),
@@ -87,7 +92,11 @@ impl Shot {
 /// What the reader says.
 pub fn read(world: &World) -> Result<Scene, String> {
     let description = gltf::read_bytes(&glb(world), Path::new("random.glb"), &ReadOptions::default());
-    description.and_then(|description| Scene::build(description, 1)).map_err(|error| error.to_string())
+    build(description.map_err(|error| error.to_string())?)
+}
+
+fn build(description: Description) -> Result<Scene, String> {
+    Scene::build(description, 1).map_err(|error| error.to_string())
 }
 
 /// Means of the pictures of some seeds; what a window leaves out is not a number.
@@ -98,7 +107,7 @@ pub type Set = Vec<Vec<f64>>;
 /// # Errors
 /// The scene is not taken, or samples are rejected.
 pub fn renders(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Vec<Rendered>, String> {
-    let scene = read(world)?;
+    let scene = if shot.usd { build(usd::read(world)?)? } else { read(world)? };
     let camera = scene.camera(&shot.view()).map_err(|error| error.to_string())?;
     seeds
         .map(|seed| {
@@ -172,6 +181,52 @@ impl std::fmt::Display for Difference {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let Difference { place, means: [a, b], errors: [ea, eb], probability, .. } = self;
         write!(f, "{place}: {a:.5} +- {ea:.5} and {b:.5} +- {eb:.5} (ratio {:.3}, p {probability:.1e})", b / a)
+    }
+}
+
+/// Differences between sets of pictures.
+pub struct Found {
+    pub differences: Vec<Difference>,
+    /// Some picture is black where sets differ: so few light paths came there that a t test says nothing. Where one
+    /// comes with probability q, n black pictures have the probability (1 - q)^n, and an estimated error of 0.
+    pub sparse: bool,
+}
+
+impl Found {
+    pub fn new(differences: Vec<Difference>, sets: &[&Set]) -> Found {
+        let black = |means: &Vec<f64>| differences.iter().any(|difference| means[difference.index] == 0.0);
+        let sparse = sets.iter().any(|set| set.iter().any(black));
+        Found { differences, sparse }
+    }
+}
+
+/// What `found(effort, seeds)` finds in a set, and again in one of four times as many other seeds. Sparse pictures get
+/// more iterations before they count.
+///
+/// # Errors
+/// Those of `found`.
+pub fn confirmed(
+    found: impl Fn(f64, std::ops::Range<u64>) -> Result<Found, String>,
+) -> Result<Option<Vec<Difference>>, String> {
+    let mut effort = 1.0;
+    loop {
+        let first = found(effort, 0..SEEDS)?;
+        if first.differences.is_empty() {
+            return Ok(None);
+        }
+        if !first.sparse || effort >= MAX_EFFORT {
+            let mut again = found(effort, SEEDS..SEEDS * (1 + CONFIRMING))?;
+            again
+                .differences
+                .retain(|difference| first.differences.iter().any(|other| other.index == difference.index));
+            if again.differences.is_empty() {
+                return Ok(None);
+            }
+            if !again.sparse || effort >= MAX_EFFORT {
+                return Ok(Some(again.differences));
+            }
+        }
+        effort *= 4.0;
     }
 }
 

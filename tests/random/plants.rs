@@ -78,6 +78,12 @@ fn double_less(_: &mut World, other: &mut Other) -> bool {
     true
 }
 
+fn brighten(world: &mut World, other: &mut Other) -> bool {
+    *world = super::usd::reduced(world);
+    other.worlds[0] = super::relation::brighter(world, DVec3::splat(1.1));
+    world.sky.is_none()
+}
+
 fn widen(_: &mut World, other: &mut Other) -> bool {
     for thing in &mut other.worlds[0].things {
         if let ThingKind::Camera(lens) = &mut thing.kind {
@@ -122,6 +128,7 @@ pub fn plants() -> Vec<Plant> {
         plant("channels stay", Relation::Permuted, forget_channels),
         plant("glass is glued to the floor", Relation::Lifted, glue),
         plant("the window shows more", Relation::Cropped, widen),
+        plant("lamps are a tenth too bright", Relation::Usd, brighten),
         plant("a mirror is forgotten", Relation::MirroredTwice, forget_a_mirror),
     ]
 }

@@ -1,6 +1,6 @@
 //! Relations that must hold whatever a scene is, and planted faults that must break them.
 
-use super::picture::{CONFIRMING, Difference, MEANS, SEEDS, SIGNIFICANCE, Set, Shot, TOLERANCE, differences, pictures};
+use super::picture::{Difference, Found, MEANS, SIGNIFICANCE, Set, Shot, TOLERANCE, confirmed, differences, pictures};
 use super::random::Random;
 use super::shapes::cuboid;
 use super::world::{Light, LightKind, Matter, Mesh, Placement, ThingKind, World};
@@ -39,6 +39,8 @@ pub enum Relation {
     MirroredTwice,
     /// A small black thing far away.
     FarThing,
+    /// The same scene as a stage of USD, where it is what that can express ([`super::usd::reduced`]).
+    Usd,
     /// Another method.
     Method(Method),
 }
@@ -108,6 +110,7 @@ impl Relation {
             }
             Relation::MirroredTwice => one(mirrored(world)),
             Relation::FarThing => one(with_far_thing(world)?),
+            Relation::Usd => Other { shot: Shot { usd: true, ..shot.clone() }, ..one(world.clone()) },
             Relation::Method(method) => Other {
                 shot: Shot { method, ..shot.clone() },
                 tolerance: bias(shot.method).max(bias(method)),
@@ -149,23 +152,12 @@ impl std::fmt::Display for Broken {
 /// other seeds show it again.
 pub fn check(world: &World, relation: Relation, shot: &Shot) -> Option<Broken> {
     let other = relation.other(world, shot)?;
-    compare(world, &other, shot).unwrap_or_else(|error| Some((vec![], Some(error)))).map(|(differences, error)| {
-        Broken { relation, method: shot.method, camera: shot.camera.clone(), differences, error }
-    })
-}
-
-type Outcome = Option<(Vec<Difference>, Option<String>)>;
-
-/// # Errors
-/// One of the scenes is not taken.
-fn compare(world: &World, other: &Other, shot: &Shot) -> Result<Outcome, String> {
-    let first = found(world, other, shot, 0..SEEDS)?;
-    if first.is_empty() {
-        return Ok(None);
+    let broken =
+        |differences, error| Broken { relation, method: shot.method, camera: shot.camera.clone(), differences, error };
+    match confirmed(|effort, seeds| found(world, &other, shot, effort, seeds)) {
+        Ok(differences) => differences.map(|differences| broken(differences, None)),
+        Err(error) => Some(broken(vec![], Some(error))),
     }
-    let mut again = found(world, other, shot, SEEDS..SEEDS * (1 + CONFIRMING))?;
-    again.retain(|difference| first.iter().any(|other| other.index == difference.index));
-    Ok((!again.is_empty()).then_some((again, None)))
 }
 
 /// Differences of one set of seeds.
@@ -176,20 +168,23 @@ pub fn found(
     world: &World,
     other: &Other,
     shot: &Shot,
+    effort: f64,
     seeds: std::ops::Range<u64>,
-) -> Result<Vec<Difference>, String> {
-    let a = pictures(world, shot, seeds.clone())?;
-    Ok(differences(&a, &others(other, seeds)?, other.tolerance, SIGNIFICANCE))
+) -> Result<Found, String> {
+    let with_effort = |shot: &Shot| Shot { effort: effort * shot.effort, ..shot.clone() };
+    let a = pictures(world, &with_effort(shot), seeds.clone())?;
+    let b = others(other, &with_effort(&other.shot), seeds)?;
+    Ok(Found::new(differences(&a, &b, other.tolerance, SIGNIFICANCE), &[&a, &b]))
 }
 
 /// Seeds of the other scenes start here.
 const OTHER_SEEDS: u64 = 1 << 20;
 
-fn others(other: &Other, seeds: std::ops::Range<u64>) -> Result<Set, String> {
+fn others(other: &Other, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Set, String> {
     let mut sum: Set = vec![vec![0.0; MEANS]; (seeds.end - seeds.start) as usize];
     for (index, world) in (1..).zip(&other.worlds) {
         let first = index * OTHER_SEEDS;
-        let set = pictures(world, &other.shot, first + seeds.start..first + seeds.end)?;
+        let set = pictures(world, shot, first + seeds.start..first + seeds.end)?;
         for (total, means) in sum.iter_mut().zip(&set) {
             for (at, total) in total.iter_mut().enumerate() {
                 *total += means[at - at % 3 + other.channels[at % 3]] / other.factor;
@@ -340,6 +335,9 @@ fn single_lights(world: &World) -> Vec<World> {
     worlds
 }
 
+/// Intensity of a sphere that is off, relative to itself: without any it would not be there, and hide nothing.
+const FAINT: f64 = 1e-9;
+
 /// Turns a light off; its body stays.
 pub fn switch_off(world: &mut World, index: usize) {
     match world.things[index].kind {
@@ -349,14 +347,15 @@ pub fn switch_off(world: &mut World, index: usize) {
             world.things[index].kind = ThingKind::Mesh { mesh, material: world.materials.len() - 1 };
         }
         ThingKind::Light(light) => {
-            world.things[index].kind = ThingKind::Light(Light { color: DVec3::ZERO, ..light });
+            let faint = if matches!(light.kind, LightKind::Point { radius } if radius > 0.0) { FAINT } else { 0.0 };
+            world.things[index].kind = ThingKind::Light(Light { color: light.color * faint, ..light });
         }
         ThingKind::Camera(_) => {}
     }
 }
 
 /// All light times a factor for each channel.
-fn brighter(world: &World, factor: DVec3) -> World {
+pub fn brighter(world: &World, factor: DVec3) -> World {
     let mut made = world.clone();
     made.sky = made.sky.map(|sky| sky * factor);
     made.materials.iter_mut().for_each(|matter| matter.emission *= factor);
