@@ -91,8 +91,7 @@ impl Plan {
     /// Plans a render of a scene seen by a camera.
     pub fn new(scene: &Scene, camera: &Camera, asked: &Asked) -> Plan {
         let presence = Presence::of(scene, camera);
-        let sizeless = Presence::has_sizeless_lights(scene);
-        let finds = |effect| asked.search.finds(effect, sizeless, scene.survey.scattering);
+        let finds = |effect| asked.search.finds(effect, &scene.survey);
         let plan = |effect: Effect| {
             let removed = asked.removed.because(effect);
             let because = if removed.is_empty() { presence.because(effect) } else { removed }.to_vec();

@@ -3,7 +3,6 @@
 use super::effect::Effect;
 use super::names::{Worn, cut, cut_list, lights, worn_in};
 use crate::camera::Camera;
-use crate::light::Emitter;
 use crate::material::{Alpha, Material};
 use crate::scene::Scene;
 
@@ -61,11 +60,6 @@ impl Presence {
     /// Whether the scene calls for an effect.
     pub fn has(&self, effect: Effect) -> bool {
         !self.because(effect).is_empty()
-    }
-
-    /// Whether light from points and parallel light, which no path runs into, is part of the scene.
-    pub fn has_sizeless_lights(scene: &Scene) -> bool {
-        scene.lights.emitters().iter().any(Emitter::is_delta)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::class::{ClassSet, PathClass};
 use super::effect::Effect;
-use crate::scene::Scene;
+use crate::scene::{Scene, Survey};
 
 /// Kinds of methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,14 +67,17 @@ impl Search {
 
     /// Whether it finds all light of an effect. A light without size is hit by no path: without photons it shows no
     /// light behind glass, where it could be neither connected to nor run into.
-    pub(super) fn finds(self, effect: Effect, sizeless_lights: bool, media_scatter: bool) -> bool {
+    pub fn finds(self, effect: Effect, scene: &Survey) -> bool {
+        let Survey { delta_lights, scattering, cloudy_glass, .. } = *scene;
         match (self, effect) {
-            (Search::EyePaths, Effect::Caustic | Effect::Sds) => !sizeless_lights,
+            (Search::EyePaths, Effect::Caustic | Effect::Sds) => !delta_lights,
             (Search::LightPaths, Effect::Sds) => false,
-            (Search::Connections, Effect::Sds) => !sizeless_lights,
-            (Search::Map | Search::Merging, Effect::Volume) => !media_scatter,
+            (Search::Connections, Effect::Sds) => !delta_lights,
+            // Light that comes into clear glass and scatters there once: photons are merged on surfaces alone.
+            (Search::ConnectionsAndMerging, Effect::Sds) => !(delta_lights && cloudy_glass),
+            (Search::Map | Search::Merging, Effect::Volume) => !scattering,
             // Photons end where they first scatter broadly, eye paths do not scatter in media.
-            (Search::PathsAndPhotons, Effect::Volume | Effect::Indirect) => !media_scatter,
+            (Search::PathsAndPhotons, Effect::Volume | Effect::Indirect) => !scattering,
             _ => true,
         }
     }

@@ -22,6 +22,8 @@ impl Strategy {
     /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where
     /// others would have found the glass, and without which it is hardly found where it is small.
     pub const FOCUSED: Strategy = Strategy { guided: true, ..Strategy::USUAL };
+    /// What is taken where the usual does not find all light that is focused.
+    pub const FOCUSED_GATHERING: Strategy = Strategy { guided: true, ..Strategy::GATHERING };
     /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
     pub const GATHERING: Strategy = Strategy::plain(Method::Sppm);
 

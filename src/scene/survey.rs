@@ -21,6 +21,8 @@ pub struct Survey {
     pub media: bool,
     /// Something scatters between surfaces.
     pub scattering: bool,
+    /// Clear glass holds a medium that scatters.
+    pub cloudy_glass: bool,
     /// Some solid refracts colours differently.
     pub dispersion: bool,
     /// Some surface may have narrow lobes: mirrors, glass, what shines.
@@ -63,7 +65,9 @@ impl Survey {
             if material.is_solid_glass() {
                 solids += worn;
                 survey.media |= material.medium.is_some();
-                survey.scattering |= scatters(&material.medium);
+                let scatters = scatters(&material.medium);
+                survey.scattering |= scatters;
+                survey.cloudy_glass |= scatters && material.ior != 1.0 && lobes.0;
                 survey.null_boundaries |= material.ior == 1.0 || material.has_alpha_per_entry();
                 survey.dispersion |= material.disperses();
             }

@@ -362,6 +362,34 @@ fn effects_are_weighed() {
     }
 }
 
+/// A lamp without size shines into a clear ball of cloudy glass. What scatters once in there no connection finds, and
+/// `vcm` merges photons on surfaces alone: it says so, and `auto` takes photons in media.
+#[test]
+fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
+    let cloudy = |size: bool, ior: f32| {
+        let mut description = Description::default();
+        let medium = Some(MediumParameters { sigma_a: Rgb::splat(0.5), sigma_s: Rgb::splat(2.0), g: 0.3 });
+        add(&mut description, "ball", sphere(Vec3::ZERO, 0.5, 24), Material { medium, ..glass(ior) });
+        let mut light = point_light(DVec3::new(0.0, 1.5, 0.5), 4.0);
+        light.radius = if size { 0.2 } else { 0.0 };
+        description.lights.push(light);
+        description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 25.0));
+        build(description)
+    };
+    let chosen = |scene: &Scene| {
+        let camera = scene.camera(&square(16)).expect("a camera");
+        let make = |way| Some(Settings { iterations: Some(4), ..Settings::of(way) });
+        choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").way
+    };
+    assert_eq!(chosen(&cloudy(false, 1.2)), Strategy::FOCUSED_GATHERING);
+    assert_eq!(chosen(&cloudy(true, 1.2)), Strategy::FOCUSED);
+    let finds = |scene: &Scene, method: Method| method.search().finds(Effect::Sds, &scene.survey);
+    let methods = [Method::Vcm, Method::Sppm];
+    assert_eq!(methods.map(|method| finds(&cloudy(false, 1.2), method)), [false, true]);
+    assert_eq!(methods.map(|method| finds(&cloudy(true, 1.2), method)), [true, true]);
+    assert_eq!(methods.map(|method| finds(&cloudy(false, 1.0), method)), [true, true]);
+}
+
 /// What is switched off is weighed as if it were not: that is what the picture lacks. Media have a part of the light
 /// where they scatter; those that only absorb take of all others, and are not weighed.
 #[test]

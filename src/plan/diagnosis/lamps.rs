@@ -185,7 +185,7 @@ fn within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
 
 /// Lamps without size that shine through glass, where the method does not find them.
 pub(super) fn behind_glass(scene: &Scene, asked: &Asked) -> Vec<String> {
-    if asked.search.finds(Effect::Caustic, true, scene.survey.scattering) {
+    if asked.search.finds(Effect::Caustic, &scene.survey) {
         return vec![];
     }
     let mut warnings = Vec::new();

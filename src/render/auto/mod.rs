@@ -68,8 +68,8 @@ pub fn choose(
     let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
     let chosen = trials.iter().find(|trial| trial.chosen);
     let untried = || {
-        let focused = pilot::focuses(scene).then_some(Strategy::FOCUSED);
-        focused.into_iter().chain([Strategy::USUAL]).find(|way| make(*way).is_some()).unwrap_or(Strategy::GATHERING)
+        let ways = pilot::focused(scene).iter().chain(&[Strategy::USUAL]);
+        ways.copied().find(|way| make(*way).is_some()).unwrap_or(Strategy::GATHERING)
     };
     let way = chosen.map_or_else(untried, |chosen| chosen.way);
     let settings = make(way)?;

@@ -5,7 +5,7 @@ use super::trial;
 use super::weights::{self, Weighed};
 use crate::camera::Camera;
 use crate::finish::Finish;
-use crate::plan::Presence;
+use crate::plan::{Effect, Presence};
 use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::Stage;
@@ -32,8 +32,15 @@ const CORES: f64 = 2.0;
 /// What a render until an error is reached is taken for (core-seconds).
 const UNLIMITED: f64 = 1000.0;
 
-pub(super) fn focuses(scene: &Scene) -> bool {
-    !scene.lights.targets().spheres().is_empty()
+/// The ways to take where glass or mirrors focus light, the best one first; none elsewhere.
+pub(super) fn focused(scene: &Scene) -> &'static [Strategy] {
+    if scene.lights.targets().spheres().is_empty() {
+        &[]
+    } else if Method::Vcm.search().finds(Effect::Sds, &scene.survey) {
+        &[Strategy::FOCUSED, Strategy::USUAL]
+    } else {
+        &[Strategy::FOCUSED_GATHERING, Strategy::GATHERING, Strategy::FOCUSED, Strategy::USUAL]
+    }
 }
 
 /// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors
@@ -41,8 +48,9 @@ pub(super) fn focuses(scene: &Scene) -> bool {
 /// them for it.
 fn ways(scene: &Scene, make: &impl Fn(Strategy) -> Option<Settings>) -> Vec<(Strategy, Settings)> {
     let with_settings = |way: &Strategy| make(*way).map(|settings| (*way, settings));
-    if focuses(scene) {
-        return [Strategy::FOCUSED, Strategy::USUAL].iter().find_map(with_settings).into_iter().collect();
+    let focused = focused(scene);
+    if !focused.is_empty() {
+        return focused.iter().find_map(with_settings).into_iter().collect();
     }
     [Strategy::USUAL, Strategy::plain(Method::Path), Strategy::plain(Method::Bdpt)]
         .iter()
@@ -117,12 +125,16 @@ impl<'a> Pilot<'a> {
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
         let Pilot { scene, cost, pixels, budget, .. } = *self;
-        let ways = ways(scene, make);
+        let (ways, focuses) = (ways(scene, make), !focused(scene).is_empty());
         if ways.len() < 2 {
-            let why = if focuses(scene) && !ways.is_empty() {
-                "light is focused here, which it finds by all techniques"
-            } else {
-                "the one way that these options leave"
+            let why = match ways.first() {
+                Some((Strategy { method: Method::Vcm, .. }, _)) if focuses => {
+                    "light is focused here, which it finds by all techniques"
+                }
+                Some((Strategy { method: Method::Sppm, .. }, _)) if focuses => {
+                    "a lamp without size shines into cloudy glass, where vcm does not find all light"
+                }
+                _ => "the one way that these options leave",
             };
             return (Vec::new(), Some(why));
         }
