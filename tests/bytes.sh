@@ -19,8 +19,9 @@ one() { # SCENE METHOD OPTIONS...
     fi
 }
 
+methods=$(python3 -c "import json; print(*(method['name'] for method in json.load(open('tests/methods.json'))))")
 for scene in scenes/*.glb; do
-    for method in path light bdpt pm ppm sppm appm cppm bpm vcm mlt; do
+    for method in $methods; do
         one "$scene" "$method" --no-combine
     done
     printf '%s  %s plan\n' "$("$program" plan "$scene" --json 2>/dev/null | sha256sum | cut -c1-16)" "$scene"

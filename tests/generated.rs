@@ -5,6 +5,7 @@ use caustique::estimator::QUARTERS;
 use caustique::film::cryptomatte::RANKS;
 use caustique::film::kind::{LAYERS, LayerKind, Suffix};
 use caustique::film::{describe, finished_part, part_names};
+use caustique::render::Method;
 use caustique::transport::MAX_LEVELS;
 use serde_json::{Value, json};
 use std::fs;
@@ -78,6 +79,13 @@ fn python_knows_all_layers() {
     let text = format!("{:#}\n", layers());
     compare("scripts/blender/caustique_addon/layers.json", &text);
     compare("scripts/usd/layers.json", &text);
+}
+
+#[test]
+fn scripts_know_all_methods() {
+    let method = |method: &Method| json!({"name": method.name(), "photons": method.counts_photons()});
+    let all: Vec<Value> = Method::ALL.iter().map(method).collect();
+    compare("tests/methods.json", &format!("{:#}\n", Value::from(all)));
 }
 
 /// A row of the page's table.

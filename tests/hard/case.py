@@ -2,7 +2,14 @@
 
 import json
 from dataclasses import dataclass, field
+from pathlib import Path
 
+#: The program's table of methods: tests/generated.rs writes the file.
+_TABLE = json.loads((Path(__file__).parents[1] / "methods.json").read_text("utf-8"))
+#: All methods.
+ALL_METHODS = tuple(method["name"] for method in _TABLE)
+#: Methods that send a number of light paths of their own.
+PHOTON_METHODS = tuple(method["name"] for method in _TABLE if method["photons"])
 #: Methods of a case unless it says others: paths, connections, both with photons, and photons alone.
 METHODS = ("path", "bdpt", "vcm", "sppm")
 

@@ -2,10 +2,9 @@
 
 from . import magnitude
 from .answers import Resumed, Shards, Threads
-from .case import Case
+from .case import ALL_METHODS, Case
 
 TITLE = "Determinism"
-ALL = ("path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "mlt")
 DIVIDED = ("path", "bdpt", "sppm", "vcm", "mlt")
 SCENE = {"scene": magnitude.room}
 
@@ -15,7 +14,7 @@ CASES = [
         "1, 2, 3 and 7 threads",
         SCENE,
         Threads("What a pixel and a photon are follows from their numbers alone, and sums have a fixed order."),
-        ALL,
+        ALL_METHODS,
         size=24,
         iterations=2,
         photons=5000,

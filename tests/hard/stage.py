@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-#: Methods that send a number of light paths of their own.
-PHOTON_METHODS = ("pm", "ppm", "sppm", "appm", "cppm")
+from .case import PHOTON_METHODS
+
 #: Seconds after which a render counts as hanging.
 PATIENCE = 60
 

@@ -5,6 +5,7 @@ Each method is killed --moments times, spread over the whole run of a render tha
 iterations. Where no state was saved yet, the render begins anew, as a farm has it.
 """
 
+import json
 import random
 import shutil
 import signal
@@ -17,10 +18,11 @@ from ..record import ROOT, record
 
 OUT = ROOT / "out" / "kills"
 SCENE = ROOT / "scenes" / "cornell.glb"
-ALL = ["path", "light", "bdpt", "pm", "ppm", "sppm", "appm", "cppm", "bpm", "vcm", "mlt", "auto"]
+METHODS = json.loads((ROOT / "tests" / "methods.json").read_text("utf-8"))
+ALL = [*(method["name"] for method in METHODS), "auto"]
 ARGUMENTS = {"methods": ALL, "moments": 50, "seed": 1}
 # Methods whose light paths are not as many as the pixels unless told so.
-PHOTONS = ("pm", "ppm", "sppm", "appm", "cppm")
+PHOTONS = {method["name"] for method in METHODS if method["photons"]}
 # auto begins with a pilot that takes a share of them.
 ITERATIONS = {"auto": 200}
 FINAL, STATE = OUT / "cut.exr", OUT / "cut.exr.checkpoint"
