@@ -11,10 +11,10 @@ METHODS = (
 )
 
 FINISHES = (
-    ("auto", "Auto", "Open Image Denoise where it is found, else the program's own network"),
+    ("auto", "Auto", "Open Image Denoise where it is found, else the program's own denoiser"),
     ("oidn", "Open Image Denoise", "Intel's denoiser, bounded by the noise of each pixel"),
-    ("own", "Own", "The program's own network, bounded by the noise of each pixel"),
-    ("none", "Combine Alone", "Combine the bandwidths, without a denoiser"),
+    ("own", "Own", "The program's own denoiser, bounded by the noise of each pixel"),
+    ("none", "No Denoiser", "The finish without a denoiser"),
     ("off", "Off", "The estimate itself, with its noise"),
 )
 
@@ -55,7 +55,7 @@ class Settings(bpy.types.PropertyGroup):
     use_error: bpy.props.BoolProperty(name="Error", description="Stop when the picture is good enough")
     error: bpy.props.FloatProperty(
         name="Error", default=5, min=0.01, max=100, subtype="PERCENTAGE",
-        description="Estimated relative error of the picture before it is finished")
+        description="Estimated relative error of the finished picture")
 
     finish: bpy.props.EnumProperty(
         name="Finish", items=FINISHES, default="auto", description="What cleans the picture of noise at the end")
@@ -81,7 +81,7 @@ class Passes(bpy.types.PropertyGroup):
     noisy: bpy.props.BoolProperty(name="Noisy", description="The estimate before the finish")
     noisy_parts: bpy.props.BoolProperty(
         name="Noisy Parts", description="Direct, Indirect, Caustic, Emission and Volume: they sum to Noisy")
-    error: bpy.props.BoolProperty(name="Error", description="Estimated standard error of Noisy, pixel by pixel")
+    error: bpy.props.BoolProperty(name="Error", description="Estimated standard error of the picture as delivered, pixel by pixel")
     levels: bpy.props.BoolProperty(
         name="Bandwidths", description="The estimates at five bandwidths, Level1 to Level5, and their variances")
 

@@ -29,6 +29,12 @@ def peers(figures):
     return table(["caustique over", "of", "geometric mean", "worst", "better on"], rows)
 
 
+def told(key):
+    """The name of a renderer for people; a key may have a word behind it: "cycles_path approximates"."""
+    peer, _, word = key.partition(" ")
+    return f"{NAMES.get(peer, peer)} {word}".strip()
+
+
 def gallery(figures):
     """A picture and a table for every scene."""
     values = figures.one("peers")
@@ -44,7 +50,7 @@ def gallery(figures):
             for peer, of in row["figures"].items()
         ]
         parts.append("\n".join(lines) + "\n" + table(head, cells))
-        said = (f"- {NAMES.get(peer, peer)}: {note}" for peer, note in row["notes"].items())
+        said = (f"- {told(of)}: {note}" for of, note in row["notes"].items())
         notes = [textwrap.fill(note, WIDTH, subsequent_indent="  ") for note in said]
         parts += ["\n".join(notes) + "\n"] if notes else []
     return "\n".join(parts)
