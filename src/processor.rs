@@ -1,4 +1,4 @@
-//! Whether this processor has the instructions that the program was built with.
+//! The processor: whether it has the instructions that the program was built with, and how to hide its cache misses.
 //!
 //! `.cargo/config.toml` builds for x86-64-v3. `is_x86_feature_detected!` is no help: where a feature is enabled at
 //! build time it is simply `true`. So the kernel is asked, which lists the features as `flags` in `/proc/cpuinfo`.
@@ -7,6 +7,16 @@ use crate::error::{Error, Kind, Result};
 
 /// Features of x86-64-v3 by the kernel's names.
 const NEEDED: [&str; 5] = ["avx2", "bmi2", "f16c", "fma", "movbe"];
+
+/// Reads values from memory that several steps are about to use one after the other, so that the processor waits for
+/// all of them at once.
+#[inline(always)]
+pub fn prefetch<T>(values: impl IntoIterator<Item = T>) {
+    for value in values {
+        // The compiler may not drop the read.
+        std::hint::black_box(value);
+    }
+}
 
 /// Checks the processor; without the instructions the program would end with a signal somewhere in the middle.
 ///

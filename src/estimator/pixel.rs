@@ -245,15 +245,6 @@ impl Pixel {
         Some(scatter.sum::<DVec3>() / ((QUARTERS - 1) as f64 * total))
     }
 
-    /// Looks at the memory that [`Pixel::add`] is about to change, so that the processor waits for that of several
-    /// pixels at once. Returns something that depends on it.
-    #[inline]
-    pub fn touch(&self) -> f64 {
-        let others: f64 = self.others.iter().map(|level| level.values.value().x + level.squares.value().x).sum();
-        let parts: f64 = self.parts.iter().map(|part| part.value().x).sum();
-        others + parts + self.quarters[0].sum.value().x + self.albedo.x + f64::from(self.bandwidths[0])
-    }
-
     /// Keeps what iteration `pass` (from 1) sees first, its camera depth and position, if none has been counted before.
     /// To be called before [`Pixel::add`].
     #[inline]

@@ -2,6 +2,7 @@
 
 use super::mesh::Corner;
 use super::{Instance, Mesh, Surface};
+use crate::processor::prefetch;
 
 /// The scene's geometry.
 #[derive(Clone, Debug, Default)]
@@ -26,20 +27,19 @@ impl Shapes {
         self.instances.iter().map(|instance| self.meshes[instance.mesh as usize].triangles.len()).sum()
     }
 
-    /// Looks at the memory of triangles (instance, index) that [`Shapes::surface`] is about to be asked for, at all of
-    /// it at once, so that the processor waits once. Returns something that depends on it.
+    /// Prefetches the triangles (instance, index) that [`Shapes::surface`] is about to be asked for.
     #[inline]
-    pub fn touch(&self, triangles: impl Iterator<Item = (u32, u32)> + Clone) -> f32 {
+    pub fn prefetch(&self, triangles: impl Iterator<Item = (u32, u32)> + Clone) {
         let corners = |(instance, primitive): (u32, u32)| {
             let mesh = self.instances[instance as usize].mesh as usize;
             (mesh, self.meshes[mesh].triangles[primitive as usize])
         };
-        let indices: u32 = triangles.clone().map(|t| corners(t).1[0] & 1).sum();
-        let places = triangles.map(|t| {
-            let (mesh, corners) = corners(t);
-            corners.iter().map(|&c| self.corners[mesh][c as usize].p.x).sum::<f32>()
-        });
-        places.sum::<f32>() + indices as f32
+        // All indices before the first corner, because a corner's address waits for its index.
+        prefetch(triangles.clone().map(|triangle| corners(triangle).1[0]));
+        prefetch(triangles.flat_map(|triangle| {
+            let (mesh, corners) = corners(triangle);
+            corners.map(|corner| self.corners[mesh][corner as usize].p.x)
+        }));
     }
 
     /// The surface at barycentric coordinates of a triangle; `None` if it has no area.

@@ -17,6 +17,7 @@ use crate::estimator::rule::CountingRule;
 use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
+use crate::processor::prefetch;
 use crate::random::{Domain, Streams};
 use crate::transport::{Bandwidths, Counter, EqualFlux, EyeMeasure, Found, LevelRadii, PathStart, Scratch};
 use rayon::prelude::*;
@@ -213,17 +214,13 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             if eye.is_given_up() {
                 return;
             }
-            let waiting = places.iter().flatten().map(|place| {
+            for place in places.iter().flatten() {
                 let first = place.at * states;
-                // Those of the first kind, which most pixels see.
+                // The counts of the first kind of photon, which most pixels see. The last may be in a line of its own.
                 let counts = &counts[first * each..][..count * each];
-                // The last may be in a line of its own.
-                for count in counts.iter().step_by(line).chain(counts.last()) {
-                    std::hint::black_box(*count);
-                }
-                f64::from(R::radius2(&bandwidths[first]))
-            });
-            std::hint::black_box(waiting.sum::<f64>());
+                prefetch(counts.iter().step_by(line).chain(counts.last()).copied());
+                prefetch([R::radius2(&bandwidths[first])]);
+            }
             let starts = |[film, streams]: [Streams; 2]| maps[0].tune(eye.starts_through(places, film, streams));
             let independent = starts(independent);
             let correlated = levels.two_paths.then(|| starts(correlated));

@@ -603,9 +603,8 @@ impl Eye<'_> {
             })
         };
         self.scene.tracer.intersect8(ray, |k, hit| hits[k] = Some(hit));
-        // Looked at together here, their memory is there when one path after the other asks for it.
         let triangles = hits.iter().flatten().map(|hit| (hit.instance, hit.primitive));
-        std::hint::black_box(self.scene.shapes.touch(triangles));
+        self.scene.shapes.prefetch(triangles);
         for (start, hit) in starts.iter_mut().zip(hits) {
             if let (Some((start, _)), Some(hit)) = (start, hit) {
                 start.first = PrecomputedHit::Hit(hit);
