@@ -1,21 +1,39 @@
 #!/usr/bin/env bash
-# Installs what is missing and runs every test that gates a change. Stops at the first part that fails, but always ends
-# with the summary; its last line counts the tests: "123 passed, 0 failed". A part that fails without a failed test of
-# its own (formatting, a lint, a build) counts as one.
+# Installs what is missing and runs the tests. Stops at the first part that fails, but always ends with the slowest tests
+# and the summary; its last line counts the tests: "123 passed, 0 failed". A part that fails without a failed test of its
+# own (formatting, a lint, a build) counts as one.
+#
+#   scripts/test.sh                     what a change must pass before others see it
+#   scripts/test.sh --long              everything: also the tests marked long, and the hard cases by all methods
+#   scripts/test.sh --long-within 1300  also the tests marked long, if the others took fewer seconds than that
 
 set -euo pipefail
 
 # shellcheck source=scripts/setup.sh
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
+long_within=0
+hard_cases=(--methods vcm)
+case "$*" in
+    '') ;;
+    --long) long_within=1000000 hard_cases=() ;;
+    '--long-within '[0-9]*) long_within=$2 ;;
+    *) fail "unknown arguments: $*" "scripts/test.sh takes --long, --long-within SECONDS, or nothing" ;;
+esac
+
 passed=0
 failed=0
 summary=()
 LOG=
+TIMES=$(mktemp)
 
 finish() {
     local status=$?
-    [ -z "$LOG" ] || rm -f "$LOG"
+    if [ -s "$TIMES" ]; then
+        printf '\nslowest tests, in seconds\n'
+        sort -rn "$TIMES" | sed -n 1,20p
+    fi
+    rm -f "$TIMES" ${LOG:+"$LOG"}
     # An exit that no part accounts for, in the installation for example.
     if [ "$status" -ne 0 ] && [ "$failed" -eq 0 ]; then
         summary+=("FAILED   before all parts had run")
@@ -38,6 +56,7 @@ part() {
     LOG=$(mktemp)
     "$@" 2>&1 | tee "$LOG" || status=$?
     read -r good bad skipped < <(awk -f "$ROOT/tests/test_counts.awk" "$LOG")
+    awk -f "$ROOT/tests/test_times.awk" "$LOG" >>"$TIMES"
     rm -f "$LOG"
     LOG=
     # A test that is skipped tests nothing, and everything it could lack is installed.
@@ -84,12 +103,21 @@ else
     without 'cargo clippy' 'clippy is not installed: rustup component add clippy'
 fi
 RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --locked --release --workspace --no-deps
-tests 'cargo test' cargo test --locked --release --workspace --no-fail-fast
-tests 'Python' .venv/bin/python -m unittest discover -s tests/python -p 'test_*.py'
-# HARD_CASES narrows them, for machines whose time is short: HARD_CASES='--methods vcm'.
-# shellcheck disable=SC2086
-tests 'Hard cases' tests/hard-cases.sh ${HARD_CASES:-}
+# Stable Rust's test programs print the time of each test only if told that they may use unstable options. As the runner of
+# the programs alone, `env` does not change what is built.
+host=$(rustc -vV | sed -n 's/^host: //p' | tr 'a-z-' 'A-Z_')
+export "CARGO_TARGET_${host}_RUNNER=env RUSTC_BOOTSTRAP=1"
+rust=(cargo test --locked --release --workspace --no-fail-fast --lib --bins --tests -- -Z unstable-options --report-time)
+tests 'cargo test' "${rust[@]}"
+part 'cargo test --doc' cargo test --locked --release --workspace --doc
+tests 'Python' .venv/bin/python tests/python/timed.py discover -s tests/python -p 'test_*.py'
+tests 'Hard cases' tests/hard-cases.sh ${hard_cases[@]+"${hard_cases[@]}"}
 part 'Python wheel' scripts/python.sh
-tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning -m unittest discover -s tests/python/package
-tests 'Python with USD' .venv-usd/bin/python -m unittest discover -s tests/python -p 'usd_*.py'
-tests 'Python with Blender' .venv-bpy/bin/python -m unittest discover -s tests/python -p 'blender_*.py'
+tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning tests/python/timed.py discover -s tests/python/package
+tests 'Python with USD' .venv-usd/bin/python tests/python/timed.py discover -s tests/python -p 'usd_*.py'
+tests 'Python with Blender' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'blender_*.py'
+if [ "$SECONDS" -lt "$long_within" ]; then
+    tests 'cargo test, long' "${rust[@]}" --ignored
+else
+    without 'cargo test, long' 'scripts/test.sh --long runs them'
+fi

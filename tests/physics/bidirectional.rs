@@ -139,6 +139,7 @@ fn point_light_beside_a_mirror() {
 
 /// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab.
 #[test]
+#[ignore = "long"]
 fn sun_through_a_slab_seen_directly_and_through_a_slab() {
     let (rho, e, n) = (0.5, 3.0, 1.5f64);
     for (through, what) in [(false, "caustic"), (true, "caustic behind glass")] {
@@ -189,6 +190,7 @@ fn lamp_seen_through_absorbing_glass() {
 /// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. With either side's
 /// factor of eta^2 wrong, light inside is off by 2.25.
 #[test]
+#[ignore = "long"]
 fn white_sphere_in_glass_under_a_uniform_sky() {
     let mut description = Description::default();
     add(&mut description, "glass", sphere(Vec3::ZERO, 1.0, 128), glass(1.5));
@@ -256,6 +258,7 @@ fn agree_with(
 
 /// Plastic and rough metal in a room: layered lobes, wide and narrow.
 #[test]
+#[ignore = "long"]
 fn glossy_room() {
     let scene = build(glossy_balls());
     let methods = [Method::Path, Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm, Method::Sppm, Method::Cppm];
@@ -267,6 +270,7 @@ fn glossy_room() {
 /// Smooth and rough glass, with a lens in front of the camera. Light tracing sees nothing behind smooth glass, so it
 /// stays out.
 #[test]
+#[ignore = "long"]
 fn glass_room() {
     let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "smooth", sphere(Vec3::new(-0.45, 0.45, 0.0), 0.4, 128), glass(1.5));
@@ -282,6 +286,7 @@ fn glass_room() {
 
 /// Everything lit from outside by a bright patch of sky and a sun of finite size, with rough metal in the open.
 #[test]
+#[ignore = "long"]
 fn under_the_sky() {
     let mut description = Description::default();
     add(&mut description, "floor", floor(1.5), matte(0.5, 0.0));

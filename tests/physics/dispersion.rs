@@ -518,6 +518,7 @@ fn a_rainbow_agrees() {
 
 /// The rainbow seen through dispersive glass: light paths and eye paths both have a wavelength, and meet if it is one.
 #[test]
+#[ignore = "long"]
 fn a_rainbow_behind_dispersive_glass_agrees() {
     let scene = rainbow(strong, true);
     let path = seeds(&scene, Method::Path, |seed| settings(1000, seed));

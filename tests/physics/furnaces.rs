@@ -88,6 +88,7 @@ fn means(scene: &Scene, method: Method) -> Vec<f64> {
 }
 
 #[test]
+#[ignore = "long"]
 fn nothing_white_is_seen_under_a_white_sky() {
     let materials = white();
     let critical = t_critical(sidak(ERROR_RATE, materials.len() * METHODS.len()), 1, SEEDS as f64 - 1.0);

@@ -147,6 +147,7 @@ fn pane() -> Scene {
 /// Eye paths leave photons their share whether any have come this time or not: few light paths bring as much as many,
 /// and as paths alone.
 #[test]
+#[ignore = "long"]
 fn empty_maps_bring_nothing_and_take_nothing() {
     let scene = pane();
     let by = |method, photons| {

@@ -286,6 +286,7 @@ fn taken_on_the_way(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
 /// hold behind its border is made up for. Divided by the volume of the whole ball, it was 0.865 instead of 0.899,
 /// 0.495 instead of 0.536.
 #[test]
+#[ignore = "long"]
 fn kernels_that_reach_behind_borders_lose_nothing() {
     let sigma = [1.5, 0.5, 1.0];
     for mesh in [false, true] {
@@ -409,6 +410,7 @@ fn god_rays() -> Scene {
 }
 
 #[test]
+#[ignore = "long"]
 fn god_rays_agree() {
     let scene = god_rays();
     let path = seeds(&scene, Method::Path, 10, |seed| settings(150, seed));

@@ -107,6 +107,7 @@ fn a_uniform_field_has_no_bias_at_any_bandwidth() {
 
 /// A room with a glass ball under a lamp that paths run into: all agree with path tracing, tile by tile.
 #[test]
+#[ignore = "long"]
 fn all_agree_with_path_tracing() {
     let mut description = Description::default();
     let walls = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true);

@@ -17,13 +17,17 @@ from lab.tables.markdown import digits
 from lab.tables.stored import Missing
 
 COUNTS = support.ROOT / "tests" / "test_counts.awk"
+TIMES = support.ROOT / "tests" / "test_times.awk"
 LAB = [sys.executable, "-m", "lab"]
 
 
+def awk(program, log):
+    command = [shutil.which("awk"), "-f", program]
+    return subprocess.run(command, input=log, capture_output=True, text=True, check=True).stdout
+
+
 def counts(log):
-    awk = shutil.which("awk")
-    done = subprocess.run([awk, "-f", COUNTS], input=log, capture_output=True, text=True, check=True)
-    return tuple(map(int, done.stdout.split()))
+    return tuple(map(int, awk(COUNTS, log).split()))
 
 
 class Counts(unittest.TestCase):
@@ -33,6 +37,17 @@ class Counts(unittest.TestCase):
             "test result: FAILED. 4 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 1.00s\n"
         )
         self.assertEqual(counts(log), (16, 2, 1))
+
+    def test_tests_of_the_long_form_are_not_skipped_tests(self):
+        log = (
+            "test furnaces::box ... ok <1.250s>\ntest media::fog ... ignored, long\ntest media::mist ... ignored\n"
+            "test result: ok. 1 passed; 0 failed; 2 ignored; 0 measured; 0 filtered out; finished in 1.25s\n"
+        )
+        self.assertEqual(counts(log), (1, 0, 1))
+
+    def test_times_of_rust_and_python_tests(self):
+        log = "test furnaces::box ... ok <12.345s>\n.\ntest_cli.Exits.test_usage: 3.2 s\n.\ntest result: ok.\nRan 1 test in 1.0s\n"
+        self.assertEqual(awk(TIMES, log), "12.3 furnaces::box\n3.2 test_cli.Exits.test_usage\n")
 
     def test_unittest_results(self):
         for last, expected in [

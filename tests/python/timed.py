@@ -1,0 +1,26 @@
+"""Runs unittest's command line and prints the time of every test that takes a second or more.
+
+`tests/test_times.awk` reads these lines.
+"""
+
+import sys
+import time
+import unittest
+
+
+class TimedResult(unittest.TextTestResult):
+    """A result that prints the times of slow tests."""
+
+    def startTest(self, test):
+        self.started = time.monotonic()
+        super().startTest(test)
+
+    def stopTest(self, test):
+        super().stopTest(test)
+        seconds = time.monotonic() - self.started
+        if seconds >= 1:
+            print(f"\n{test.id()}: {seconds:.1f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(module=None, testRunner=unittest.TextTestRunner(resultclass=TimedResult))
