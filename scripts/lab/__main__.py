@@ -26,7 +26,7 @@ def summary(path):
 def environment(path):
     """The environment that a figure runs in."""
     for statement in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(statement, ast.Assign) and statement.targets[0].id == "VENV":
+        if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "VENV":
             return ast.literal_eval(statement.value)
     return USUAL
 

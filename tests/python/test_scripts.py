@@ -1,6 +1,8 @@
 """The scripts count results as they should, and record figures as one JSON object a line."""
 
+import importlib
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -11,7 +13,9 @@ from unittest import mock
 import support
 
 from lab import record
+from lab.__main__ import FIGURES, environment
 from lab.figures import tables
+from lab.options import parser
 from lab.tables import Figures
 from lab.tables.markdown import digits
 from lab.tables.stored import Missing
@@ -144,6 +148,30 @@ class Record(support.Scratch):
         with self.assertRaises(ValueError):
             record.record("rays", {"mrays": float("nan")}, file)
         self.assertFalse(file.exists())
+
+
+class Laboratory(unittest.TestCase):
+    def test_every_figure_has_arguments_that_are_known_and_a_function_main(self):
+        for name, path in FIGURES.items():
+            if environment(path) != ".venv":
+                continue
+            with self.subTest(name):
+                figure = importlib.import_module(f"lab.figures.{name}")
+                self.assertTrue(callable(figure.main))
+                self.assertIn(f"scripts/lab.sh {name}", parser(name, figure, short=False).format_help())
+
+    def test_defaults_and_arguments_are_read(self):
+        finished = importlib.import_module("lab.figures.finished")
+        read = parser("finished", finished, short=False).parse_args(["--budgets", "1,2.5", "--scenes", "pool"])
+        self.assertEqual((read.budgets, read.scenes, read.width, read.seeds), ([1.0, 2.5], ["pool"], 320, 1))
+        short = parser("finished", finished, short=True).parse_args(["--short"])
+        self.assertEqual((short.width, short.budgets), (240, [10.0]))
+
+    def test_an_unknown_figure_is_named(self):
+        env = {**os.environ, "PYTHONPATH": str(support.ROOT / "scripts")}
+        done = subprocess.run([*LAB, "nothing"], capture_output=True, text=True, check=False, env=env)
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertRegex(done.stderr, "^lab: error: no figure 'nothing'\nhint: one of: adaptive, .*\n$")
 
 
 class Tables(support.Scratch):
