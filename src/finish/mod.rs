@@ -198,8 +198,8 @@ impl Finish {
         self.denoiser.name()
     }
 
-    /// Denoises a grey picture, so that somebody can see how long that takes; the first time loads what later ones find
-    /// ready.
+    /// Finishes a grey picture with a quality of the denoiser, so that the caller can time it; the first time loads what
+    /// later ones find ready.
     ///
     /// # Errors
     /// The denoiser fails.
@@ -207,7 +207,10 @@ impl Finish {
         let plane = || vec![[0.5; 3]; size.pixels()];
         let (albedo, normal) = (Some(plane()), Some(plane()));
         let estimate = Estimate { size, mean: plane(), deviation: plane(), albedo, normal, alpha: None };
-        self.denoiser.run(&estimate, quality).map(|_| ())
+        let before = std::mem::replace(&mut self.quality, quality);
+        let finished = self.picture(&estimate);
+        self.quality = before;
+        finished.map(|_| ())
     }
 
     /// Whether the denoiser has qualities.
