@@ -3,7 +3,7 @@
 use super::finish::{Denoise, tell_missing};
 use super::output::{self, Naming, PictureArgs};
 use super::progress::Form;
-use super::render::{Summary, tell_finish, tell_picture};
+use super::render::{Summary, tell_finish, tell_picture, tell_unseen};
 use super::say;
 use caustique::error::Result;
 use caustique::film::{LayerSet, Selection, take_plain_names};
@@ -125,6 +125,7 @@ fn join(args: &MergeArgs) -> Result<()> {
             tell_finish(name, &delivery, summary.told_of_finished());
         }
         summary.tell_rejected(&args.output, true);
+        tell_unseen(&args.output, &delivery);
     }
     args.write(&delivery.set, &delivery.attributes, naming, &made_for)?;
     let output = args.output.display();

@@ -278,10 +278,7 @@ impl Pixel {
                 _ => independent.radiance(level),
             };
         }
-        let (measure, level) = match correlated {
-            Some(correlated) if own > 0 => (correlated, own - 1),
-            _ => (independent, own),
-        };
+        let (measure, level) = self.own_of(independent, correlated);
         let parts: [Rgb; PARTS] = [
             measure.emission,
             measure.direct,
@@ -327,6 +324,19 @@ impl Pixel {
                 self.features += 1;
                 self.depths += u32::from(features.depth > 0.0);
             }
+        }
+    }
+
+    /// The measure that has the own image's level, and where.
+    #[inline]
+    pub fn own_of<'m>(
+        &self,
+        independent: &'m EyeMeasure,
+        correlated: Option<&'m EyeMeasure>,
+    ) -> (&'m EyeMeasure, usize) {
+        match (correlated, self.own()) {
+            (Some(correlated), own @ 1..) => (correlated, own - 1),
+            (_, own) => (independent, own),
         }
     }
 

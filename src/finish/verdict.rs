@@ -49,6 +49,9 @@ pub struct Verdict {
     /// Share of the estimate's variance that lies in the pixels left out, 0 to 1: near one a few bright samples
     /// hold all noise, and what others of their kind will bring no sample so far can tell.
     pub rare: f64,
+    /// Squared relative error by light that photons have not brought, which quarters do not tell: whoever counts the
+    /// photons adds it.
+    pub unseen: f64,
 }
 
 /// Squared errors per pixel.
@@ -114,6 +117,7 @@ impl Trial<'_> {
             deviation: (self.squares_of_blocks(evidence) / VARIANCES).sqrt() / evidence.count,
             bias: bias.map_or(0.0, |bias| evidence.average(bias)),
             rare: evidence.rare,
+            unseen: 0.0,
         }
     }
 

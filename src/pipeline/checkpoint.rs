@@ -16,7 +16,7 @@ use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
-pub const MAGIC: &[u8; 23] = b"caustique checkpoint 3\n";
+pub const MAGIC: &[u8; 23] = b"caustique checkpoint 4\n";
 /// What checkpoints of all versions begin with.
 const KIND: &[u8] = b"caustique checkpoint ";
 /// Pixels packed together.

@@ -7,7 +7,7 @@ use super::{Ready, Watch};
 use crate::error::{Error, Result};
 use crate::estimator::Pixel;
 use crate::film::{LayerSet, Naming, Selection};
-use crate::finish::{Account, ERROR, reads};
+use crate::finish::{Account, ERROR, Verdict, reads};
 use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
@@ -32,6 +32,8 @@ pub struct Delivery {
     pub worst: Option<Worst>,
     /// Seconds from the last iteration to here.
     pub finishing: f64,
+    /// Which light photons have hardly brought, where that is most of the error.
+    pub unseen: Option<String>,
     /// Why the picture is not finished, though that was asked for.
     pub refusal: Option<Error>,
     /// What other shards are joined with, where this is one.
@@ -63,7 +65,9 @@ pub(super) fn deliver(
 ) -> Result<(Delivery, Vec<Pixel>)> {
     let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
     let mut header = rendered.account((!reproducible).then_some(rayon::current_num_threads()));
-    let rejections = rendered.rejections();
+    let (rejections, unseen) = (rendered.rejections(), rendered.unseen());
+    let of_estimate = rendered.relative_error();
+    let settings = rendered.settings.clone();
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let finishes = ready.is_some();
     let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
@@ -79,7 +83,7 @@ pub(super) fn deliver(
     header.insert("plan".into(), plan.clone());
     header.insert("arguments".into(), arguments.clone());
     let rejected = rejections.sentence().filter(|_| rejections.are_many());
-    let warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
+    let mut warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
     header.insert("warnings".into(), json!(warnings));
     if let Some(number) = facts.made_for.frame {
         header.insert("frame".into(), number.into());
@@ -94,7 +98,8 @@ pub(super) fn deliver(
         watch.estimated(&set, &attributes);
     }
     let applied = ready.map(|ready| {
-        let account = ready.finish().apply(&mut set, |name| name == ERROR || selection.wants(name))?;
+        let mut account = ready.finish().apply(&mut set, |name| name == ERROR || selection.wants(name))?;
+        account.verdict = account.verdict.map(|verdict| Verdict { unseen: unseen.squared, ..verdict });
         Ok((ready.name(), ready.facts(&account), account))
     });
     let finishing = clock.seconds();
@@ -102,7 +107,13 @@ pub(super) fn deliver(
         Ok(finished) => (finished, None),
         Err(error) => (None, Some(error)),
     };
-    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account));
+    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account.verdict));
+    let error = of_finished.as_ref().map(Reached::error).or(of_estimate);
+    let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.rules(error)));
+    if let Some(sentence) = &unseen {
+        warnings.push(sentence);
+        header.insert("warnings".into(), json!(warnings));
+    }
     let errors = finished.as_mut().and_then(|(_, _, account)| account.errors.take());
     let worst = errors.map(|errors| {
         let squared: Vec<[f32; 3]> = errors.squared().collect();
@@ -130,8 +141,19 @@ pub(super) fn deliver(
     let finished = finished.map(|(name, _, account)| (name, account));
     let reached = of_finished;
     let (tail, spent_checkpoint) = (None, None);
-    let delivery =
-        Delivery { set, attributes, techniques, finished, reached, worst, finishing, refusal, tail, spent_checkpoint };
+    let delivery = Delivery {
+        set,
+        attributes,
+        techniques,
+        finished,
+        reached,
+        worst,
+        finishing,
+        unseen,
+        refusal,
+        tail,
+        spent_checkpoint,
+    };
     Ok((delivery, pixels))
 }
 
@@ -145,10 +167,10 @@ pub struct Reached {
 
 impl Reached {
     /// By a history and what the finish has told at its end; `None` where nothing is known.
-    fn of(mut history: Vec<History>, account: &Account) -> Option<Reached> {
+    fn of(mut history: Vec<History>, verdict: Option<Verdict>) -> Option<Reached> {
         let last = history.last_mut()?;
-        if account.verdict.is_some() {
-            last.finished = account.verdict;
+        if verdict.is_some() {
+            last.finished = verdict;
         }
         let last = *last;
         Some(Reached { accuracy: Accuracy::of(&history)?, history, last })
@@ -201,6 +223,7 @@ impl Reached {
             "interval": self.interval(),
             "confidence": CONFIDENCE,
             "rare": self.rare(),
+            "unseen": self.accuracy.squared_unseen.sqrt(),
             "bias": self.accuracy.squared_bias.sqrt(),
             "exponent": self.accuracy.exponent,
             "halving": halving,
@@ -219,15 +242,17 @@ pub fn tell_stored(header: &mut Map<String, Value>, account: &Account) {
     let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
     let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);
     let timed = number("seconds").is_some();
+    let unseen = header.get("unseen").and_then(|unseen| unseen.get("error")).and_then(Value::as_f64).unwrap_or(0.0);
+    let verdict = account.verdict.map(|verdict| Verdict { unseen: unseen * unseen, ..verdict });
     let history = History {
         seconds: number("seconds").unwrap_or(0.0),
         cpu_seconds: number("cpu_seconds").unwrap_or(0.0),
         iterations,
         light_paths: 0,
         estimate: None,
-        finished: account.verdict,
+        finished: verdict,
     };
-    if let Some(reached) = Reached::of(vec![history], account) {
+    if let Some(reached) = Reached::of(vec![history], verdict) {
         reached.tell(header, !timed);
     }
 }

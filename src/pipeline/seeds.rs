@@ -233,6 +233,18 @@ fn rejected_by(sources: &[Source]) -> Value {
     all.into()
 }
 
+/// The photons of all renders, and the least error by light that these have not brought: one render that has found it
+/// is enough. `None` where none counts photons.
+fn unseen(sources: &[Source]) -> Option<Value> {
+    let all = || sources.iter().filter_map(|source| source.header.get("unseen"));
+    let error = all().filter_map(|unseen| unseen["error"].as_f64()).reduce(f64::min)?;
+    let of_kind = |kind: &str| {
+        let sum = |key: &str| all().filter_map(|unseen| unseen[kind][key].as_u64()).sum::<u64>();
+        json!({"stored": sum("stored"), "gathered": sum("gathered")})
+    };
+    Some(json!({"indirect": of_kind("indirect"), "caustic": of_kind("caustic"), "error": error}))
+}
+
 /// The first render's header, with what all have in common done.
 fn header(sources: &[Source], total: f64) -> Value {
     let mut header: Map<String, Value> =
@@ -257,6 +269,7 @@ fn header(sources: &[Source], total: f64) -> Value {
     ] {
         header.insert(key.into(), value);
     }
+    header.extend(unseen(sources).map(|unseen| ("unseen".to_owned(), unseen)));
     let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
     let seeds: Vec<&Value> = sources.iter().map(|source| &source.header["seed"]).collect();
     header.insert("merged".into(), json!({"renders": names, "seeds": seeds, "weights": "iterations"}));

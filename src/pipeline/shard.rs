@@ -16,7 +16,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// The last bytes of a file with such a tail.
-pub const MARK: &[u8; 8] = b"caustqS2";
+pub const MARK: &[u8; 8] = b"caustqS3";
 /// The length and the mark.
 const END: i64 = 16;
 

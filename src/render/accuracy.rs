@@ -23,6 +23,9 @@ const MODEL: f64 = 0.25;
 /// Squared bias over what levels tell of it, where it grows with the bandwidth and not with its square, as it does at
 /// edges and on things narrower than the kernel: the next larger level has sqrt(2) times the bias then, not twice.
 const OF_EDGES: f64 = 5.828_427;
+/// Squared light of three photons over that of the square root of two: no more than three are expected, with a
+/// probability of 95 %, where none has come.
+const OF_THREE: f64 = 4.5;
 /// The share of pictures whose error lies in the interval.
 pub const CONFIDENCE: f64 = 0.9;
 /// Standard deviations to each side of a normal distribution that hold that share.
@@ -37,6 +40,8 @@ pub struct Accuracy {
     level: f64,
     /// Squared bias, which is taken to stay.
     pub squared_bias: f64,
+    /// Squared error by light that photons have not brought ([`Verdict::unseen`]).
+    pub squared_unseen: f64,
     /// Standard error of the logarithm of the latest squared error, of what judges add.
     doubt: f64,
     /// Share of the noise that few bright samples hold ([`Verdict::rare`]).
@@ -85,12 +90,13 @@ impl Accuracy {
         let falls: f64 = moments.iter().map(fall).sum();
         let exponent = ((falls + USUAL) / (spread + 1.0)).clamp(RANGE.0, RANGE.1);
         let level = mean(latest, &|m| m.squared + 2.0 * exponent * m.iterations);
-        Some(Accuracy { exponent, level, squared_bias: verdict.bias, doubt, rare: verdict.rare, judged: last })
+        let Verdict { bias: squared_bias, rare, unseen: squared_unseen, .. } = verdict;
+        Some(Accuracy { exponent, level, squared_bias, squared_unseen, doubt, rare, judged: last })
     }
 
     /// Relative error of the picture finished after so many iterations: the root of trimmed relMSE.
     pub fn error(&self, iterations: u64) -> f64 {
-        (self.noise(iterations) + self.squared_bias).sqrt()
+        (self.noise(iterations) + self.squared_bias + self.squared_unseen).sqrt()
     }
 
     /// Squared error of noise.
@@ -100,16 +106,18 @@ impl Accuracy {
 
     /// Between what the error lies in [`CONFIDENCE`] of all pictures. Where few bright samples hold the noise, the upper
     /// end is what the error would be with all of it: as if the pixels that were left out were as well told as others.
-    /// The bias is that of edges there.
+    /// The bias is that of edges there. Light that photons have not brought is none at the lower end, and at the upper as
+    /// much as [`OF_THREE`] says, but no more than all.
     pub fn interval(&self, iterations: u64) -> [f64; 2] {
         let factor = (DEVIATIONS * MODEL.hypot(0.5 * self.doubt)).exp();
-        let most = (self.noise(iterations) + OF_EDGES * self.squared_bias).sqrt();
-        [self.error(iterations) / factor, most * factor / (1.0 - self.rare).max(1e-4).sqrt()]
+        let (noise, bias) = (self.noise(iterations), self.squared_bias);
+        let most = (noise + OF_EDGES * bias) * factor * factor / (1.0 - self.rare).max(1e-4);
+        [(noise + bias).sqrt() / factor, (most + (OF_THREE * self.squared_unseen).min(1.0)).sqrt()]
     }
 
     /// Iterations after which the error is this small; `None` where bias forbids it for longer than can be told.
     pub fn iterations_to(&self, error: f64) -> Option<f64> {
-        let noise = error * error - self.squared_bias;
+        let noise = error * error - self.squared_bias - self.squared_unseen;
         let iterations = ((self.level - noise.ln()) / (2.0 * self.exponent)).exp();
         (noise > 0.0 && iterations.is_finite()).then_some(iterations)
     }
@@ -127,7 +135,13 @@ mod tests {
             iterations,
             light_paths: 0,
             estimate: None,
-            finished: Some(Verdict { noise: squared(iterations as f64 / 2.0), deviation: 1e-9, bias, rare: 0.0 }),
+            finished: Some(Verdict {
+                noise: squared(iterations as f64 / 2.0),
+                deviation: 1e-9,
+                bias,
+                rare: 0.0,
+                unseen: 0.0,
+            }),
         };
         judged.iter().map(moment).collect()
     }
@@ -169,11 +183,11 @@ mod tests {
             (high / sure.error(64) / model - 1.0).abs() < 1e-6
                 && (low * high / sure.error(64).powi(2) - 1.0).abs() < 1e-6
         );
-        moments[2].finished = Some(Verdict { noise: -1.0, deviation: 0.5, bias: 0.0, rare: 0.0 });
+        moments[2].finished = Some(Verdict { noise: -1.0, deviation: 0.5, bias: 0.0, rare: 0.0, unseen: 0.0 });
         let unsure = Accuracy::of(&moments).expect("four moments");
         // A weight of 1/26 for a squared error that is 350 times too large.
         assert!((unsure.error(64) / sure.error(64)).ln().abs() < 0.15, "{}", unsure.error(64) / sure.error(64));
-        moments[3].finished = Some(Verdict { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96 });
+        moments[3].finished = Some(Verdict { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96, unseen: 0.0 });
         let rare = Accuracy::of(&moments[3..]).expect("one moment");
         assert!((rare.error(32) - 1e-3).abs() < 1e-9, "{}", rare.error(32));
         let [low, high] = rare.interval(32);

@@ -18,11 +18,13 @@ use super::result::Phases;
 use super::settings::Settings;
 use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
+use super::unseen::PhotonCounts;
 use crate::camera::{Camera, GROUP};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::light::Guide;
-use crate::photon::PhotonMap;
+use crate::photon::{ByKind, PhotonMap};
+use crate::plan::{Event, EyeSuffix, Part};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::spectrum::Comb;
@@ -189,6 +191,7 @@ impl<'a> Passes<'a> {
         let map = self.photons.as_ref().map(|(_, map)| map);
         let merges = map.map_or(0, |map| map.photons().len());
         let mut rejected = map.map_or(0, PhotonMap::rejected);
+        let stored = map.map_or([0; 2], count_by_kind);
         let bandwidths: &[Pixel] = pixels;
         let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
@@ -248,12 +251,21 @@ impl<'a> Passes<'a> {
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
-        measures::add(&self.measures, (&shared.eye, i), pixels, |index| tiles.slot(index as u32), groups);
+        let gathered =
+            measures::add(&self.measures, (&shared.eye, i), pixels, |index| tiles.slot(index as u32), groups);
         if shared.strategies.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
-        Some(Work { light_paths: walked, photons: merges, rejected })
+        Some(Work { light_paths: walked, photons: merges, rejected, counts: PhotonCounts { stored, gathered } })
     }
+}
+
+/// Photons by the kind of light that a surface shows of them.
+fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
+    let sight = EyeSuffix::START.then(Event::Broad);
+    let caustics =
+        map.photons().par_iter().filter(|photon| sight.receives(photon.beam).part() == Part::Caustic).count();
+    [map.photons().len() - caustics, caustics].map(|count| count as u64)
 }
 
 /// Light paths of a pass: where nothing is merged, as many as the whole picture has pixels, of which the film may be a

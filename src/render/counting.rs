@@ -313,12 +313,12 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         // Eye paths change them; an iteration that is given up must not have.
         let before = (self.bandwidths.clone(), self.counts.clone());
         self.eye_pass(i, &maps, pixels);
-        let done = self.sppm.add(i, pixels);
-        if !done {
+        let done = self.sppm.add(i, pixels, work);
+        if done.is_none() {
             (self.bandwidths, self.counts) = before;
         }
         phases.eye += cpu_seconds() - start;
-        done.then_some(work)
+        done
     }
 
     fn state(&self) -> postcard::Result<Vec<u8>> {

@@ -2,11 +2,13 @@
 
 use super::result::Phases;
 use super::techniques::TechniquePicture;
+use super::unseen::PhotonCounts;
 use crate::estimator::Pixel;
 use crate::light::Guide;
 use crate::photon::ByKind;
 
 /// What an iteration has done.
+#[derive(Default)]
 pub(super) struct Work {
     /// Light paths walked.
     pub light_paths: u64,
@@ -14,6 +16,8 @@ pub(super) struct Work {
     pub photons: usize,
     /// Those that were left out of it and light paths that ended because they were not finite.
     pub rejected: u64,
+    /// Photons on surfaces by kind, where a method has any.
+    pub counts: PhotonCounts,
 }
 
 /// The passes of a method.

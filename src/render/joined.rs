@@ -4,6 +4,7 @@ use super::control::{History, StopReason};
 use super::error_estimate::ErrorEstimate;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Settings, Shard};
+use super::unseen::{PhotonCounts, PhotonRecord};
 use crate::estimator::{BandwidthState, Pixel};
 use crate::scene::MAX_SIZE;
 use crate::transport::MAX_LEVELS;
@@ -26,6 +27,8 @@ pub struct Part {
     pub photons: u64,
     /// Photons and light paths that were not finite.
     pub light_rejected: u64,
+    /// Photons stored and gathered.
+    pub photon_record: PhotonRecord,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Core-seconds per phase.
@@ -47,6 +50,7 @@ impl Rendered {
             light_paths: self.light_paths,
             photons: self.photons,
             light_rejected: self.light_rejected,
+            photon_record: self.photon_record,
             seconds: self.seconds,
             phases: self.phases,
             history: self.history.clone(),
@@ -56,7 +60,7 @@ impl Rendered {
 
     /// Ends the history with what the pixels tell.
     pub fn close_history(&mut self) {
-        let estimate = error_estimate(&self.pixels, &self.settings);
+        let estimate = error_estimate(&self.pixels, &self.settings).map(|error| error.with(self.unseen()));
         let Rendered { seconds, iterations, light_paths, phases: Phases { pilot, light, map, eye }, .. } = *self;
         self.history.retain(|moment| moment.iterations < iterations);
         let cpu_seconds = pilot + light + map + eye;
@@ -90,6 +94,7 @@ impl Part {
             light_paths: self.light_paths,
             photons: self.photons,
             light_rejected: self.light_rejected,
+            photon_record: self.photon_record,
             seconds: self.seconds,
             phases: self.phases,
             history: self.history,
@@ -106,7 +111,11 @@ impl Part {
         let once = last.settings.method.has_one_map();
         let of_light =
             |counts: &mut dyn Iterator<Item = u64>| if once { counts.max().unwrap_or(0) } else { counts.sum() };
+        let mut photon_record = last.photon_record;
+        photon_record.counts = PhotonCounts::default();
+        parts.iter().for_each(|part| photon_record.counts.join(&part.photon_record.counts));
         Some(Part {
+            photon_record,
             settings: Settings { shard: Shard { index: 0, count: 1 }, ..last.settings.clone() },
             iterations: parts.iter().map(|part| part.iterations).sum(),
             light_paths: of_light(&mut parts.iter().map(|part| part.light_paths)),

@@ -5,10 +5,14 @@
 use super::settings::{Levels, Settings};
 use super::tiles::TILE_PIXELS;
 use crate::estimator::Pixel;
-use crate::math::Rgb;
+use crate::math::{Rgb, is_lit};
+use crate::photon::ByKind;
 use crate::transport::{Cause, Eye, EyeMeasure, Features, FirstHit};
 use rayon::prelude::*;
 use std::mem::size_of;
+
+/// Pixels to which a task adds an iteration.
+const PIXELS_PER_TASK: usize = 1024;
 
 /// Of a measure, what all levels share.
 #[derive(Clone, Copy, Default)]
@@ -116,21 +120,30 @@ impl SomeMeasures<'_> {
 }
 
 /// Adds iteration `i`, measured by one or two eye paths, to the pixels: the measures that are kept at the pixel's `slot`,
-/// and its light by `groups`.
+/// and its light by `groups`. Returns the number of pixels to whose own image photons of each kind have brought light.
 pub(super) fn add<'g>(
     measures: &[Measures],
     (eye, i): (&Eye<'_>, u64),
     pixels: &mut [Pixel],
     slot: impl Fn(usize) -> usize + Sync,
     groups: impl Fn(usize) -> &'g [[Rgb; 2]] + Sync,
-) {
-    pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
+) -> ByKind<u64> {
+    let add = |(index, pixel): (usize, &mut Pixel)| {
         let slot = slot(index);
         let measure = measures[0].get(slot);
         pixel.see(i, || eye.seen(&measure));
         let others = measures.get(1).map(|measures| measures.get(slot));
+        let (own, level) = pixel.own_of(&measure, others.as_ref());
+        let light = [own.indirect_photons[level], own.caustic_photons[level]];
         pixel.add_with_groups(i, &measure, others.as_ref(), groups(slot));
-    });
+        light.map(|light| u64::from(is_lit(light)))
+    };
+    let all = |(part, pixels): (usize, &mut [Pixel])| {
+        let indices = part * PIXELS_PER_TASK..;
+        indices.zip(pixels).map(add).fold([0; 2], |[a, b], [c, d]| [a + c, b + d])
+    };
+    let parts: Vec<ByKind<u64>> = pixels.par_chunks_mut(PIXELS_PER_TASK).enumerate().map(all).collect();
+    parts.iter().fold([0; 2], |[a, b], [c, d]| [a + c, b + d])
 }
 
 #[inline]

@@ -374,6 +374,6 @@ impl Iterate for Metropolis<'_> {
             pixel.add(i, measure, None);
         });
         phases.eye += cpu_seconds() - started;
-        Some(Work { light_paths: u64::from(width) * u64::from(height), photons: 0, rejected })
+        Some(Work { light_paths: u64::from(width) * u64::from(height), rejected, ..Work::default() })
     }
 }

@@ -33,6 +33,7 @@ mod strategy;
 mod techniques;
 mod tiles;
 mod told;
+mod unseen;
 mod volume;
 
 pub use accuracy::{Accuracy, CONFIDENCE};
@@ -55,3 +56,4 @@ pub use state::State;
 pub use strategy::Strategy;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
 pub use told::Told;
+pub use unseen::{PhotonCounts, PhotonRecord, Unseen};

@@ -3,6 +3,7 @@
 use super::control::StopReason;
 use super::result::Rendered;
 use super::settings::Settings;
+use super::unseen::PhotonCounts;
 use crate::error::Result;
 use crate::film::{LayerSet, output};
 use crate::scene::{Scene, Survey};
@@ -74,6 +75,15 @@ impl Rendered {
             entry
         });
         put("history", history.collect());
+        if self.settings.method.has_bandwidths() {
+            let unseen = self.unseen();
+            let of_kind = |kind: usize| {
+                let PhotonCounts { stored, gathered } = self.photon_record.counts;
+                json!({"stored": stored[kind], "gathered": gathered[kind]})
+            };
+            let photons = json!({"indirect": of_kind(0), "caustic": of_kind(1), "error": unseen.squared.sqrt()});
+            put("unseen", photons);
+        }
         if let Some(threads) = threads {
             put("seconds", self.seconds.into());
             put("phases", json!(self.phases));

@@ -73,7 +73,7 @@ impl Iterate for Paths<'_> {
         };
         self.watched = watched;
         phases.eye += cpu_seconds() - start;
-        done.then_some(Work { light_paths: 0, photons: 0, rejected: 0 })
+        done.then_some(Work::default())
     }
 
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {

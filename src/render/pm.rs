@@ -184,7 +184,7 @@ impl Iterate for Pm<'_> {
         // After a pause the maps are made again, of the same paths.
         let (light_paths, rejected) =
             if std::mem::replace(&mut self.counted, true) { (0, 0) } else { (u64::from(traced), rejected) };
-        Some(Work { light_paths, photons, rejected })
+        Some(Work { light_paths, photons, rejected, ..Work::default() })
     }
 
     fn state(&self) -> postcard::Result<Vec<u8>> {

@@ -6,6 +6,7 @@ use super::measures::bytes_of_measures;
 use super::rejections::Rejections;
 use super::settings::Settings;
 use super::techniques::TechniquePicture;
+use super::unseen::{PhotonRecord, Unseen};
 use crate::estimator::{BandwidthState, Pixel, SquaredError};
 use crate::math::DVec3;
 use crate::photon::Kind;
@@ -47,6 +48,8 @@ pub struct Rendered {
     pub photons: u64,
     /// Photons and light paths that were not finite.
     pub light_rejected: u64,
+    /// Photons stored and gathered.
+    pub photon_record: PhotonRecord,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Core-seconds per phase.
@@ -83,7 +86,12 @@ impl Rendered {
     /// A pixel whose value rests on one bright sample counts with about 1, since its mean is as wrong as its variance
     /// is large: where such pixels rule the error, the estimate is too small until they have been seen several times.
     pub fn relative_error(&self) -> Option<f64> {
-        error_estimate(&self.pixels, &self.settings).map(|error| error.root())
+        error_estimate(&self.pixels, &self.settings).map(|error| error.with(self.unseen()).root())
+    }
+
+    /// Light of which hardly any photon has come.
+    pub fn unseen(&self) -> Unseen {
+        self.photon_record.unseen((&self.pixels, &self.bandwidths), &self.settings, self.light_paths)
     }
 
     /// Squared bandwidth of the last iteration of a level (from 0, the smallest) of the pixel that has this index.

@@ -9,6 +9,7 @@ use super::output;
 use super::result::{Phases, Rendered, error_estimate};
 use super::settings::{Levels, Settings};
 use super::state::{Rest, State};
+use super::unseen::{PhotonRecord, Unseen};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
@@ -71,6 +72,7 @@ pub struct Session<'a> {
     light_paths: u64,
     photons: usize,
     rejected: u64,
+    photon_record: PhotonRecord,
     history: Vec<History>,
     next_record: u64,
     /// The error after the last iteration, where it was wanted.
@@ -104,6 +106,7 @@ impl<'a> Session<'a> {
             light_paths: 0,
             photons: 0,
             rejected: 0,
+            photon_record: PhotonRecord::new(scene, settings, surroundings),
             history: Vec::new(),
             next_record: 1,
             last: None,
@@ -115,7 +118,7 @@ impl<'a> Session<'a> {
         let mut session = Session::new(stage);
         let State { pixels, rest } = state;
         let Rest { next, done, light_paths, photons, rejected, next_record, history, .. } = rest;
-        let Rest { phases, spent, pilot_seconds, passes, .. } = rest;
+        let Rest { phases, spent, pilot_seconds, passes, photon_record, .. } = rest;
         let (levels, groups) = (stage.settings.levels.count, stage.settings.light_groups(stage.scene));
         let fits = pixels.len() == session.pixels.len()
             && pixels.iter().all(|pixel| pixel.holds(levels, groups))
@@ -130,6 +133,7 @@ impl<'a> Session<'a> {
             light_paths,
             photons: photons as usize,
             rejected,
+            photon_record,
             history,
             next_record,
             ..session
@@ -147,6 +151,7 @@ impl<'a> Session<'a> {
             light_paths: self.light_paths,
             photons: self.photons as u64,
             rejected: self.rejected,
+            photon_record: self.photon_record,
             next_record: self.next_record,
             history: self.history.clone(),
             phases: self.phases,
@@ -213,11 +218,12 @@ impl<'a> Session<'a> {
 
     /// Keeps what was told of the picture finished from half of the iterations so far ([`History::finished`]).
     pub fn judged(&mut self, verdict: Option<Verdict>) {
+        let unseen = self.unseen().squared;
         if !self.records() {
             self.push(self.estimate());
         }
         if let Some(moment) = self.history.last_mut() {
-            moment.finished = verdict;
+            moment.finished = verdict.map(|verdict| Verdict { unseen, ..verdict });
         }
     }
 
@@ -238,6 +244,7 @@ impl<'a> Session<'a> {
         self.light_paths += work.light_paths;
         self.photons = work.photons;
         self.rejected += work.rejected;
+        self.photon_record.counts.join(&work.counts);
         // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
         let record = self.done >= self.next_record || Some(self.done) == self.total();
         let wanted = record || settings.target_error.is_some();
@@ -302,7 +309,13 @@ impl<'a> Session<'a> {
 
     /// Estimated error of the method's own image, see [`Rendered::relative_error`].
     pub fn estimate(&self) -> Option<ErrorEstimate> {
-        error_estimate(&self.pixels, &self.stage.settings)
+        error_estimate(&self.pixels, &self.stage.settings).map(|error| error.with(self.unseen()))
+    }
+
+    /// Light of which hardly any photon has come.
+    fn unseen(&self) -> Unseen {
+        let settings = &self.stage.settings;
+        self.photon_record.unseen((&self.pixels, &self.bandwidths()), settings, self.light_paths)
     }
 
     /// The method's own image as it is, row by row from the top.
@@ -349,6 +362,7 @@ impl<'a> Session<'a> {
             light_paths: self.light_paths,
             photons: self.photons as u64,
             light_rejected: self.rejected,
+            photon_record: self.photon_record,
             seconds: self.spent.seconds,
             phases: self.phases,
             history: self.history,

@@ -153,18 +153,19 @@ impl<'a> Sppm<'a> {
         &mut self.measures
     }
 
-    /// Adds iteration `i`, as it is measured, to the pixels; false where it was given up.
-    pub fn add(&self, i: u64, pixels: &mut [Pixel]) -> bool {
+    /// Adds iteration `i`, as it is measured, to the pixels, and the photons they have met to `work`; `None` where it was
+    /// given up.
+    pub fn add(&self, i: u64, pixels: &mut [Pixel], mut work: Work) -> Option<Work> {
         let done = !self.settings.stop.gave_up();
-        if done {
-            measures::add(&self.measures, (&self.eye, i), pixels, |index| index, |_| &[]);
-        }
-        done
+        done.then(|| {
+            work.counts.gathered = measures::add(&self.measures, (&self.eye, i), pixels, |index| index, |_| &[]);
+            work
+        })
     }
 
     /// The photons of an iteration by channel, each from a third of the light paths; `flux` is what they carry.
     pub fn channel_maps(&self, i: u64, flux: &[Option<EqualFlux>; 3], phases: &mut Phases) -> ([Maps; 3], Work) {
-        let mut work = Work { light_paths: 0, photons: 0, rejected: 0 };
+        let mut work = Work::default();
         let each = (self.settings.photons / 3).max(1);
         let Settings { seed, max_depth, .. } = *self.settings;
         let maps = std::array::from_fn(|channel| {
@@ -188,6 +189,7 @@ impl<'a> Sppm<'a> {
             work.light_paths += u64::from(each);
             work.photons += maps.len();
             work.rejected += maps.rejected();
+            work.counts.join(&maps.counts());
             maps
         });
         (maps, work)
@@ -207,7 +209,8 @@ impl<'a> Sppm<'a> {
         let maps = self.build(photons, pass.paths(), i);
         phases.light += t1 - t0;
         phases.map += cpu_seconds() - t1;
-        let work = Work { light_paths: u64::from(pass.paths()), photons: maps.len(), rejected: maps.rejected() };
+        let (photons, rejected, counts) = (maps.len(), maps.rejected(), maps.counts());
+        let work = Work { light_paths: u64::from(pass.paths()), photons, rejected, counts };
         (maps, work)
     }
 
@@ -271,8 +274,8 @@ impl Iterate for Sppm<'_> {
             KernelChoice::Epanechnikov => eye_pass(eye, settings, i, *later2, &maps, all, kernel::Epanechnikov),
             KernelChoice::Gaussian => eye_pass(eye, settings, i, *later2, &maps, all, kernel::Gaussian),
         }
-        let done = self.add(i, pixels);
+        let done = self.add(i, pixels, work);
         phases.eye += cpu_seconds() - start;
-        done.then_some(work)
+        done
     }
 }

@@ -3,6 +3,7 @@
 use super::clock::Spent;
 use super::control::History;
 use super::result::Phases;
+use super::unseen::PhotonRecord;
 use crate::estimator::Pixel;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,8 @@ pub struct Rest {
     pub(super) photons: u64,
     /// Photons and light paths that were not finite.
     pub(super) rejected: u64,
+    /// Photons stored and gathered.
+    pub(super) photon_record: PhotonRecord,
     /// Iterations done when the error is recorded next.
     pub(super) next_record: u64,
     /// Error against time.

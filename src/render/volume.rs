@@ -1,6 +1,7 @@
 //! The photons of a pass, and what media add to them: photons of their own, and bandwidths of their own.
 
 use super::settings::Settings;
+use super::unseen::PhotonCounts;
 use crate::camera::GROUP;
 use crate::estimator::{Pixel, Schedule};
 use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
@@ -25,6 +26,12 @@ impl Maps {
     pub fn len(&self) -> usize {
         let surface: usize = self.surface.iter().map(|map| map.photons().len()).sum();
         surface + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
+    }
+
+    /// Photons on surfaces, of which none has been gathered yet.
+    pub fn counts(&self) -> PhotonCounts {
+        let stored = self.surface.each_ref().map(|map| map.photons().len() as u64);
+        PhotonCounts { stored, ..PhotonCounts::default() }
     }
 
     /// Photons and light paths that were not finite.

@@ -379,6 +379,15 @@ pub fn light_path(
     Some((emitted.cell, vertices))
 }
 
+/// Flux of all lights (W), from the beginnings of light paths.
+pub fn emitted_flux(scene: &Scene, surroundings: &Surroundings) -> DVec3 {
+    const SAMPLES: u32 = 4096;
+    let pass = LightPass::new(0, 0, Domain::PilotLight, SAMPLES, u32::MAX);
+    let emitted = (0..SAMPLES).filter_map(|index| pass.emit(scene, surroundings, index));
+    // `emit` divides by the number of paths.
+    emitted.map(|emitted| emitted.start.throughput.as_dvec3()).sum()
+}
+
 /// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path
 /// would lose is the probability that it ends. So photons differ in number only, and their density alone tells where
 /// light varies \[CPPM 2020, 9.4\].
@@ -390,17 +399,11 @@ pub struct EqualFlux {
 }
 
 impl EqualFlux {
-    /// Paths drawn to tell the mean flux.
-    const SAMPLES: u32 = 4096;
-
     /// Of a channel (0 to 2): as much flux as a light path carries on average, so that paths are as many. A channel
     /// that the sample has not seen may be that of a rare light: it gets the mean of all three, for any flux above zero
     /// leaves every light what it is, in more paths or fewer. `None` where no light shines.
     pub fn new(scene: &Scene, surroundings: &Surroundings, channel: usize) -> Option<EqualFlux> {
-        let pass = LightPass::new(0, 0, Domain::PilotLight, Self::SAMPLES, u32::MAX);
-        let emitted = (0..Self::SAMPLES).filter_map(|index| pass.emit(scene, surroundings, index));
-        // `emit` divides by the number of paths.
-        let flux: DVec3 = emitted.map(|emitted| emitted.start.throughput.as_dvec3()).sum();
+        let flux = emitted_flux(scene, surroundings);
         let flux = if flux[channel] > 0.0 { flux[channel] } else { flux.element_sum() / 3.0 };
         (flux > 0.0).then_some(EqualFlux { channel, flux: flux as f32 })
     }

@@ -41,7 +41,7 @@ pub use gather::Scratch;
 pub use glow::Glow;
 pub use interior::{Crossing, Interior};
 pub use lengths::Lengths;
-pub use light::{Emitted, EqualFlux, LightPass, Photons, light_path};
+pub use light::{Emitted, EqualFlux, LightPass, Photons, emitted_flux, light_path};
 pub use light_vertex::{LightVertex, Scatterer};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;

@@ -32,3 +32,4 @@ mod progressive;
 mod shadow_rays;
 mod stability;
 mod stopping;
+mod unseen;

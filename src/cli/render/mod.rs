@@ -32,7 +32,7 @@ use caustique::stop::Stop;
 use preview::Preview;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-pub use summary::{Summary, place, tell_finish, tell_picture};
+pub use summary::{Summary, place, tell_finish, tell_picture, tell_unseen};
 
 /// A render of so many seconds is not to be lost while its picture is finished.
 const WORTH_KEEPING: f64 = 60.0;
@@ -233,6 +233,7 @@ impl Telling<'_> {
             say(&format!("warning: {}: the picture is black: {reason_if_black}", args.output.display()));
         }
         summary.tell_full();
+        tell_unseen(&args.output, &delivery);
         summary.tell_rejected(&args.output, talk);
         written?;
         described?;

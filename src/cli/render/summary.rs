@@ -160,6 +160,13 @@ pub fn tell_finish(name: &str, delivery: &Delivery, told: Told) {
     }
 }
 
+/// A warning of light that photons have hardly brought, if that is most of the error.
+pub fn tell_unseen(output: &Path, delivery: &Delivery) {
+    if let Some(unseen) = &delivery.unseen {
+        say(&format!("warning: {}: {unseen}", output.display()));
+    }
+}
+
 /// `caustics at 'Lamp' (Glass): 61 %`.
 pub fn place(place: &Place) -> String {
     let Place { share, object, material, light } = place;

@@ -61,7 +61,7 @@ const UNSAID: [(&str, &[&str]); 6] = [
         "tests/python/usd_render.py says it, by a variable of the environment",
         &["{} is no number of seconds", "give a whole number from 1 to 2000000, or none"],
     ),
-    ("they are no messages", &["caustique checkpoint 3n", "caustique checkpoint ", "not said", "default material"]),
+    ("they are no messages", &["caustique checkpoint 4n", "caustique checkpoint ", "not said", "default material"]),
 ];
 
 /// The files of the loaders.

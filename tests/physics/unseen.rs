@@ -1,0 +1,140 @@
+//! Errors of pictures to which photons have hardly come: fixed seeds, known answers.
+
+use crate::support;
+
+use caustique::estimator::{InitialBandwidth, Pixel};
+use caustique::finish::{Denoiser, Finish};
+use caustique::math::{DVec3, Vec3};
+use caustique::render::{Accuracy, Levels, Method, Part, Rendered, Session, Settings, Shard, Stage, StopReason};
+use caustique::scene::{Description, Scene};
+use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, point_light, quad, sphere, square};
+
+const SIZE: u32 = 16;
+const ITERATIONS: u64 = 16;
+
+/// A dial under a pane, and 0.3 mm of it in the picture. Half of its light comes from a point lamp beside it, the other
+/// half from one above the pane, which photons alone bring.
+fn dial() -> Scene {
+    let mut description = Description::default();
+    let dial = quad(Vec3::new(-0.5, 0.0, 0.5), Vec3::X, -Vec3::Z);
+    add(&mut description, "dial", dial, matte(0.6, 0.0));
+    let pane = cuboid(Vec3::new(-0.6, 0.05, -0.6), Vec3::new(0.6, 0.052, 0.6), false);
+    add(&mut description, "pane", pane, glass(1.5));
+    description.lights.push(point_light(DVec3::new(0.1, 0.03, 0.0), 1.0));
+    description.lights.push(point_light(DVec3::new(0.0, 0.5, 0.0), 7.2));
+    description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.02), DVec3::ZERO, 0.057));
+    build(description)
+}
+
+/// A lamp in a room, and a ball of glass.
+fn room() -> Scene {
+    let mut description = lit_room(matte(0.6, 0.0));
+    add(&mut description, "ball", sphere(Vec3::new(0.0, 0.5, 0.3), 0.4, 32), glass(1.5));
+    build(description)
+}
+
+fn settings(method: Method, initial: InitialBandwidth) -> Settings {
+    let levels = if method.has_levels() { Levels::new(5) } else { Levels::new(1) };
+    Settings { method, levels, initial, photons: 4000, seed: 1, iterations: Some(ITERATIONS), ..Settings::default() }
+}
+
+/// A render, and what its end has told of the finished picture.
+fn rendered(scene: &Scene, settings: &Settings) -> (Rendered, Accuracy) {
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    let stage = Stage::new(scene, &camera, settings);
+    let mut session = Session::new(&stage);
+    while !session.finished() {
+        session.step();
+    }
+    let set = session.layers(|_| true).expect("all layers");
+    let verdict = Finish::new(Denoiser::Own, None).verdict(&set).expect("our own denoiser does not fail");
+    session.judged(verdict);
+    let accuracy = Accuracy::of(session.history()).expect("there is noise");
+    (session.finish(StopReason::Iterations), accuracy)
+}
+
+fn mean(rendered: &Rendered) -> f64 {
+    let own = rendered.settings.levels.own();
+    let sum: DVec3 = rendered.pixels.iter().map(|pixel| pixel.mean(own)).sum();
+    sum.y / rendered.pixels.len() as f64
+}
+
+/// Kernels of a footprint, and of 10 um, meet no photon: half of the light is missing. The interval holds that half, and
+/// the sentence names it. A planted fault, counts that say that photons have come, tells less than a fifth.
+#[test]
+fn light_that_no_photon_has_brought_is_in_the_interval() {
+    let scene = dial();
+    let wide = settings(Method::Sppm, InitialBandwidth::Fixed(0.05));
+    let truth = mean(&rendered(&scene, &wide).0);
+    let small = InitialBandwidth::Fixed(1e-5);
+    for (method, initial) in [
+        (Method::Vcm, InitialBandwidth::Footprint),
+        (Method::Sppm, small),
+        (Method::Appm, small),
+        (Method::Cppm, small),
+    ] {
+        let (picture, accuracy) = rendered(&scene, &settings(method, initial));
+        let error = 1.0 - mean(&picture) / truth;
+        assert!((error - 0.5).abs() < 0.1, "{method:?} is off by {error}");
+        let [low, high] = accuracy.interval(ITERATIONS);
+        let told = accuracy.error(ITERATIONS);
+        println!("{method:?}: off by {error:.3}, told {told:.3} ({low:.3} to {high:.3})");
+        assert!((low..high).contains(&error) && (0.5..2.0).contains(&(told / error)), "{method:?}: {low} to {high}");
+        let sentence = picture.unseen().sentence(&picture.settings).expect("light is expected");
+        assert!(sentence.starts_with("no photon of caustics has reached the picture ("), "{sentence}");
+        assert!(picture.relative_error().expect("light is seen") > 0.5);
+        let mut faulty = picture;
+        faulty.photon_record.counts.gathered = [1 << 20; 2];
+        assert!(faulty.unseen().squared.sqrt() < 0.2 * error);
+    }
+}
+
+/// With kernels that find photons next to nothing is added to the error of a room. It is not most of that of the dial,
+/// to which some ten photons have come.
+#[test]
+fn errors_are_as_they_were_where_photons_come() {
+    let nearest = InitialBandwidth::Nearest(20);
+    for method in [Method::Sppm, Method::Vcm, Method::Cppm] {
+        let (picture, accuracy) = rendered(&room(), &settings(method, nearest));
+        let (unseen, told) = (picture.unseen(), accuracy.error(ITERATIONS));
+        let without = (told * told - unseen.squared).sqrt();
+        println!("{method:?}: {:.5} of {told:.4}, {:?}", unseen.squared.sqrt(), picture.photon_record.counts);
+        assert!(told / without - 1.0 < 0.001 && !unseen.rules(told), "{method:?}: {told} {without}");
+    }
+    let (picture, accuracy) = rendered(&dial(), &settings(Method::Sppm, nearest));
+    assert!(!picture.unseen().rules(accuracy.error(ITERATIONS)));
+}
+
+/// Counts of shards, and of a render that was interrupted, are those of the whole.
+#[test]
+fn counts_join() {
+    let scene = room();
+    let camera = scene.camera(&square(SIZE)).expect("a camera");
+    for method in [Method::Sppm, Method::Vcm] {
+        let settings = settings(method, InitialBandwidth::Fixed(0.02));
+        let (whole, _) = rendered(&scene, &settings);
+        let shards = [0, 1, 2]
+            .map(|index| rendered(&scene, &Settings { shard: Shard { index, count: 3 }, ..settings.clone() }).0);
+        let parts: Vec<Part> = shards.iter().map(Rendered::part).collect();
+        let mut pixels: Vec<Pixel> = shards[0].pixels.clone();
+        for shard in &shards[1..] {
+            pixels.iter_mut().zip(&shard.pixels).for_each(|(own, other)| own.join(other.clone()));
+        }
+        let joined = Part::join(&parts).expect("there are shards").rendered(pixels);
+        assert_eq!(joined.photon_record, whole.photon_record, "{method:?}");
+        assert_eq!(joined.unseen(), whole.unseen(), "{method:?}");
+        assert_ne!(shards[0].photon_record, whole.photon_record);
+        let stage = Stage::new(&scene, &camera, &settings);
+        let mut session = Session::new(&stage);
+        for _ in 0..ITERATIONS / 2 {
+            session.step();
+        }
+        let bytes = postcard::to_allocvec(&session.state().expect("a state")).expect("bytes");
+        let state = postcard::from_bytes(&bytes).expect("a state");
+        let mut session = Session::resume(&stage, state).expect("its own state");
+        while !session.finished() {
+            session.step();
+        }
+        assert_eq!(session.finish(StopReason::Iterations).photon_record, whole.photon_record, "{method:?}");
+    }
+}
