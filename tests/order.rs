@@ -1,5 +1,6 @@
 //! The order of modules in `src/lib.rs`, and habits that no file may leave.
 
+use caustique::render::Method;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -232,4 +233,55 @@ fn the_scan_finds_planted_faults() {
         forbidden("// never .unwrap()\nfn f() {}\n#[cfg(test)]\nmod tests { fn t() { x.unwrap() } }"),
         [] as [&str; 0]
     );
+}
+
+/// Files that name methods: the table of methods and their passes, what auto chooses from, and defaults of comparisons.
+const NAMES_METHODS: [&str; 10] = [
+    "src/render/method.rs",
+    "src/render/choice.rs",
+    "src/render/strategy.rs",
+    "src/render/auto/pilot.rs",
+    "src/report/guests.rs",
+    "src/cli/converge/reference.rs",
+    "src/cli/converge/runs.rs",
+    "ffi/python/src/converge.rs",
+    "src/cli/render/job.rs",
+    "ffi/python/src/job.rs",
+];
+
+/// The methods that shipped lines of a file name one by one.
+fn named_methods(text: &str) -> Vec<&'static str> {
+    let code = shipped(text);
+    let variant = |name: &str| format!("Method::{}{}", name[..1].to_uppercase(), &name[1..]);
+    let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let names = |variant: &str| code.match_indices(variant).any(|(at, _)| ends(&code[at + variant.len()..]));
+    let mut found: Vec<&str> = Method::ALL.iter().map(|method| method.name()).filter(|n| names(&variant(n))).collect();
+    if code.contains("Method as ") || code.contains("Method::*") {
+        found.push("another name for Method");
+    }
+    found
+}
+
+/// A method is its pass and one row of a table: other files ask the row, so that a new method does not touch them.
+#[test]
+fn only_the_table_and_choices_name_methods() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut faults = Vec::new();
+    for file in files("src").into_iter().chain(files("ffi")) {
+        let path = file.strip_prefix(root).expect("it is below the root").to_string_lossy().replace('\\', "/");
+        let named = named_methods(&fs::read_to_string(&file).expect("it can be read"));
+        if !named.is_empty() && !NAMES_METHODS.contains(&path.as_str()) && !path.contains("/tests") {
+            faults.push(format!("{path}: {}", named.join(", ")));
+        }
+    }
+    assert!(faults.is_empty(), "ask the method's row in src/render/method.rs instead:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn the_scan_for_methods_finds_planted_faults() {
+    assert_eq!(named_methods("match m { render::Method::Pm | Method::Vcm => 1 }"), ["pm", "vcm"]);
+    assert_eq!(named_methods("use render::Method as M;"), ["another name for Method"]);
+    let allowed =
+        "// Method::Pm\nlet all = Method::ALL; let other = Method::Pmx;\n#[cfg(test)]\nmod tests { Method::Pm }";
+    assert_eq!(named_methods(allowed), [] as [&str; 0]);
 }
