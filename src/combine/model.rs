@@ -25,7 +25,8 @@ impl Model {
     /// [`Kind::Io`] when the file cannot be read. What it holds is checked by [`Combiner::new`](super::Combiner::new).
     pub fn from_file(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|cause| {
-            Error::io(path, &cause).hint("--model takes compact, or an ONNX file made by scripts/lab/train/export_network.py")
+            Error::io(path, &cause)
+                .hint("--model takes compact, or an ONNX file made by scripts/lab/train/export_network.py")
         })?;
         Ok(Model { name: path.display().to_string(), bytes: Cow::Owned(bytes) })
     }
