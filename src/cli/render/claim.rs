@@ -6,6 +6,8 @@
 
 use caustique::error::{Error, Result};
 use caustique::image::atomic;
+use rustix::io::Errno;
+use rustix::process::{Pid, test_kill_process};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileExt, MetadataExt};
@@ -141,8 +143,13 @@ fn age(path: &Path, touched: SystemTime) -> io::Result<Duration> {
 fn is_dead(holder: &str, age: Duration) -> bool {
     let mut lines = holder.split('\n').skip(1);
     let of_here = lines.next() == Some(machine().as_str());
-    let process = lines.next().filter(|_| of_here && cfg!(target_os = "linux"));
-    age > DEAD || process.is_some_and(|process| !Path::new("/proc").join(process).exists())
+    age > DEAD || lines.next().filter(|_| of_here).is_some_and(is_gone)
+}
+
+/// Whether there is no process of a number. One that may not be signalled is there, though `/proc` may hide it.
+fn is_gone(process: &str) -> bool {
+    let process = process.parse().ok().filter(|process| *process > 0).and_then(Pid::from_raw);
+    process.is_some_and(|process| test_kill_process(process) == Err(Errno::SRCH))
 }
 
 /// Removes a claim whose owner has died. Of several that do so at once the lock lets one after the other look whether
@@ -229,6 +236,13 @@ mod tests {
         drop(Claim { path: path.clone(), owner: elsewhere.into(), over: None, toucher: None });
         assert!(path.exists());
         assert_eq!(fs::read_dir(folder.path()).expect("it can be read").count(), 1);
+    }
+
+    /// Processes that are there are alive, also those of others; what is no number tells nothing.
+    #[test]
+    fn processes_of_others_are_alive() {
+        let own = std::process::id().to_string();
+        assert_eq!(["1", &own, "0", "-1", "x", "4194999"].map(is_gone), [false, false, false, false, false, true]);
     }
 
     /// A touch is a new time.
