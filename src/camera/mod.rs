@@ -180,6 +180,11 @@ impl Camera {
         [self.whole.size, self.whole.at]
     }
 
+    /// Width and height in pixels, of the film and of the whole picture.
+    pub fn sizes(&self) -> [(u32, u32); 2] {
+        [self.size(), self.whole.size]
+    }
+
     /// Number of pixels of the whole picture, each as large as one of this film.
     pub fn whole_pixels(&self) -> f32 {
         self.whole.film.x * self.whole.film.y

@@ -2,7 +2,7 @@
 //! once, with as much work for a pixel.
 
 use crate::camera::Camera;
-use crate::render::auto::small;
+use crate::render::auto::{small, window_factor};
 use crate::render::{Session, Settings, Stage};
 use crate::scene::Scene;
 
@@ -27,14 +27,17 @@ pub(super) fn warn((scene, camera): (&Scene, &Camera), settings: &Settings) -> O
     })
 }
 
-/// About how long an iteration takes.
+/// About how long an iteration takes. The smaller picture is no window: the light paths around one are counted.
 fn seconds((scene, camera): (&Scene, &Camera), settings: &Settings) -> Option<f64> {
-    let pixels = |camera: &Camera| f64::from(camera.size().0) * f64::from(camera.size().1);
-    let pilot = camera.smaller((PIXELS / pixels(camera)).min(SHARE).sqrt());
+    let count = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
+    let pixels = |camera: &Camera| count(camera.size());
+    let walked = camera.sizes().map(count)[usize::from(settings.method.walks_whole_picture())];
+    let pilot = camera.smaller((PIXELS.min(SHARE * walked) / pixels(camera)).sqrt());
     let share = pixels(&pilot) / pixels(camera);
+    let factor = window_factor(scene, camera, settings);
     let settings = Settings { guided: false, ..small(settings, share) };
     let stage = Stage::new(scene, &pilot, &settings);
     let mut session = Session::new(&stage);
     let before = session.spent().seconds;
-    session.step_within(None).then(|| (session.spent().seconds - before) / share)
+    session.step_within(None).then(|| factor * (session.spent().seconds - before) / share)
 }

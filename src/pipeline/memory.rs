@@ -8,9 +8,13 @@ use crate::film;
 use crate::finish::{BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
 use crate::memory;
 use crate::photon;
-use crate::render::{BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, bytes_of_measures, photons_per_path};
+use crate::plan::Search;
+use crate::render::{
+    BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, WHOLE_TILE, bytes_of_measures, bytes_per_whole_tile,
+    photons_per_path,
+};
 use crate::scene::Scene;
-use crate::transport::MergePhoton;
+use crate::transport::{MergePhoton, Splat};
 use std::fmt::Display;
 use std::mem::size_of;
 
@@ -18,12 +22,15 @@ use std::mem::size_of;
 /// beside the map of the last one.
 const MERGED_BYTES: u64 = 5 * size_of::<MergePhoton>() as u64 + 32;
 
+/// Bytes per vertex of a light path that sends light to the film: lists grow to twice what they hold, and are sorted.
+const SPLAT_BYTES: u64 = 2 * size_of::<Splat>() as u64 + 8;
+
 /// Bytes per pixel of a technique's weighted and unweighted picture.
 const PER_TECHNIQUE: u64 = 24;
 
 /// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
 fn needed(
-    (width, height): (u32, u32),
+    [(width, height), whole]: [(u32, u32); 2],
     (channels, groups): (usize, usize),
     settings: &Settings,
     per_light_path: f64,
@@ -38,6 +45,11 @@ fn needed(
         (false, true) => ((light_paths * per_light_path * MERGED_BYTES as f64) as u64, 0),
         (false, false) => (0, 0),
     };
+    // As many of the whole picture's light paths reach a window as have its pixels.
+    let connects = method.walks_whole_picture() || method.search() == Search::ConnectionsAndMerging;
+    let splats = if connects { (light_paths * per_light_path * SPLAT_BYTES as f64) as u64 } else { 0 };
+    let [across, down] = [whole.0, whole.1].map(|side| u64::from(side.div_ceil(WHOLE_TILE)));
+    let tiles = if method.walks_whole_picture() { across * down * bytes_per_whole_tile() } else { 0 };
     // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
     let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
     // Bandwidths of their own, and counts.
@@ -58,8 +70,9 @@ fn needed(
         + pictures
         + (Pixel::bytes(settings.levels.count, groups) + bytes_of_measures(settings)) as u64
         + (channels * size_of::<f32>()) as u64
-        + merged;
-    pixels * per_pixel + photons
+        + merged
+        + splats;
+    pixels * per_pixel + photons + tiles
 }
 
 /// What a finish takes whatever the picture: the library of the denoiser and its network. A bound found by lowering
@@ -98,17 +111,17 @@ impl Cap {
     ) -> Result<(Settings, Option<String>)> {
         let planes = (channels, scene.lights.groups().names.len());
         let per_light_path = photons_per_path(scene, camera, &settings);
-        self.keep(camera.size(), settings, planes, per_light_path)
+        self.keep(camera.sizes(), settings, planes, per_light_path)
     }
 
     fn keep(
         self,
-        size: (u32, u32),
+        sizes: [(u32, u32); 2],
         settings: Settings,
         planes: (usize, usize),
         per_light_path: f64,
     ) -> Result<(Settings, Option<String>)> {
-        let needs = |settings: &Settings| needed(size, planes, settings, per_light_path);
+        let needs = |settings: &Settings| needed(sizes, planes, settings, per_light_path);
         let whole = needs(&settings);
         if whole <= self.bytes {
             return Ok((settings, None));
@@ -121,8 +134,8 @@ impl Cap {
             let least = if settings.method.counts_photons() { pixels + least } else { whole };
             let cause = format!(
                 "{} x {} pixels with --method {} need {} MiB at least, and --memory allows {mib}",
-                size.0,
-                size.1,
+                sizes[0].0,
+                sizes[0].1,
                 settings.method.name(),
                 least.div_ceil(1 << 20)
             );
@@ -151,7 +164,7 @@ impl Cap {
 pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize, finishes: bool) -> Result<()> {
     let size = stage.1.size();
     let groups = stage.0.lights.groups().names.len();
-    let needed = needed(size, (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
+    let needed = needed(stage.1.sizes(), (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
     let needed = needed + if finishes { finish_bytes(size, groups) } else { 0 };
     let paths = if settings.method.counts_photons() {
         let each = if settings.method.has_one_map() { "" } else { " an iteration" };
@@ -177,9 +190,10 @@ const COMBINED_CHANNELS: usize = 37;
 /// They need more memory than there is.
 pub fn check_all<'a>(stage: (&Scene, &Camera), all: impl Iterator<Item = &'a Settings>) -> Result<()> {
     let (scene, camera) = stage;
-    let (width, height) = camera.size();
-    let each =
-        |settings| needed((width, height), (COMBINED_CHANNELS, 0), settings, photons_per_path(scene, camera, settings));
+    let [(width, height), whole] = camera.sizes();
+    let each = |settings| {
+        needed([(width, height), whole], (COMBINED_CHANNELS, 0), settings, photons_per_path(scene, camera, settings))
+    };
     refuse(all.map(each).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
 }
 
@@ -206,22 +220,37 @@ mod tests {
     fn the_largest_picture_does_not_overflow() {
         let none = Settings { photons: 0, ..Settings::default() };
         let some = Settings { photons: 1000, ..Settings::default() };
-        let one = needed((1, 1), (93, 0), &none, 2.5);
+        let one = needed([(1, 1); 2], (93, 0), &none, 2.5);
         assert!(one > 93 * 4);
-        assert_eq!(needed((1 << 16, 1 << 16), (93, 0), &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
+        assert_eq!(needed([(1 << 16, 1 << 16); 2], (93, 0), &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
         let merged = Settings { method: Method::Vcm, ..none };
-        assert!(needed((1, 1), (93, 0), &merged, 2.5) > one);
+        assert!(needed([(1, 1); 2], (93, 0), &merged, 2.5) > one);
+    }
+
+    /// Of a window, the methods that walk the light paths of the whole picture keep lists for all its tiles.
+    #[test]
+    fn windows_are_counted_with_their_whole_picture() {
+        let bytes = |method: Method, whole: u32| {
+            let settings = Settings { method, photons: 1000, ..Settings::default() };
+            needed([(64, 64), (whole, whole)], (93, 0), &settings, 2.5)
+        };
+        for method in [Method::Light, Method::Bdpt] {
+            assert_eq!(bytes(method, 1 << 14) - bytes(method, 64), ((1 << 20) - 16) * bytes_per_whole_tile());
+        }
+        for method in [Method::Path, Method::Sppm, Method::Vcm] {
+            assert_eq!(bytes(method, 1 << 14), bytes(method, 64));
+        }
     }
 
     /// What is planned under a cap needs no more than it, and little less; what cannot be is refused with what it takes.
     #[test]
     fn plans_keep_to_their_cap() {
-        let size = (64, 64);
-        let plan = |bytes, settings: &Settings| Cap { bytes }.keep(size, settings.clone(), (93, 0), 2.5);
+        let sizes = [(64, 64); 2];
+        let plan = |bytes, settings: &Settings| Cap { bytes }.keep(sizes, settings.clone(), (93, 0), 2.5);
         for method in [Method::Sppm, Method::Cppm, Method::Pm, Method::Vcm] {
             let photon_memory = u64::MAX;
             let asked = Settings { method, photons: 5_000_000, photon_memory, ..Settings::default() };
-            let needs = |settings: &Settings| needed(size, (93, 0), settings, 2.5);
+            let needs = |settings: &Settings| needed(sizes, (93, 0), settings, 2.5);
             let whole = needs(&asked);
             let (kept, told) = plan(whole, &asked).expect("it fits");
             assert_eq!((kept.photons, kept.photon_memory, told), (asked.photons, photon_memory, None));

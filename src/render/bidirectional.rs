@@ -275,6 +275,11 @@ fn light_paths(camera: &Camera, strategies: Strategies) -> u32 {
     width * height
 }
 
+/// Bytes kept for a tile of the whole picture whose light paths are walked, without what these send.
+pub fn bytes_per_whole_tile() -> u64 {
+    (size_of::<WholeTile>() + size_of::<Deposits>()) as u64
+}
+
 /// Splats by the tile that they go to, each tile's in the order of the tiles that have left them: whoever adds them, the
 /// sums are the same.
 struct SplatsByTile<'l> {

@@ -88,7 +88,17 @@ impl Cost {
         Cost { lengths, survey: scene.survey, factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
     }
 
-    /// Core-seconds of an iteration of a picture of so many pixels.
+    /// Core-seconds of an iteration of the camera's film: of a window, with the light paths of the whole picture.
+    pub fn of_film(&self, way: Strategy, settings: &Settings, camera: &Camera) -> f64 {
+        let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
+        let beyond = if way.method.walks_whole_picture() { whole - film } else { 0.0 };
+        let Lengths { light, light_media, textured, .. } = self.lengths;
+        let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
+        let path = start + light * TWO_WAY_VERTEX * (1.0 + TEXTURED * textured) + light_media * TWO_WAY_MEDIUM;
+        self.of(way, settings, film) + beyond * path * self.factor
+    }
+
+    /// Core-seconds of an iteration of a picture of so many pixels, which is no window of another.
     pub fn of(&self, way: Strategy, settings: &Settings, pixels: f64) -> f64 {
         let Lengths { eye, eye_to_broad, light, light_to_broad, merged, textured, .. } = self.lengths;
         let Lengths { eye_media, light_media, on_the_way, eye_open, light_open, .. } = self.lengths;

@@ -290,6 +290,11 @@ impl Method {
         self.row().has_fixed_points
     }
 
+    /// Whether it walks the light paths of the whole picture to render a window of it: they all may send light there.
+    pub fn walks_whole_picture(self) -> bool {
+        matches!(self.search(), Search::LightPaths | Search::Connections) && !self.has_chains()
+    }
+
     /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have
     /// one for every eye path, or none.
     pub fn counts_photons(self) -> bool {

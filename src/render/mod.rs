@@ -37,6 +37,7 @@ mod unseen;
 mod volume;
 
 pub use accuracy::{Accuracy, CONFIDENCE};
+pub use bidirectional::bytes_per_whole_tile;
 pub use clock::{Clock, Spent, cpu_seconds, peak_memory};
 pub use control::{Control, History, Progress, StopReason};
 pub use drive::{LEAST, drive, render};
@@ -55,5 +56,6 @@ pub use settings::{
 pub use state::State;
 pub use strategy::Strategy;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
+pub use tiles::TILE as WHOLE_TILE;
 pub use told::Told;
 pub use unseen::{PhotonCounts, PhotonRecord, Unseen};

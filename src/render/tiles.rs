@@ -3,7 +3,7 @@
 use crate::camera::{Camera, GROUP, Place};
 
 /// Width and height of a tile in pixels.
-const TILE: u32 = 16;
+pub const TILE: u32 = 16;
 /// Pixels of a tile.
 pub(super) const TILE_PIXELS: usize = (TILE * TILE) as usize;
 

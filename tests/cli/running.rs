@@ -154,6 +154,27 @@ fn signals_end_an_iteration_in_its_midst() {
     assert_eq!(folder.files(), [""; 0]);
 }
 
+/// The light paths of the whole picture count, of which a window shows a part.
+#[test]
+fn a_window_of_a_huge_picture_takes_long() {
+    let folder = Folder::new();
+    let render = "render scene.glb -o out.exr --width 16000 --height 16000 --crop 8000,8000,16,16 --time 1 --no-combine --progress plain";
+    for (method, warns) in [("bdpt", true), ("light", true), ("path", false)] {
+        let mut command = folder.command(&format!("{render} --method {method}"));
+        let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+        let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
+        let mut text = String::new();
+        while !text.contains("one iteration takes about ")
+            && lines.read_line(&mut text).expect("stderr can be read") > 0
+        {}
+        if warns {
+            signal(&child, "-TERM");
+        }
+        child.wait().expect("the program ends");
+        assert_eq!(text.contains("one iteration takes about "), warns, "{method}: {text}");
+    }
+}
+
 /// What takes long says so: the pilot and, of this scene, which comes through a pipe, the reading.
 #[test]
 fn waits_are_explained() {

@@ -75,15 +75,25 @@ pub fn choose(
     let settings = make(way)?;
     let saving = |weighed: Weighed| weighed.saving(&pilot.cost, way, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
-    let seconds_per_iteration = pilot.cost.of(way, &settings, pilot.pixels);
+    let seconds_per_iteration = pilot.cost.of_film(way, &settings, camera);
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
     Some(Choice { settings, way, trials, weights, because, seconds_per_iteration, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.
 pub fn counted_cost(scene: &Scene, camera: &Camera, way: Strategy, settings: &Settings) -> f64 {
-    let (width, height) = camera.size();
     let stage = Stage::new(scene, camera, settings);
     let session = Session::new(&stage);
-    Cost::count(scene, camera, settings, session.guide()).of(way, settings, f64::from(width) * f64::from(height))
+    Cost::count(scene, camera, settings, session.guide()).of_film(way, settings, camera)
+}
+
+/// What an iteration of a film costs, by counted work, over what it would cost if the film were the whole picture.
+pub fn window_factor(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
+    let [film, whole] = camera.sizes();
+    if film == whole || !settings.method.walks_whole_picture() {
+        return 1.0;
+    }
+    let way = Strategy::plain(settings.method);
+    let cost = Cost::count(scene, camera, settings, None);
+    cost.of_film(way, settings, camera) / cost.of(way, settings, f64::from(film.0) * f64::from(film.1))
 }

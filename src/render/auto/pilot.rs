@@ -124,7 +124,7 @@ impl<'a> Pilot<'a> {
         make: &impl Fn(Strategy) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
-        let Pilot { scene, cost, pixels, budget, .. } = *self;
+        let Pilot { scene, camera, cost, pixels, budget, .. } = *self;
         let (ways, focuses) = (ways(scene, make), !focused(scene).is_empty());
         if ways.len() < 2 {
             let why = match ways.first() {
@@ -153,7 +153,7 @@ impl<'a> Pilot<'a> {
             .iter()
             .zip(&ways)
             .map(|(stage, (way, settings))| {
-                let costs = [cost.of(*way, stage.settings(), few), cost.of(*way, settings, pixels)];
+                let costs = [cost.of(*way, stage.settings(), few), cost.of_film(*way, settings, camera)];
                 Candidate::new(stage, *way, costs)
             })
             .collect();
