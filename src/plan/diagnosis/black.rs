@@ -3,11 +3,20 @@
 use super::super::{Asked, EffectPlan};
 use super::rays;
 use crate::camera::Camera;
+use crate::light::Emitter;
 use crate::math::Vec2;
 use crate::scene::Scene;
 
 /// Camera rays along each edge of the picture.
-const EDGE: u32 = 16;
+const EDGE: u32 = 32;
+
+/// The camera looks past the scene, and nothing shines from behind it.
+pub(super) fn nothing_seen(scene: &Scene, camera: &Camera) -> Option<String> {
+    let shows_more = scene.survey.scattering || scene.lights.emitters().iter().any(Emitter::is_infinite);
+    (!shows_more && !sees_anything(scene, camera)).then(|| {
+        "the camera sees no surface, so the picture will be black; look at its place and direction, or choose another with --camera".into()
+    })
+}
 
 /// The likeliest reason, and a remedy, should the whole picture be black; empty without any light, which is told when the
 /// scene is built. `warned`: something looks like a mistake.

@@ -7,6 +7,7 @@ use crate::light::Receiver;
 use crate::material::{Alpha, Material, WIDEST_ROUGHNESS};
 use crate::math::{Vec2, Vec3};
 use crate::scene::Scene;
+use crate::stat::median;
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,6 +25,9 @@ const SAMPLES: u32 = 64;
 const EMITTED: u32 = 1 << 14;
 /// Bodies that fade less may be meant to.
 const MOST_ALPHA: f32 = 0.75;
+/// Share of a body that fades, at least, and faces on which that is looked up.
+const MOST_OF_BODY: f32 = 0.9;
+const FACES: usize = 256;
 
 fn is_glass(material: &Material) -> bool {
     material.transmission >= 0.5 && material.ior != 1.0
@@ -79,27 +83,45 @@ pub(super) fn wide(scene: &Scene) -> Vec<String> {
 
 /// Smooth closed bodies that fade by alpha, as old models have it for glass: a veil of that share, and no lens.
 pub(super) fn faded(scene: &Scene) -> Vec<String> {
-    let meshes = &scene.shapes.meshes;
-    let meant_glass = |instance: &&Instance| {
-        let material = &scene.materials.list[instance.material as usize];
-        let fades = material.alpha == Alpha::Blend && (0.0..=MOST_ALPHA).contains(&material.base_color[3]);
+    let materials = &scene.materials.list;
+    let mut alphas: BTreeMap<u32, f32> = BTreeMap::new();
+    let mut named = Vec::new();
+    for (index, instance) in scene.shapes.instances.iter().enumerate() {
+        let material = &materials[instance.material as usize];
         let smooth = material.metallic < 0.5 && material.roughness < WIDEST_ROUGHNESS && !material.unlit;
-        let body = || {
-            let mesh = &meshes[instance.mesh as usize];
-            mesh.closed && !is_flat(mesh)
-        };
-        fades && smooth && material.base_color[3] > 0.0 && material.transmission < 0.5 && body()
-    };
-    let instances = scene.shapes.instances.iter().filter(meant_glass);
-    let worn = worn(&scene.materials.list, instances.map(|i| (i.material, i.name.as_str())));
-    let tell = |worn: &Worn| {
+        if material.alpha != Alpha::Blend || !smooth || material.transmission >= 0.5 {
+            continue;
+        }
+        if let Some(alpha) = alpha_of_body(scene, index as u32) {
+            alphas.entry(instance.material).or_insert(alpha);
+            named.push((instance.material, instance.name.as_str()));
+        }
+    }
+    let tell = |(worn, alpha): (&Worn, f32)| {
         format!(
             "{}: its alpha of {} lets light through straight, so it bends no light and casts no caustic; if it is glass, give it transmission 1 and alpha 1",
             worn.label(),
-            worn.material.base_color[3]
+            (100.0 * alpha).round() / 100.0
         )
     };
-    worn.iter().map(tell).collect()
+    // In the order of materials, both of them.
+    worn(materials, named.into_iter()).iter().zip(alphas.into_values()).map(tell).collect()
+}
+
+/// The alpha of a closed body which fades all over; that of a texture is looked up on faces spread over the mesh.
+fn alpha_of_body(scene: &Scene, index: u32) -> Option<f32> {
+    let instance = &scene.shapes.instances[index as usize];
+    let mesh = &scene.shapes.meshes[instance.mesh as usize];
+    if !mesh.closed || is_flat(mesh) {
+        return None;
+    }
+    let material = &scene.materials.list[instance.material as usize];
+    let faces = rays::spread(mesh.triangles.len(), FACES);
+    let places = faces.filter_map(|face| scene.shapes.surface(index, face as u32, [1.0 / 3.0; 2]));
+    let mut alphas: Vec<f32> = places.map(|place| material.alpha(&place, &scene.materials.textures)).collect();
+    let fading = alphas.iter().filter(|alpha| **alpha > 0.0 && **alpha <= MOST_ALPHA).count();
+    let middle = median(&mut alphas, f32::total_cmp)?;
+    (fading as f32 >= MOST_OF_BODY * alphas.len() as f32).then_some(middle)
 }
 
 /// What stands between the lights and a glass object: `None` if light comes through somewhere.

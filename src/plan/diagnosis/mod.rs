@@ -29,6 +29,7 @@ pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<Str
         warnings.extend(lamps::shut_out(scene, camera.position()));
         warnings.extend(lamps::behind_glass(scene, asked));
         warnings.extend(glass::unlit(scene));
+        warnings.extend(black::nothing_seen(scene, camera));
     }
     warnings
 }

@@ -5,12 +5,13 @@ use crate::support::scenes::{add, cuboid, glass, matte, point_light, quad, spher
 use caustique::geometry::Mesh;
 use caustique::light::SpotEdge;
 use caustique::material::{Alpha, Material};
-use caustique::math::{DVec3, Rgb, Vec3};
+use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::plan::Search;
 use caustique::scene::Description;
 use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, GuessedUnits, PunctualKind, PunctualLight,
 };
+use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 
 /// The floor under a lamp.
 fn lit() -> Description {
@@ -279,6 +280,21 @@ fn alpha_in_place_of_glass() {
     }
     let pane = quad(Vec3::new(-1.0, 0.5, 0.0), Vec3::X, Vec3::Y);
     silent(with(lit(), "Pane", pane, faded(0.1, 0.1)));
+    // The alpha of a texture: nearly even, and cut out.
+    let textured = |alphas: [f32; 4]| {
+        let first = TextureRef { texture: 0, set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+        let mut body = sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16);
+        body.uvs[0] = body.positions.iter().map(|p| Vec2::new(p.x + 0.5, p.z + 0.5)).collect();
+        let texels = Texels::Floats(alphas.map(|alpha| [1.0, 1.0, 1.0, alpha]).to_vec());
+        let (wrap, name) = ([Wrap::Repeat; 2], "alphas".into());
+        let textures = vec![Texture { name, width: 2, height: 2, texels, wrap, linear: false }];
+        let material = Material { base_color_texture: Some(first), ..faded(1.0, 0.1) };
+        with(Description { textures, ..lit() }, "Ball", body, material)
+    };
+    assert!(warning(textured([0.3; 4])).contains("its alpha of 0.3 lets light through straight"));
+    assert!(warning(textured([0.2, 0.21, 0.2, 0.22])).contains("\"Ball\": its alpha of 0.2"));
+    silent(textured([0.0, 1.0, 0.3, 0.0]));
+    silent(textured([0.3, 1.0, 0.3, 0.3]));
 }
 
 #[test]
@@ -318,7 +334,12 @@ fn reasons_of_black_pictures() {
     assert_eq!(reason(floor()), "");
     let mut away = lit();
     away.cameras = vec![crate::support::scenes::look_at(DVec3::new(0.0, 5.0, 6.0), DVec3::new(0.0, 9.0, 6.1), 50.0)];
-    assert!(reason(away).starts_with("the camera sees no surface; "));
+    assert!(warning(away.clone()).starts_with("the camera sees no surface, so the picture will be black; "));
+    assert!(reason(away.clone()).starts_with("the camera sees no surface; "));
+    // A sky shows behind nothing.
+    let source = EnvironmentSource::Color(Rgb::ONE);
+    away.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+    silent(away);
     assert!(reason(lit()).ends_with("too hard to find for any"));
 }
 
