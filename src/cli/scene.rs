@@ -10,6 +10,7 @@ use caustique::pipeline::Loaded;
 use caustique::pipeline::load::{Environment, Order, load};
 use caustique::plan::Switches;
 use caustique::scene::gltf;
+use caustique::stop::Stop;
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -125,7 +126,7 @@ pub fn read(args: &SceneArgs, form: Form, threads: usize) -> Result<Loaded> {
         },
     };
     let _waiting = Waiting::begin(form, &format!("reading {}", args.path.display()));
-    load(&args.order(), threads)
+    load(&args.order(), threads, &Stop::default())
 }
 
 /// Prints a line for each warning; with `--strict` they are an error that lists them all.

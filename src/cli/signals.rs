@@ -58,9 +58,9 @@ impl Interrupt {
         Err(Error::new(Kind::Interrupted, output.display(), cause))
     }
 
-    /// What tells a render to end.
-    pub fn stop(&self) -> Stop {
-        Stop::by(Arc::clone(&self.0))
+    /// What tells a render to end, once somebody listens.
+    pub fn stop() -> Stop {
+        LISTENING.get().map(|interrupt| Stop::by(Arc::clone(&interrupt.0))).unwrap_or_default()
     }
 
     /// Whether a signal came.

@@ -7,6 +7,7 @@ use crate::plan::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
 use crate::scene::{Scene, environment_file, gltf, usd};
+use crate::stop::Stop;
 use std::path::PathBuf;
 
 /// Room for Embree's library, and for each of its threads: it ends the process where they get none. A bound found by
@@ -54,11 +55,14 @@ pub struct Loaded {
 /// Reads and builds the scene, with the environment that is asked for, without the effects that are off.
 ///
 /// # Errors
-/// The file or what it names, by place; an environment that is changed and is not there.
-pub fn load(order: &Order, threads: usize) -> Result<Loaded> {
+/// The file or what it names, by place; an environment that is changed and is not there; `stop` asks for an end.
+pub fn load(order: &Order, threads: usize, stop: &Stop) -> Result<Loaded> {
     check_memory(order, threads)?;
-    let read = if usd::is_stage(&order.path) { usd::read } else { gltf::read };
-    build(read(&order.path, &order.options)?, order, threads)
+    let description = match usd::is_stage(&order.path) {
+        true => usd::read(&order.path, &order.options, stop)?,
+        false => gltf::read(&order.path, &order.options)?,
+    };
+    build(description, order, threads)
 }
 
 /// Like [`load`], from the bytes of a file that would stand at the order's path.

@@ -165,7 +165,7 @@ pub trait Watch {
 /// The scene, options that contradict it, memory, or an end that was asked for before the first iteration.
 pub fn render(order: Order<'_>, watch: &mut dyn Watch) -> Result<Delivery> {
     watch.waits(Some(Wait::Reading));
-    let loaded = load::load(&order.scene, rayon::current_num_threads())?;
+    let loaded = load::load(&order.scene, rayon::current_num_threads(), &watch.stop())?;
     watch.waits(None);
     render_loaded(order, &loaded, watch)
 }

@@ -31,6 +31,42 @@ fn no_limit_of_memory_aborts() {
     assert!(codes[0] == Some(1) && codes[codes.len() - 1] == Some(0), "{codes:?}");
 }
 
+/// A render whose announced memory fits is finished, and takes no more, and no less than a third: whoever has more than
+/// that is not refused.
+#[test]
+fn renders_whose_memory_fits_are_finished() {
+    const GIB: f64 = (1 << 30) as f64;
+    /// The message rounds both its numbers to tenths.
+    const ROUNDING: f64 = 0.1 * GIB;
+    /// Enough for the scene, and for no picture.
+    const LITTLE: f64 = 550e6;
+    let folder = Folder::new();
+    for (size, method, denoiser) in
+        [((1280, 720), "path", "auto"), ((1280, 720), "sppm --photons 2000", "none"), ((1920, 1080), "path", "none")]
+    {
+        let size = format!("--width {} --height {}", size.0, size.1);
+        let render = format!(
+            "render scene.glb -o out.exr {size} --method {method} --iterations 1 --denoise {denoiser} --layers beauty \
+             --compression none --threads 2 --progress none"
+        );
+        let within = |bytes: f64| limited(&folder, &format!("ulimit -v {}", (bytes / 1024.0) as u64), &render);
+        let refused = within(LITTLE).stderr;
+        let number = |before: &str, after: &str| -> f64 {
+            let (_, rest) = refused.split_once(before).expect(&refused);
+            GIB * rest.split_once(after).expect(&refused).0.parse::<f64>().expect("a number")
+        };
+        let announced = number("need about ", " GiB of memory, ");
+        let taken = LITTLE - number(" GiB of memory, ", " GiB are left by 'ulimit -v'");
+        let outcome = within(taken + announced + ROUNDING);
+        assert_eq!(outcome.code, Some(0), "{method} {size}: {}", outcome.stderr);
+        let (_, header) = folder.read("out.exr");
+        assert!(header["combined"]["denoiser"].is_string(), "{method} {size}");
+        let used = header["peak_memory"].as_f64().expect("a number");
+        let bound = announced / 3.0..=announced + taken;
+        assert!(bound.contains(&used), "{method} {size}: {used} of {announced}");
+    }
+}
+
 /// A file that is named by many buffers, and an image that is shown by many textures, are counted as often as they are
 /// read.
 #[test]
@@ -97,6 +133,41 @@ fn a_cap_on_memory_is_planned() {
         "{}",
         outcome.stderr
     );
+}
+
+/// The estimate is there while the picture is finished, and afterwards only if the program was ended meanwhile: by
+/// force, or by a second signal, which ends it at once.
+#[test]
+fn the_estimate_outlives_a_killed_finish() {
+    let folder = Folder::new();
+    let render =
+        "render scene.glb -o out.exr --width 192 --height 108 --time 2 --method path --threads 1 --progress none";
+    let estimate = folder.path("out.estimate.exr");
+    let begin = || {
+        let mut child = folder.command(render).stderr(Stdio::null()).spawn().expect("the program starts");
+        while !estimate.exists() {
+            assert_eq!(child.try_wait().expect("its state is known"), None, "there was no estimate");
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        assert!(!folder.path("out.exr").exists());
+        child
+    };
+    for (signals, code) in [(&["-KILL"][..], None), (&["-INT", "-INT"], Some(130))] {
+        let mut child = begin();
+        for signal in signals {
+            let kill = format!("kill {signal} {}", child.id());
+            assert!(Command::new("sh").args(["-c", &kill]).status().expect("sh runs").success());
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        assert_eq!(child.wait().expect("it ends").code(), code);
+        assert!(!folder.path("out.exr").exists());
+        let (set, header) = folder.read("out.estimate.exr");
+        assert!(set.get("Noisy").is_some() && header["combined"].is_null());
+        assert_eq!(folder.run("combine out.estimate.exr -o combined.exr").code, Some(0));
+        std::fs::remove_file(&estimate).expect("it is there");
+    }
+    assert_eq!(begin().wait().expect("it ends").code(), Some(0));
+    assert!(!estimate.exists() && folder.read("out.exr").1["combined"].is_object());
 }
 
 /// A file that may not grow as large as it must: the older one stays whole, and nothing else is left.

@@ -80,6 +80,23 @@ class Program(usd_support.Stages):
                 self.until(lambda: not self.converters())
                 self.until(lambda: not list(self.dir.glob("caustique-usd-*")))
 
+    def test_a_signal_ends_the_conversion_of_a_later_frame(self):
+        self.save()
+        self.stage.Export(str(self.dir / "shot.1.usda"))
+        self.endless()
+        self.path = self.path.rename(self.dir / "shot.2.usda")
+        command = [support.binary(), "render", self.dir / "shot.#.usda", "-o", self.dir / "shot.#.exr", "--frames",
+                   "1-2", *map(str, QUICK)]
+        with subprocess.Popen(command, env={**os.environ, "TMPDIR": self.dir}, stderr=subprocess.PIPE,
+                              text=True) as program:
+            self.until(lambda: len(self.converters()) == 2 or program.poll() is not None)
+            program.send_signal(signal.SIGINT)
+            said = program.stderr.read()
+        self.assertEqual(program.returncode, 130, said)
+        self.assertIn(f"frame 2: {self.path}: interrupted while the stage was read\n", said)
+        self.until(lambda: not self.converters())
+        self.assertEqual(list(self.dir.glob("caustique-usd-*")), [])
+
     def test_a_conversion_has_limits(self):
         self.endless()
         done = self.run_on("info", check=1, env={"CAUSTIQUE_USD_SECONDS": 1, "TMPDIR": self.dir})

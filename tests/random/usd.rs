@@ -3,6 +3,7 @@
 use super::world::{Lens, Light, LightKind, Matter, Mesh, Placement, Thing, ThingKind, World};
 use caustique::scene::Description;
 use caustique::scene::gltf::ReadOptions;
+use caustique::stop::Stop;
 use glam::DVec3;
 
 /// What is left of a scene that means the same as a stage: no media, textures, lenses, soft spots and bodies of spots,
@@ -43,7 +44,7 @@ pub fn read(world: &World) -> Result<Description, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let path = folder.path().join("random.usda");
     std::fs::write(&path, stage(world)).map_err(|error| error.to_string())?;
-    caustique::scene::usd::read(&path, &ReadOptions::default()).map_err(|error| error.to_string())
+    caustique::scene::usd::read(&path, &ReadOptions::default(), &Stop::default()).map_err(|error| error.to_string())
 }
 
 /// The scene as the text of a stage.

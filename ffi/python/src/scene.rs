@@ -89,7 +89,7 @@ impl Scene {
         }
         let done = work(py, threads, |_| match &bytes {
             Some(bytes) => load_bytes(bytes, &order, rayon::current_num_threads()),
-            None => load(&order, rayon::current_num_threads()),
+            None => load(&order, rayon::current_num_threads(), &Stop::default()),
         })?;
         let loaded = done.whole()?;
         if strict && !loaded.scene.warnings.is_empty() {

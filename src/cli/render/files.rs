@@ -40,15 +40,23 @@ pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: O
     })
 }
 
+/// Share of a render's time that writing its estimate may take.
+const MAX_ESTIMATE_SHARE: f64 = 0.05;
+/// Bytes that a disk writes in a second, at least.
+const BYTES_PER_SECOND: f64 = 2e8;
+
 /// Writes the EXR before its picture is finished, for the case that the finish does not end, beside the output: whoever
-/// finds a file of that name has a finished picture. What fails now fails again when the finished picture is written.
-pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes) -> Option<PathBuf> {
+/// finds a file of that name has a finished picture. Nothing where that would take much of the `seconds` of the render,
+/// which can be rendered again then. What fails now fails again when the finished picture is written.
+pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, seconds: f64) -> Option<PathBuf> {
     let is_file = std::fs::metadata(&args.output).map_or(true, |data| data.is_file());
-    if output::is_stdout(&args.output) || !is_file {
+    let bytes: usize = set.layers.iter().flat_map(|layer| &layer.planes).map(|p| size_of_val(&p.values[..])).sum();
+    let is_quick = bytes as f64 <= MAX_ESTIMATE_SHARE * BYTES_PER_SECOND * seconds;
+    if output::is_stdout(&args.output) || !is_file || !is_quick {
         return None;
     }
     let path = args.output.with_extension("estimate.exr");
-    let options = args.picture.exr_options(args.exr_naming.into());
+    let options = exr::Options { compression: exr::Compression::None, naming: args.exr_naming.into() };
     exr::write_followed(&path, set, attributes, options, |_| Ok(())).ok().map(|()| path)
 }
 

@@ -34,9 +34,6 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 pub use summary::{Summary, place, tell_finish, tell_picture, tell_unseen};
 
-/// A render of so many seconds is not to be lost while its picture is finished.
-const WORTH_KEEPING: f64 = 60.0;
-
 /// Renders a scene, or frames of it.
 pub fn run(args: &RenderArgs) -> Result<()> {
     if !args.has_output() {
@@ -146,7 +143,7 @@ impl Watch for Telling<'_> {
     }
 
     fn stop(&self) -> Stop {
-        self.interrupt.as_ref().map(Interrupt::stop).unwrap_or_default()
+        Interrupt::stop()
     }
 
     fn chosen(&mut self, choice: Option<&Choice>) -> Result<()> {
@@ -203,9 +200,7 @@ impl Watch for Telling<'_> {
     }
 
     fn estimated(&mut self, set: &LayerSet, attributes: &exr::Attributes) {
-        if self.seconds >= WORTH_KEEPING {
-            self.estimate = files::write_estimate(self.args, set, attributes);
-        }
+        self.estimate = files::write_estimate(self.args, set, attributes, self.seconds);
     }
 }
 

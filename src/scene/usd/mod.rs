@@ -11,11 +11,14 @@ use super::description::Description;
 use super::gltf::{self, Frame, ReadOptions};
 use crate::error::{Error, Kind, Result};
 use crate::memory;
+use crate::stop::Stop;
 use crate::temporary;
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
 
 /// Extensions of stages.
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
@@ -51,15 +54,16 @@ pub fn is_stage(path: &Path) -> bool {
 /// Reads the stage at `path`, at the frame that `options` ask for (a time code), else at its first.
 ///
 /// # Errors
-/// No Python with `usd-core`; what the stage has wrong, by prim; [`gltf::read`] of what becomes of it.
-pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
+/// No Python with `usd-core`; what the stage has wrong, by prim; [`gltf::read`] of what becomes of it; `stop` asks for
+/// an end.
+pub fn read(path: &Path, options: &ReadOptions, stop: &Stop) -> Result<Description> {
     let converter = Converter::new(path)?;
     let glb = converter.folder.path().join("stage.glb");
     let mut words: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
     if let Some(frame) = options.frame {
         words.extend(["--frame".into(), frame.number.to_string().into()]);
     }
-    converter.run(&words, options.allow_outside)?;
+    converter.run(&words, options.allow_outside, stop)?;
     // The converter has looked at the frame, and put beside the .glb what it names.
     let frame = options.frame.map(|frame| Frame { of_sequence: true, ..frame });
     let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
@@ -78,7 +82,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
 /// # Errors
 /// Those of the converter, as for [`read`].
 pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
-    let output = Converter::new(path)?.run(&["--arguments".into()], allow_outside)?;
+    let output = Converter::new(path)?.run(&["--arguments".into()], allow_outside, &Stop::default())?;
     answer::options(&output.stdout, path)
 }
 
@@ -86,6 +90,9 @@ pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
 const SECONDS_VARIABLE: &str = "CAUSTIQUE_USD_SECONDS";
 /// Seconds that it may take otherwise: what takes longer is hardly meant to end.
 const MAX_SECONDS: u32 = 3600;
+
+/// Time between two looks at whether an end is asked for.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Seconds that a conversion may take.
 fn seconds() -> Result<u32> {
@@ -119,7 +126,7 @@ impl<'p> Converter<'p> {
     }
 
     /// Runs the converter on the stage.
-    fn run(&self, words: &[OsString], allow_outside: bool) -> Result<Output> {
+    fn run(&self, words: &[OsString], allow_outside: bool, stop: &Stop) -> Result<Output> {
         let mut command = self.interpreter.command();
         command.arg("-B").arg(self.folder.path().join("convert.py")).arg(self.stage).args(words);
         if allow_outside {
@@ -128,18 +135,33 @@ impl<'p> Converter<'p> {
         // Zero: nobody tells what is left.
         let bytes = memory::available().map_or(0, |available| available.bytes);
         command.arg("--guard").arg(seconds()?.to_string()).arg(bytes.to_string());
-        // A group of its own: Ctrl-C ends this program, and the pipe that closes then ends the converter.
+        // A group of its own: Ctrl-C is for this program, and the pipe that closes then ends the converter.
         command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let run = |command: &mut Command| {
-            let mut child = command.spawn()?;
-            let _open = child.stdin.take();
-            child.wait_with_output()
-        };
-        let output = run(&mut command)
+        let output = command
+            .spawn()
+            .and_then(|child| output_unless(child, stop))
             .map_err(|cause| Error::new(Kind::Library, self.interpreter.path().display(), cause).hint(python::HINT))?;
         if output.status.success() {
             return Ok(output);
         }
+        if stop.asked() {
+            return Err(Error::new(Kind::Interrupted, self.stage.display(), "interrupted while the stage was read"));
+        }
         Err(answer::failure(&output.stderr, self.stage))
     }
+}
+
+/// The output of the converter, which ends when its standard input does: as soon as `stop` asks for that.
+fn output_unless(mut child: Child, stop: &Stop) -> std::io::Result<Output> {
+    let open = child.stdin.take();
+    let (over, ended) = channel::<()>();
+    std::thread::scope(|scope| {
+        std::thread::Builder::new().spawn_scoped(scope, move || {
+            while !stop.asked() && ended.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {}
+            drop(open);
+        })?;
+        let output = child.wait_with_output();
+        drop(over);
+        output
+    })
 }
