@@ -47,6 +47,11 @@ impl Error {
         Error { kind, place: place.to_string(), cause: cause.to_string(), hint: None }
     }
 
+    /// An error of the options of a call: `cause` names them as on the command line, `--max-depth`.
+    pub fn usage(cause: impl fmt::Display) -> Self {
+        Error::new(Kind::Usage, "command line", cause)
+    }
+
     /// The same error with advice.
     #[must_use]
     pub fn hint(mut self, hint: impl fmt::Display) -> Self {

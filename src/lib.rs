@@ -61,6 +61,9 @@ pub mod render;
 
 pub mod pipeline;
 
+#[cfg(feature = "cli")]
+pub mod settings;
+
 pub mod peers;
 
 pub mod report;

@@ -12,6 +12,8 @@ mod converge;
 mod files;
 #[path = "cli/frames.rs"]
 mod frames;
+#[path = "cli/generated.rs"]
+mod generated;
 #[path = "cli/libraries.rs"]
 mod libraries;
 #[path = "cli/limits.rs"]

@@ -13,13 +13,8 @@ from stage import said
 # Keys of `extras.caustique` of a scene: what else stands in `caustique:` of the settings is an option of `render`.
 SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate"}
 # Options that a stage may give: those about the picture. Files and permissions are the command line's alone, for a
-# stage may come from anywhere.
-OPTIONS = {
-    "method", "photons", "levels", "eye_paths", "initial_bandwidth", "knn", "alpha", "cppm_grid", "cppm_k", "cppm_beta",
-    "cppm_significance", "cppm_plus", "radius_rule", "kernel", "guide", "indirect", "max_depth", "seed", "frame_seed",
-    "time", "iterations", "target_error", "filter", "effects", "glass", "env_rotation", "env_strength", "no_combine",
-    "denoise", "layers", "exr_naming", "compression", "reproducible",
-}
+# stage may come from anywhere. The program's definition of options gives the list: scripts/generate.sh.
+OPTIONS = frozenset(json.loads(pathlib.Path(__file__).with_name("options.json").read_text("utf-8"))["files_may_give"])
 # Layers by what a RenderVar's sourceName may say.
 LAYERS = {
     "ci": "beauty", "color": "beauty", "rgba": "beauty", "beauty": "beauty", "lpe:c.*[<l.>o]": "beauty",

@@ -1,15 +1,16 @@
 //! `caustique combine`: finishes a stored picture.
 
-use super::finish::FinishArgs;
 use super::output::{self, PictureArgs};
 use super::progress::{Form, duration};
-use super::say;
+use super::{finish, say};
 use caustique::error::Result;
 use caustique::film::{Naming, take_plain_names};
 use caustique::image::exr;
 use caustique::pipeline::tell_stored;
 use caustique::render::Clock;
 use caustique::scene::description::Picture;
+use caustique::settings::FinishOptions;
+use caustique::settings::number::threads;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -27,11 +28,11 @@ pub struct CombineArgs {
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
-    finish: FinishArgs,
+    finish: FinishOptions,
     #[command(flatten)]
     picture: PictureArgs,
     /// Threads; 0 takes all cores
-    #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads, help_heading = "Running")]
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     threads: usize,
 }
 
@@ -40,7 +41,7 @@ pub fn run(args: &CombineArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     super::pool(args.threads)?.install(|| {
-        let mut ready = args.finish.open(None)?;
+        let mut ready = finish::open(&args.finish, None)?;
         let (mut set, mut attributes) = exr::read(&args.input)?;
         // Names in the style of the input: cryptomatte attributes hold them too.
         let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));

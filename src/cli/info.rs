@@ -2,7 +2,6 @@
 
 use super::progress::{Form, duration, percent};
 use super::render::place;
-use super::scene::SceneArgs;
 use super::{plot, print, print_json, printable, scene};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{LayerSet, describe};
@@ -10,6 +9,7 @@ use caustique::image::exr;
 use caustique::light::Emitter;
 use caustique::pipeline::{FINISHED_PICTURE, Place};
 use caustique::scene::Scene;
+use caustique::settings::SceneOptions;
 use serde_json::{Map, Value, json};
 use std::fs::File;
 use std::io::Read;
@@ -43,7 +43,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         escape(&mut object);
         return print(&image_text(path, &set, &object));
     }
-    let asked = SceneArgs::of(path, args.allow_outside);
+    let asked = SceneOptions::of(path, args.allow_outside);
     let scene =
         super::pool(0)?.install(|| scene::read(&asked, Form::beside(args.json), rayon::current_num_threads()))?.scene;
     let mut object = scene_object(path, &scene);

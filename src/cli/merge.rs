@@ -1,12 +1,13 @@
 //! `caustique merge`: the shards of one render to its picture, or renders of other seeds to their mean.
 
-use super::finish::{Denoise, tell_missing};
-use super::output::{self, Naming, PictureArgs};
+use super::finish::tell_missing;
+use super::output::{self, PictureArgs};
 use super::progress::Form;
 use super::render::{Summary, tell_finish, tell_picture, tell_unseen};
 use super::say;
 use caustique::error::Result;
-use caustique::film::{LayerSet, Selection, take_plain_names};
+use caustique::film::{LayerSet, Naming, Selection, take_plain_names};
+use caustique::finish::DenoiserChoice;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::merge::{self, Shards, Step, is_shard};
 use caustique::pipeline::seeds::Seeds;
@@ -38,7 +39,7 @@ pub struct MergeArgs {
     no_combine: bool,
     /// What makes the denoised picture: 'auto', 'oidn', 'own' or 'none' [default: as the shards were asked]
     #[arg(long, value_enum, help_heading = "Finish")]
-    denoise: Option<Denoise>,
+    denoise: Option<DenoiserChoice>,
     /// Network that combines five bandwidth levels before that [default: as the shards were asked]
     #[arg(long, value_name = "compact|FILE.onnx", help_heading = "Expert")]
     model: Option<String>,
@@ -54,7 +55,7 @@ pub struct MergeArgs {
     #[arg(long, help_heading = "Running")]
     reproducible: bool,
     /// Threads; 0 takes all cores
-    #[arg(long, value_name = "T", default_value_t = 0, value_parser = super::number::threads, help_heading = "Running")]
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = caustique::settings::number::threads, help_heading = "Running")]
     threads: usize,
 }
 
@@ -81,7 +82,7 @@ impl MergeArgs {
         let model = self.model.clone().or_else(|| asked(arguments, "model"));
         let here = self.denoise.is_some() || self.model.is_some();
         let none = self.no_combine || (!here && asked(arguments, "no-combine") == Some(true));
-        (!none).then(|| finish::Order { denoiser: denoise.into(), model })
+        (!none).then(|| finish::Order { denoiser: denoise, model })
     }
 
     fn naming(&self, arguments: &Value) -> Naming {
@@ -90,7 +91,7 @@ impl MergeArgs {
 
     /// Writes the picture.
     fn write(&self, set: &LayerSet, attributes: &Attributes, naming: Naming, made_for: &Picture) -> Result<()> {
-        exr::write(&self.output, set, attributes, self.picture.exr_options(naming.into()))?;
+        exr::write(&self.output, set, attributes, self.picture.exr_options(naming))?;
         self.picture.write_png(set, made_for)?;
         tell_picture(&self.output, set);
         Ok(())
@@ -105,7 +106,7 @@ fn join(args: &MergeArgs) -> Result<()> {
     let order = merge::Order {
         finish: args.finish(&arguments),
         layers: args.layers.clone().or_else(|| asked(&arguments, "layers")).unwrap_or_else(|| "all".into()),
-        naming: naming.into(),
+        naming: naming,
         reproducible: args.reproducible,
     };
     let made_for = shards.facts().map(|facts| facts.made_for).unwrap_or_default();

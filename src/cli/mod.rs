@@ -5,11 +5,9 @@ mod compare;
 mod converge;
 mod doctor;
 mod finish;
-mod frames;
 mod info;
 mod layout;
 mod merge;
-mod number;
 mod output;
 mod plan;
 mod plot;
@@ -61,6 +59,9 @@ enum Command {
     Completions(shell::CompletionsArgs),
     /// Print a page of the manual
     Man(shell::ManArgs),
+    /// Print a description of the options of 'render' as JSON
+    #[command(hide = true)]
+    Options,
 }
 
 /// The whole command line.
@@ -111,6 +112,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(args) => doctor::run(&args),
         Command::Completions(args) => shell::complete(&args, command_line()),
         Command::Man(args) => shell::man(&args, command_line()),
+        Command::Options => shell::options(&command_line()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

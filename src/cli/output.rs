@@ -1,91 +1,16 @@
 //! Options and checks that every command with output files shares.
 
-use super::number::finite;
 use caustique::error::{Error, Kind, Result};
-use caustique::film::LayerSet;
-use caustique::image::png;
+use caustique::film::{LayerSet, Naming};
+use caustique::image::exr::{self, Compression};
 use caustique::image::tonemap::ToneMap;
-use caustique::image::{atomic, exr};
-use caustique::scene::description::{Picture, ToneCurve};
-use clap::ValueEnum;
-use serde::{Deserialize, Serialize, Serializer};
+use caustique::image::{atomic, png};
+use caustique::scene::description::Picture;
+use caustique::settings::number::Ranged;
+use serde::Serialize;
 use std::io::IsTerminal;
+use std::ops::Bound::Unbounded;
 use std::path::{Path, PathBuf};
-
-/// From scene-linear light to the PNG's colours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Tonemap {
-    /// Soft shoulder, highlights lose colour: what Blender shows
-    Agx,
-    /// A film-like curve per channel
-    Filmic,
-    /// No curve: what is brighter than white is cut off
-    Srgb,
-}
-
-/// Names of the EXR's channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Naming {
-    /// R G B A at the root, the others as Layer.C
-    Plain,
-    /// ViewLayer.Pass.C, as Blender writes and its render engines take
-    Blender,
-}
-
-/// Compression of the EXR.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Compression {
-    /// 16 lines at a time: small files
-    Zip,
-    /// One line at a time: quick access
-    Zips,
-    /// Wavelets: small for noisy pictures
-    Piz,
-    /// None: quick and large
-    None,
-}
-
-impl From<Naming> for caustique::film::Naming {
-    fn from(naming: Naming) -> Self {
-        match naming {
-            Naming::Plain => Self::Plain,
-            Naming::Blender => Self::Blender,
-        }
-    }
-}
-
-impl From<Compression> for exr::Compression {
-    fn from(compression: Compression) -> Self {
-        match compression {
-            Compression::Zip => Self::Zip,
-            Compression::Zips => Self::Zips,
-            Compression::Piz => Self::Piz,
-            Compression::None => Self::None,
-        }
-    }
-}
-
-impl From<ToneCurve> for Tonemap {
-    fn from(curve: ToneCurve) -> Self {
-        match curve {
-            ToneCurve::Agx => Self::Agx,
-            ToneCurve::Filmic => Self::Filmic,
-            ToneCurve::Srgb => Self::Srgb,
-        }
-    }
-}
-
-impl From<Tonemap> for ToneMap {
-    fn from(tonemap: Tonemap) -> Self {
-        match tonemap {
-            Tonemap::Agx => Self::Agx,
-            Tonemap::Filmic => Self::Filmic,
-            Tonemap::Srgb => Self::Srgb,
-        }
-    }
-}
 
 /// How files are written.
 #[derive(clap::Args, Clone, Serialize)]
@@ -97,15 +22,15 @@ pub struct PictureArgs {
     #[serde(skip)]
     pub png: Option<PathBuf>,
     /// Exposure of the PNG in stops [default: the scene's, else 0]
-    #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", between = (Unbounded, Unbounded), allow_negative_numbers = true)]
     #[serde(skip)]
     pub exposure: Option<f64>,
     /// From light to the PNG's colours [default: the scene's, else agx]
     #[arg(long, value_enum)]
     #[serde(skip)]
-    pub tonemap: Option<Tonemap>,
+    pub tonemap: Option<ToneMap>,
     /// Compression of the EXR; all are lossless
-    #[arg(long, value_enum, default_value_t = Compression::Zip)]
+    #[arg(long, value_enum, default_value_t)]
     pub compression: Compression,
 }
 
@@ -116,15 +41,14 @@ impl PictureArgs {
     }
 
     /// How the EXR is written.
-    pub fn exr_options(&self, naming: caustique::film::Naming) -> exr::Options {
-        exr::Options { compression: self.compression.into(), naming }
+    pub fn exr_options(&self, naming: Naming) -> exr::Options {
+        exr::Options { compression: self.compression, naming }
     }
 
     /// Exposure in stops and tone curve: the user's, else those of the picture that a scene was made for.
     pub fn look(&self, made_for: &Picture) -> (f32, ToneMap) {
         let exposure = self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or(0.0);
-        let tonemap = self.tonemap.or(made_for.tonemap.map(Tonemap::from)).unwrap_or(Tonemap::Agx);
-        (exposure, tonemap.into())
+        (exposure, self.tonemap.or(made_for.tonemap).unwrap_or_default())
     }
 
     /// Writes the PNG if one is asked for.
@@ -151,11 +75,6 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
         });
     }
     atomic::check_writable(path)
-}
-
-/// Writes a path to a header: what is not UTF-8 in it is replaced there.
-pub fn lossy<S: Serializer>(path: &Path, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-    serializer.collect_str(&path.display())
 }
 
 /// Checks that an output is none of the inputs, which would be lost.
@@ -189,7 +108,7 @@ pub fn check_render(path: &Path) -> Result<()> {
         return check(path, "exr");
     }
     if std::io::stdout().is_terminal() {
-        let error = Error::new(Kind::Usage, "command line", "--output -: standard output is a terminal");
+        let error = Error::usage("--output -: standard output is a terminal");
         return Err(error.hint("send it to a program or a file, such as '-o - > out.exr'"));
     }
     Ok(())

@@ -1,14 +1,13 @@
 //! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
 
-use super::number::threads;
 use super::progress::{Form, duration, percent};
-use super::render::{Job, Method};
-use super::scene::SceneArgs;
 use super::{print, print_json, printable, scene};
 use caustique::error::Result;
 use caustique::pipeline::{Loaded, Outlook, check, outlook, plan, sized};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::render::auto::choose;
+use caustique::settings::number::threads;
+use caustique::settings::{RenderOptions, SceneOptions};
 use serde_json::json;
 
 /// Say which effects a scene calls for, which will be simulated, and why.
@@ -20,7 +19,7 @@ use serde_json::json;
 #[command(next_line_help = true)]
 pub struct PlanArgs {
     #[command(flatten)]
-    job: Job,
+    job: RenderOptions,
 
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
@@ -32,7 +31,7 @@ pub struct PlanArgs {
 
 impl PlanArgs {
     /// The scene that is looked at.
-    pub fn scene(&self) -> &SceneArgs {
+    pub fn scene(&self) -> &SceneOptions {
         &self.job.scene
     }
 }
@@ -50,7 +49,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     let camera = scene.camera(&job.view()?)?;
     check::media(&job.scene.path, &settings, &scene)?;
     let make = |way| job.allowed(way, camera.size());
-    let choice = if job.method == Method::Auto {
+    let choice = if job.method.0.is_none() {
         let mut finish = job.pilot_finish();
         let tried = || choose((&scene, &camera), &mut finish, make, || false);
         Form::beside(args.json).during("choosing a method", tried)
@@ -82,7 +81,7 @@ fn report(args: &PlanArgs) -> Result<()> {
         if let Some((error, outlook)) = outlook {
             text += &foretold(error, outlook);
         }
-        if job.method == Method::Auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
+        if job.method.0.is_none() && plan.effects.iter().all(|effect| effect.energy.is_none()) {
             text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
         }
         print(&text)?

@@ -1,10 +1,12 @@
-//! `caustique completions` and `caustique man`: what a shell and the reader of manuals take from the command line
-//! itself.
+//! `caustique completions`, `caustique man` and `caustique options`: what a shell, the reader of manuals and other programs
+//! take from the command line itself.
 
-use super::print;
+use super::{print, print_json};
 use caustique::error::{Error, Kind, Result};
+use caustique::settings::catalogue::describe;
 use clap::Command;
 use clap_complete::Shell;
+use serde_json::json;
 
 /// Print what completes commands and options in a shell.
 ///
@@ -25,6 +27,12 @@ pub struct ManArgs {
     command: Option<String>,
 }
 
+/// Prints a description of the options of `render` as JSON.
+pub fn options(whole: &Command) -> Result<()> {
+    let options = whole.find_subcommand("render").map(describe).unwrap_or_default();
+    print_json(&json!({"render": options}))
+}
+
 /// Prints the completions of the whole command line.
 pub fn complete(args: &CompletionsArgs, mut whole: Command) -> Result<()> {
     let mut script = Vec::new();
@@ -38,7 +46,7 @@ pub fn man(args: &ManArgs, mut whole: Command) -> Result<()> {
     let page = match &args.command {
         None => &whole,
         Some(name) => whole.find_subcommand(name).ok_or_else(|| {
-            let error = Error::new(Kind::Usage, "command line", format!("there is no command '{name}'"));
+            let error = Error::usage(format!("there is no command '{name}'"));
             error.hint("'caustique --help' lists the commands")
         })?,
     };

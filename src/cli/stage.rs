@@ -1,9 +1,9 @@
 //! What a stage of USD says about its own render: options that hold where the command line does not give them.
 
-use super::scene::SceneArgs;
 use super::{Cli, Command, usage};
 use caustique::error::{Error, Kind, Result};
 use caustique::scene::usd;
+use caustique::settings::SceneOptions;
 use clap::FromArgMatches;
 use std::ffi::OsString;
 
@@ -56,7 +56,7 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
 ///
 /// # Errors
 /// Several products: one picture would be written.
-fn output(scene: &SceneArgs, mut products: Vec<String>) -> Result<Option<String>> {
+fn output(scene: &SceneOptions, mut products: Vec<String>) -> Result<Option<String>> {
     if products.len() < 2 {
         return Ok(products.pop().filter(|word| word != OUTPUT));
     }
@@ -67,7 +67,7 @@ fn output(scene: &SceneArgs, mut products: Vec<String>) -> Result<Option<String>
 }
 
 /// The scene, or its first frame's file where its name is a pattern.
-fn first_file(scene: &SceneArgs) -> SceneArgs {
+fn first_file(scene: &SceneOptions) -> SceneOptions {
     let first = scene.frames.and_then(|frames| frames.iter().next());
     first.map_or_else(|| scene.clone(), |frame| scene.at(frame))
 }

@@ -1,6 +1,6 @@
 //! Errors of the command line in the form of all others: `command line: cause`, `hint: remedy`.
 
-use caustique::error::{Error, Kind};
+use caustique::error::Error;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
@@ -55,7 +55,7 @@ pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> 
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => None,
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            let error = Error::new(Kind::Usage, "command line", "a command is missing");
+            let error = Error::usage("a command is missing");
             Some(error.hint("'caustique --help' lists the commands"))
         }
         kind => {
@@ -121,7 +121,7 @@ fn rephrase(text: &str) -> Error {
         .map(str::to_string)
         .collect();
     let hint = if tips.is_empty() { "'--help' explains every option".to_string() } else { tips.join("; ") };
-    Error::new(Kind::Usage, "command line", cause).hint(hint)
+    Error::usage(cause).hint(hint)
 }
 
 #[cfg(test)]

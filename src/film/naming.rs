@@ -8,14 +8,17 @@
 use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, LayerKind, Suffix, Use, finished_part, kind_of, part_names, stem};
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, Kind, Result};
+use serde::{Deserialize, Serialize};
 
 /// How channels are called in an EXR.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum Naming {
-    /// `R`, `Noisy.R`, `albedo.R`, `Z`: what Nuke, tev and OIDN's tools know.
+    /// R G B A at the root, the others as Layer.C: what Nuke, tev and OIDN's tools know
     #[default]
     Plain,
-    /// `ViewLayer.Combined.R`, `ViewLayer.Depth.Z`: what Blender gives its own passes.
+    /// ViewLayer.Pass.C, as Blender writes and its render engines take
     Blender,
 }
 
@@ -189,27 +192,12 @@ fn suggestions() -> Vec<String> {
 fn unknown_layer<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Error {
     let known: Vec<&str> = known.collect();
     let error = Error::new(Kind::Usage, "--layers", format!("no layer \"{name}\""));
-    let nearest = known.iter().map(|k| (distance(&name.to_lowercase(), &k.to_lowercase()), k)).min_by_key(|(d, _)| *d);
+    let distance = |known: &str| strsim::levenshtein(&name.to_lowercase(), &known.to_lowercase());
+    let nearest = known.iter().map(|k| (distance(k), k)).min_by_key(|(d, _)| *d);
     match nearest {
         Some((d, k)) if d <= 1 + name.chars().count() / 3 => error.hint(format!("did you mean \"{k}\"?")),
         _ => error.hint(format!("there are {}", known.join(", "))),
     }
-}
-
-/// Levenshtein's distance between two words.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, &cb) in b.iter().enumerate() {
-            let substitute = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substitute.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 /// Checks that every channel has a name that Nuke and Blender read unharmed (see the head of this file).
@@ -270,13 +258,5 @@ mod tests {
         }
         check(&set, Naming::Plain).unwrap();
         check(&set, Naming::Blender).unwrap();
-    }
-
-    #[test]
-    fn distances() {
-        assert_eq!(distance("albedo", "albedo"), 0);
-        assert_eq!(distance("albeod", "albedo"), 2);
-        assert_eq!(distance("", "abc"), 3);
-        assert_eq!(distance("kitten", "sitting"), 3);
     }
 }

@@ -7,6 +7,7 @@ use super::statistical;
 use crate::error::{Error, Kind, Result};
 use crate::installed;
 use caustique_oidn as oidn;
+use serde::{Deserialize, Serialize};
 
 pub use oidn::Quality;
 
@@ -21,17 +22,19 @@ pub fn scratch(pixels: u64) -> u64 {
     (SCRATCH * pixels).min(u64::from(MEMORY_MIB) << 20)
 }
 
-/// `--denoise`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What makes the denoised picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum DenoiserChoice {
-    /// Open Image Denoise where it is found, else our own.
+    /// Open Image Denoise where its library is found, else our own
     #[default]
     Auto,
-    /// Open Image Denoise, or an error.
+    /// Intel Open Image Denoise
     Oidn,
-    /// Our own statistical filter.
+    /// Our own: means over neighbours that noise cannot tell apart
     Own,
-    /// Nothing: the estimate is the picture.
+    /// No denoiser: the finish without one
     None,
 }
 

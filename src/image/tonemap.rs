@@ -3,18 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use crate::math::Rgb;
-
-/// The curve between scene and display.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum ToneMap {
-    /// AgX: bright colours fade to white as film does.
-    #[default]
-    Agx,
-    /// A filmic curve on each channel: more contrast, bright colours keep their hue and clip.
-    Filmic,
-    /// No curve: clipped at one.
-    Srgb,
-}
+pub use crate::scene::description::ToneMap;
 
 impl ToneMap {
     /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A

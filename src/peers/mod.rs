@@ -11,12 +11,13 @@ pub use process::Stop;
 
 /// A renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Renderer {
-    /// Mitsuba 3.
+    /// Mitsuba 3: path tracing
     Mitsuba,
-    /// LuxCoreRender.
+    /// LuxCoreRender: path tracing, the same with its caustic cache, and bidirectional
     Luxcore,
-    /// Blender's Cycles.
+    /// Blender's Cycles: path tracing
     Cycles,
 }
 

@@ -1,7 +1,7 @@
 //! A finish that is ready: the denoiser found, the network loaded, its time known.
 
 use crate::combine::{Combiner, Model, Runtime};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Result};
 use crate::film::LayerSet;
 use crate::finish::{Account, Denoiser, DenoiserChoice, Finish, Quality, Size};
 use crate::render::Clock;
@@ -60,7 +60,7 @@ fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)
     let facts = combiner.facts();
     if let Some(levels) = levels.filter(|levels| *levels != facts.levels) {
         let cause = format!("the network {name} combines {} levels, not {levels}", facts.levels);
-        let error = Error::new(Kind::Usage, "command line", cause);
+        let error = Error::usage(cause);
         return Err(error.hint(format!("leave --model out, or render with --levels {}", facts.levels)));
     }
     let network = Network { name: name.into(), training: facts.training.clone() };

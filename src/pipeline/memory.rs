@@ -1,7 +1,7 @@
 //! Whether a render fits into memory, asked before it begins.
 
 use crate::camera::Camera;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Result};
 use crate::estimator::Pixel;
 use crate::estimator::rule::{adaptive, chi_squared, local};
 use crate::film;
@@ -141,7 +141,7 @@ impl Cap {
             );
             let fewer =
                 "use a smaller --width and --height, --crop, fewer --levels, another --method, or more --memory";
-            return Err(Error::new(Kind::Usage, "command line", cause).hint(fewer));
+            return Err(Error::usage(cause).hint(fewer));
         }
         if settings.method.has_one_map() {
             let told = format!(

@@ -84,7 +84,7 @@ impl Shards {
                 many => format!("shard {shard} of {count} is missing, and {} more", many - 1),
             };
             let hint = format!("render it with --shard {shard}/{count}, or give --partial to do without");
-            return Err(Error::new(Kind::Usage, "command line", cause).hint(hint));
+            return Err(Error::usage(cause).hint(hint));
         }
         Ok(Shards { files, missing })
     }
@@ -119,7 +119,7 @@ impl Shards {
     /// A file is damaged; a layer that is not there is asked for; the finish cannot be opened.
     pub fn merge(self, order: &Order, mut watch: impl FnMut(Step<'_>)) -> Result<Delivery> {
         let arguments = self.arguments();
-        let none = || Error::new(Kind::Usage, "command line", "there is no shard");
+        let none = || Error::usage("there is no shard");
         let Shards { mut files, missing } = self;
         let parts: Vec<Part> = files.iter().map(|(_, open)| open.part.clone()).collect();
         let part = Part::join(&parts).ok_or_else(none)?;

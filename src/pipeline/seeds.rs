@@ -165,7 +165,7 @@ impl Seeds {
     pub fn mean(self) -> Result<(LayerSet, Attributes)> {
         let Seeds { sources, sum, mattes } = self;
         let Some((mut set, mut attributes)) = sum else {
-            return Err(Error::new(Kind::Usage, "command line", "there is no render"));
+            return Err(Error::usage("there is no render"));
         };
         let total: f64 = sources.iter().map(|source| source.iterations).sum();
         for layer in &mut set.layers {

@@ -2,8 +2,6 @@
 
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
 use serde::{Deserialize, Serialize};
 
 /// Light paths per iteration: the papers' setting.
@@ -328,13 +326,14 @@ impl Method {
     }
 }
 
-impl ValueEnum for Method {
+#[cfg(feature = "cli")]
+impl clap::ValueEnum for Method {
     fn value_variants<'a>() -> &'a [Self] {
         Method::ALL
     }
 
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()).help(self.help()))
+    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+        Some(clap::builder::PossibleValue::new(self.name()).help(self.help()))
     }
 }
 

@@ -70,23 +70,37 @@ impl Levels {
 
 /// Kernel of density estimation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum KernelChoice {
+    /// Alike within the bandwidth
+    ///
     /// [`kernel::Box`].
     #[default]
     Box,
+    /// Falling with the squared distance
+    ///
     /// [`kernel::Epanechnikov`].
     Epanechnikov,
+    /// A normal distribution cut off at three standard deviations
+    ///
     /// [`kernel::Gaussian`].
     Gaussian,
 }
 
 /// What [`Method::Sppm`]'s bandwidths follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum RadiusRule {
-    /// The iteration's number ([`memoryless`]).
+    /// The iteration's number alone
+    ///
+    /// [`memoryless`].
     #[default]
     Memoryless,
-    /// The photons found ([`local`](crate::estimator::rule::local)).
+    /// The photons found
+    ///
+    /// [`local`](crate::estimator::rule::local).
     Local,
 }
 

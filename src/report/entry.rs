@@ -95,15 +95,18 @@ pub fn lines(entries: &[Entry], guests: &[Peer], denoised: bool) -> Vec<Line> {
 
 /// The figure that curves, targets and fits are about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Metric {
-    /// Mean relative squared error.
+    /// Squared error over the squared reference plus 0.01
     #[default]
+    #[cfg_attr(feature = "cli", value(name = "relmse"))]
     RelMse,
-    /// The same without the worst 0.5 % of pixels.
+    /// The same without the worst 0.5 % of pixels, which fireflies dominate
     #[serde(rename = "relmse_trimmed")]
+    #[cfg_attr(feature = "cli", value(name = "relmse-trimmed"))]
     RelMseTrimmed,
-    /// Mean squared error.
+    /// Squared error
     Mse,
 }
 

@@ -91,7 +91,7 @@ pub struct Picture {
     /// Exposure in stops when it is looked at.
     pub exposure: Option<f32>,
     /// From light to a display's colours.
-    pub tonemap: Option<ToneCurve>,
+    pub tonemap: Option<ToneMap>,
     /// Cameras see nothing where no surface is, and alpha tells how much of a pixel that is.
     pub film_transparent: bool,
     /// The window that is rendered: left edge, top edge, width and height, in shares of the whole picture.
@@ -102,15 +102,17 @@ pub struct Picture {
     pub frame_rate: Option<[u32; 2]>,
 }
 
-/// Tone curves by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+/// The curve between scene-linear light and a display.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
-pub enum ToneCurve {
-    /// Blender's default since 4.0.
+pub enum ToneMap {
+    /// Soft shoulder, highlights lose colour: what Blender shows
+    #[default]
     Agx,
-    /// Blender's default before.
+    /// A film-like curve per channel: more contrast, bright colours keep their hue and clip
     Filmic,
-    /// The display's own curve alone.
+    /// No curve: what is brighter than white is cut off
     Srgb,
 }
 

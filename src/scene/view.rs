@@ -80,7 +80,7 @@ impl Scene {
         let window = crop.window(size).ok_or_else(|| {
             let (width, height) = size;
             let cause = format!("--crop: the window is not within the picture of {width} x {height} pixels");
-            Error::new(Kind::Usage, "command line", cause).hint(
+            Error::usage(cause).hint(
                 "it is X,Y,W,H: left edge, top edge, width and height, in pixels or in shares such as 0.25,0,0.5,1",
             )
         })?;

@@ -103,11 +103,13 @@ const LEAST_CHANCE: f32 = 0.1;
 
 /// Who brings light that has been scattered broadly before the eye path's first broad bounce.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum Indirect {
-    /// Photons.
+    /// Photons
     #[default]
     Photons,
-    /// The eye path, which goes on.
+    /// Eye paths, which go on; photons bring caustics alone
     Paths,
 }
 

@@ -225,7 +225,7 @@ fn a_picture_per_technique() {
         assert!(noisy.iter().any(|p| p[1] > 0.0));
     }
     let idle = folder.run("render scene.glb -o out.exr --debug-techniques d");
-    let cause = "command line: --debug-techniques has no effect with --method sppm\nhint: ";
+    let cause = "command line: --debug-techniques has no effect before a method is chosen\nhint: ";
     assert!(idle.code == Some(2) && idle.stderr.starts_with(cause), "{}", idle.stderr);
     std::fs::write(folder.path("file"), "").expect("a file");
     let refused = folder.run("render scene.glb -o out.exr --method path --debug-techniques file");

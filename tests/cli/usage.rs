@@ -134,7 +134,7 @@ fn errors_word_for_word() {
         (
             &format!("{render} --cppm-k 0.7"),
             2,
-            "command line: --cppm-k has no effect with --method sppm",
+            "command line: --cppm-k has no effect before a method is chosen",
             "leave --cppm-k out, or choose --method cppm",
         ),
         (

@@ -2,8 +2,8 @@
 
 use crate::error::{raised, usage};
 use crate::image::{Image, picture};
-use crate::job::{self, Approach, Common};
-use crate::keywords::Keywords;
+use crate::job;
+use crate::keywords::{Keywords, choice};
 use crate::scene::Scene;
 use crate::value::to_python;
 use crate::work::{Caller, work};
@@ -21,28 +21,33 @@ use caustique::report::race::{Field, Rules, race};
 use caustique::report::reference::{Halves, Reference};
 use caustique::report::summary::{Subject, Wishes, summarize};
 use caustique::scene::Scene as Built;
+use caustique::settings::{MethodChoice, RenderOptions};
+use caustique::stat::sum::MOST_TERMS;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use serde_json::{Value, json};
+use std::ops::Bound::{Excluded, Unbounded};
 use std::sync::Arc;
 
 /// Seconds of each run where nothing says when to stop, as on the command line.
 const DEFAULT_TIME: f64 = 60.0;
+/// Options of a render that all runs have in common.
+const COMMON: [&str; 10] =
+    ["seed", "max_depth", "iterations", "time", "target_error", "width", "height", "camera", "crop", "filter"];
 /// Methods where none are named, as there.
 const USUAL: [&str; 4] = ["path", "sppm", "cppm", "vcm"];
-const METRICS: [(&str, Metric); 3] =
-    [("relmse", Metric::RelMse), ("relmse_trimmed", Metric::RelMseTrimmed), ("mse", Metric::Mse)];
 
 /// A run and how it was asked for.
 struct Run {
     name: String,
-    approach: Approach,
+    options: RenderOptions,
 }
 
 /// A comparison that is asked for.
 struct Comparison {
     runs: Vec<Run>,
-    common: Common,
+    /// Seed, longest path and ends, which all runs have in common.
+    common: RenderOptions,
     moments: f64,
     seeds: u64,
     metric: Metric,
@@ -64,29 +69,27 @@ pub fn converge<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut keywords = Keywords::of(py, "converge", options);
-    let view = job::view(&mut keywords)?;
     let given: Option<Bound<'_, PyAny>> = keywords.take("reference")?;
+    let (common, _) = job::take(&mut keywords, &job::named(&COMMON), &scene.asked)?;
     let own = Own {
-        method: keywords
-            .take::<String>("reference_method")?
-            .map_or(Ok(None), |name| job::method("reference_method", &name))?,
-        iterations: job::iterations(&mut keywords, "reference_iterations")?,
-        time: job::seconds(&mut keywords, "reference_time")?,
+        method: keywords.choice::<MethodChoice>("reference_method")?.and_then(|method| method.0),
+        iterations: keywords.number("reference_iterations", 1..=MOST_TERMS, "a whole number above 0")?,
+        time: keywords.number("reference_time", (Excluded(0.0), Unbounded), "a number of seconds above 0")?,
     };
     let comparison = Comparison {
-        runs: runs(py, &mut keywords)?,
-        common: Common::take(&mut keywords, scene.switches)?,
+        runs: runs(py, &mut keywords, &common)?,
+        common,
         moments: keywords
             .number("moments", 1.001..=10.0, "a ratio from 1.001 to 10")?
             .unwrap_or(std::f64::consts::SQRT_2),
         seeds: keywords.number("seeds", 1..=1000, "from 1 to 1000")?.unwrap_or(1),
-        metric: keywords.choice("metric", &METRICS)?.unwrap_or_default(),
+        metric: keywords.choice("metric")?.unwrap_or_default(),
         own,
     };
     let threads = keywords.take("threads")?.unwrap_or(0);
     let progress = keywords.take::<Py<PyAny>>("progress")?.map(Arc::new);
     keywords.finish()?;
-    let camera = scene.loaded.scene.camera(&view).map_err(raised)?;
+    let camera = scene.loaded.scene.camera(&comparison.common.view().map_err(raised)?).map_err(raised)?;
     let reference = given.map(|given| reference(&given, camera.size())).transpose()?;
     let settled = comparison.settle()?;
     let done = work(py, threads, |caller| {
@@ -97,20 +100,20 @@ pub fn converge<'py>(
 }
 
 /// Runs by method and by name.
-fn runs(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Vec<Run>> {
+fn runs(py: Python<'_>, keywords: &mut Keywords<'_>, common: &RenderOptions) -> PyResult<Vec<Run>> {
     let methods: Option<Vec<String>> = keywords.take("methods")?;
     let named: Option<Bound<'_, PyDict>> = keywords.take("runs")?;
     let usual = || if named.is_none() { USUAL.map(String::from).to_vec() } else { Vec::new() };
     let mut runs = Vec::new();
     for name in methods.unwrap_or_else(usual) {
-        let approach = Approach::single(job::method("converge: methods", &name)?);
-        runs.push(Run { name, approach });
+        let method: MethodChoice = choice("converge: methods", &name)?;
+        runs.push(Run { options: with(single(method)?, common), name });
     }
     for (name, options) in named.iter().flat_map(|named| named.iter()) {
         let mut options = Keywords::of(py, "run", Some(options.cast::<PyDict>()?));
-        let approach = Approach::take(&mut options, &Approach::usual())?;
+        let (asked, _) = job::take(&mut options, &job::of_run(), &common.scene)?;
         options.finish()?;
-        runs.push(Run { name: name.extract()?, approach });
+        runs.push(Run { name: name.extract()?, options: with(asked, common) });
     }
     match (1..runs.len()).find(|&run| runs[..run].iter().any(|other| other.name == runs[run].name)) {
         Some(twice) => Err(usage(
@@ -119,6 +122,17 @@ fn runs(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Vec<Run>> {
         )),
         None => Ok(runs),
     }
+}
+
+/// A method with one level and no finish.
+fn single(method: MethodChoice) -> PyResult<RenderOptions> {
+    job::single(method.name(), method.0.is_none_or(Method::has_levels))
+}
+
+/// A run's options with those that all runs have in common.
+fn with(run: RenderOptions, common: &RenderOptions) -> RenderOptions {
+    let RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, .. } = *common;
+    RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, scene: common.scene.clone(), ..run }
 }
 
 /// A reference that is given: an image, a file, or an array (H, W, 3).
@@ -150,13 +164,13 @@ impl Told<'_> {
 impl Comparison {
     /// Settings of all runs, and those of a reference, as far as they do not depend on the scene.
     fn settle(&self) -> PyResult<(Vec<Settings>, Settings)> {
-        let of = |approach: &Approach| approach.settings(&self.common, approach.way());
-        let settings = self.runs.iter().map(|run| of(&run.approach)).collect::<PyResult<_>>()?;
+        let of = |options: &RenderOptions| options.settings().map_err(raised);
+        let settings = self.runs.iter().map(|run| of(&run.options)).collect::<PyResult<_>>()?;
         let method = self.own.method.unwrap_or(Method::Vcm);
-        if method == Method::Pm {
+        if method.has_one_map() {
             return Err(usage("pm does not converge: it makes no reference", "choose another reference_method"));
         }
-        Ok((settings, of(&Approach::single(Some(method)))?))
+        Ok((settings, of(&with(single(MethodChoice(Some(method)))?, &self.common))?))
     }
 
     /// Seconds of each run.
@@ -179,7 +193,7 @@ impl Comparison {
         let (entries, mut finishes) = self.entries((scene, camera), settings, told)?;
         memory::check_all((built, camera), entries.iter().map(|entry| &entry.settings))?;
         let reference = reference.unwrap_or_else(|| self.make(own, (built, camera), told));
-        let Common { seed, iterations, .. } = self.common;
+        let RenderOptions { seed, iterations, .. } = self.common;
         let rules = Rules {
             time: self.time(),
             iterations,
@@ -230,24 +244,24 @@ impl Comparison {
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
         let built = &scene.loaded.scene;
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
-        for (Run { name, approach }, settings) in self.runs.iter().zip(settings) {
-            let mut settings = sized(settings, approach.photons, camera.size());
+        for (Run { name, options }, settings) in self.runs.iter().zip(settings) {
+            let mut settings = sized(settings, options.photons, camera.size());
             let mut decided = Spent::default();
             let mut choice = None;
-            if approach.method.is_none() {
-                let limits = Common { time: self.time(), ..self.common };
-                let make = |way| approach.allowed(&limits, way, camera.size());
-                choice = choose((built, camera), &mut approach.pilot_finish(), make, || told.caller.stops());
+            if options.method.0.is_none() {
+                let limited = RenderOptions { time: self.time(), ..options.clone() };
+                let make = |candidate| limited.allowed(candidate, camera.size());
+                choice = choose((built, camera), &mut options.pilot_finish(), make, || told.caller.stops());
             }
             if let Some(choice) = &choice {
                 (settings, decided) = (choice.settings.clone(), choice.spent);
             }
-            let Common { max_depth, switches, .. } = self.common;
+            let (max_depth, switches) = (self.common.max_depth, scene.asked.switches());
             let asked = plan::Asked { choice: choice.as_ref(), max_depth, switches };
             let plan = plan::plan(&asked, settings.method, (built, camera), &scene.loaded.removed);
             warnings
                 .extend(plan.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
-            let order = approach.finish_order();
+            let order = (!options.no_combine).then(|| options.finish.order());
             let mut ready = order.map(|order| finish::open(&order, Some(settings.levels.count))).transpose()?;
             let missing = ready.as_mut().and_then(|ready| ready.missing.take());
             warnings.extend(missing.map(|error| job::missing(&error)));

@@ -48,6 +48,14 @@ const RENAMED: [(&str, &str); 7] = [
     ("png", "save"),
 ];
 
+/// Options whose value follows in messages.
+const NAMED: [&str; 2] = ["method", "indirect"];
+
+/// The letters and digits that a text begins with, and what follows.
+fn word(text: &str) -> (&str, &str) {
+    text.split_at(text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len()))
+}
+
 /// A message of the library with arguments in place of the command line's options: `max_depth` for `--max-depth`.
 pub fn in_python(text: &str) -> String {
     let is_name = |c: char| c.is_ascii_lowercase() || c == '-';
@@ -63,6 +71,11 @@ pub fn in_python(text: &str) -> String {
             let renamed = RENAMED.iter().find(|(from, _)| *from == name).map(|(_, to)| (*to).to_owned());
             out.push_str(&renamed.unwrap_or_else(|| name.replace('-', "_")));
             rest = &option[name.len()..];
+            // The value that follows is a name.
+            if let Some((value, after)) = rest.strip_prefix(' ').filter(|_| NAMED.contains(&name)).map(word) {
+                out.push_str(&format!("='{value}'"));
+                rest = after;
+            }
         } else {
             out.push_str("--");
             rest = option;
@@ -100,6 +113,7 @@ mod tests {
             ("use a smaller --width and --height.", "use a smaller width and height."),
             ("render with '--compression none'", "render with 'compression none'"),
             ("a--b.glb: /x/--seed, a -- b, --", "a--b.glb: /x/--seed, a -- b, --"),
+            ("leave it out, or choose --method sppm.", "leave it out, or choose method='sppm'."),
             ("", ""),
         ] {
             assert_eq!(in_python(text), expected);

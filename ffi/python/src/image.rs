@@ -5,9 +5,8 @@ use crate::keywords::choice;
 use crate::value::{to_json, to_python};
 use caustique::error::{Error, Kind};
 use caustique::film::{Layer, LayerSet, Plane, Sample};
-use caustique::image::exr::{self, Attributes, Compression};
+use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
-use caustique::image::tonemap::ToneMap;
 use caustique::memory;
 use caustique::pipeline::Delivery;
 use caustique::pipeline::shard::Tail;
@@ -170,15 +169,8 @@ impl Image {
     /// tonemap       of the PNG: 'agx', 'filmic' or 'srgb'
     #[pyo3(signature = (path, *, compression = "zip", exposure = 0.0, tonemap = "agx"))]
     fn save(&self, py: Python<'_>, path: PathBuf, compression: &str, exposure: f32, tonemap: &str) -> PyResult<()> {
-        let all = [
-            ("zip", Compression::Zip),
-            ("zips", Compression::Zips),
-            ("piz", Compression::Piz),
-            ("none", Compression::None),
-        ];
-        let compression = choice("save: compression", compression, &all)?;
-        let curves = [("agx", ToneMap::Agx), ("filmic", ToneMap::Filmic), ("srgb", ToneMap::Srgb)];
-        let curve = choice("save: tonemap", tonemap, &curves)?;
+        let compression = choice("save: compression", compression)?;
+        let curve = choice("save: tonemap", tonemap)?;
         let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
         let set = &self.set;
         let written = py.detach(|| match () {

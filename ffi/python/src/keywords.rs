@@ -1,6 +1,7 @@
 //! Keyword arguments, taken by name: what is left is unknown, and an error that names the nearest.
 
 use crate::error::usage;
+use caustique::settings::{ValueEnum, one_of};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -12,7 +13,7 @@ use std::ops::RangeBounds;
 pub struct Keywords<'py> {
     call: &'static str,
     given: Bound<'py, PyDict>,
-    known: Vec<&'static str>,
+    known: Vec<String>,
 }
 
 impl<'py> Keywords<'py> {
@@ -25,8 +26,8 @@ impl<'py> Keywords<'py> {
     ///
     /// # Errors
     /// It is of another type, or a number that does not fit.
-    pub fn take<T: FromPyObjectOwned<'py>>(&mut self, name: &'static str) -> PyResult<Option<T>> {
-        self.known.push(name);
+    pub fn take<T: FromPyObjectOwned<'py>>(&mut self, name: &str) -> PyResult<Option<T>> {
+        self.known.push(name.to_string());
         let Some(value) = self.given.get_item(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
         value.extract::<T>().map(Some).map_err(|error| {
             let error: PyErr = error.into();
@@ -42,7 +43,7 @@ impl<'py> Keywords<'py> {
     ///
     /// # Errors
     /// It is not.
-    pub fn number<T>(&mut self, name: &'static str, range: impl RangeBounds<T>, say: &str) -> PyResult<Option<T>>
+    pub fn number<T>(&mut self, name: &str, range: impl RangeBounds<T>, say: &str) -> PyResult<Option<T>>
     where
         T: FromPyObjectOwned<'py> + PartialOrd + Display,
     {
@@ -58,16 +59,32 @@ impl<'py> Keywords<'py> {
     ///
     /// # Errors
     /// There is no such name.
-    pub fn choice<T: Copy>(&mut self, name: &'static str, all: &[(&str, T)]) -> PyResult<Option<T>> {
+    pub fn choice<T: ValueEnum>(&mut self, name: &str) -> PyResult<Option<T>> {
         let Some(given) = self.take::<String>(name)? else { return Ok(None) };
-        choice(&format!("{}: {name}", self.call), &given, all).map(Some)
+        choice(&format!("{}: {name}", self.call), &given).map(Some)
+    }
+
+    /// Whether an argument has been taken.
+    pub fn has_taken(&self, name: &str) -> bool {
+        self.known.iter().any(|known| known == name)
+    }
+
+    /// The call that they are arguments of.
+    pub fn call(&self) -> &'static str {
+        self.call
+    }
+
+    /// An argument as Python writes it.
+    pub fn shown(&self, name: &str) -> String {
+        let value = self.given.get_item(name).ok().flatten();
+        value.and_then(|value| value.repr().ok()).map_or_else(|| "?".into(), |shown| shown.to_string())
     }
 
     /// Errors: an argument that nothing has taken.
     pub fn finish(self) -> PyResult<()> {
         for (key, _) in self.given.iter() {
             let key: String = key.extract()?;
-            if !self.known.contains(&key.as_str()) {
+            if !self.has_taken(&key) {
                 let matches = nearest(&self.given, &key, &self.known)?;
                 let hint = matches.map(|near| format!("; did you mean '{near}'?")).unwrap_or_default();
                 let call = self.call;
@@ -82,14 +99,12 @@ impl<'py> Keywords<'py> {
 ///
 /// # Errors
 /// There is no such name.
-pub fn choice<T: Copy>(place: &str, given: &str, all: &[(&str, T)]) -> PyResult<T> {
-    let names = || all.iter().map(|(name, _)| format!("'{name}'")).collect::<Vec<_>>().join(", ");
-    let found = all.iter().find(|(name, _)| *name == given).map(|(_, value)| *value);
-    found.ok_or_else(|| usage(format!("{place}='{given}' does not exist"), format!("one of {}", names())))
+pub fn choice<T: ValueEnum>(place: &str, given: &str) -> PyResult<T> {
+    one_of(given).map_err(|names| usage(format!("{place}='{given}' does not exist"), names))
 }
 
 /// The known name nearest to another, by Python's difflib.
-fn nearest(given: &Bound<'_, PyDict>, key: &str, known: &[&str]) -> PyResult<Option<String>> {
+fn nearest(given: &Bound<'_, PyDict>, key: &str, known: &[String]) -> PyResult<Option<String>> {
     let matches = given.py().import("difflib")?.call_method1("get_close_matches", (key, known.to_vec(), 1))?;
     Ok(matches.extract::<Vec<String>>()?.into_iter().next())
 }

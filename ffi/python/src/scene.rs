@@ -3,7 +3,7 @@
 use crate::converge;
 use crate::error::{raised, usage};
 use crate::image::{Image, radiance};
-use crate::job::{self, Approach, Common};
+use crate::job;
 use crate::keywords::Keywords;
 use crate::progress::Progress;
 use crate::value::{to_json, to_python};
@@ -13,28 +13,27 @@ use caustique::film::Naming;
 use caustique::image::atomic;
 use caustique::pipeline::load::{self, Environment, load, load_bytes};
 use caustique::pipeline::{self, Auto, Delivery, Loaded, Order, Saving, Wait, Watch, check, checkpoint};
-use caustique::plan::{Plan, Switches};
+use caustique::plan::Plan;
 use caustique::render::auto::{Choice, choose};
 use caustique::render::{Rendered, Settings};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::{Scene as Built, gltf};
+use caustique::settings::SceneOptions;
 use caustique::stop::Stop;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::{Value, json};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Seconds between two saves unless told otherwise.
-const EVERY: f64 = 300.0;
 
 /// A scene that has been read and built; it can be rendered as often as one likes, from several threads at once.
 #[pyclass(frozen, subclass, module = "caustique")]
 pub struct Scene {
     pub(crate) loaded: Loaded,
     pub(crate) path: PathBuf,
-    pub(crate) switches: Switches,
+    pub(crate) asked: SceneOptions,
     said: Said,
 }
 
@@ -53,7 +52,7 @@ impl Scene {
     #[pyo3(
         signature = (source, **options),
         text_signature = "(source, *, environment=None, environment_rotation=None, environment_strength=None, \
-            light_units='auto', glass='auto', effects=None, frame=None, allow_outside=False, strict=False, threads=0)"
+            light_units='auto', glass='auto', effects=None, frame=None, frame_rate=None, allow_outside=False, strict=False, threads=0)"
     )]
     fn new(py: Python<'_>, source: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
         let mut keywords = Keywords::of(py, "Scene", options);
@@ -62,42 +61,30 @@ impl Scene {
             Some(_) => PathBuf::from("scene.glb"),
             None => source.extract::<PathBuf>()?,
         };
-        let switches = match keywords.take::<String>("effects")? {
-            None => Switches::default(),
-            Some(text) => text
-                .parse()
-                .map_err(|cause| usage(format!("Scene: effects='{text}': {cause}"), "such as '-dispersion,+volume'"))?,
-        };
-        let said = Said::of(py, bytes.is_none(), options)?;
-        let order = load::Order {
-            path: path.clone(),
-            environment: keywords.take::<Bound<'_, PyAny>>("environment")?.map(environment).transpose()?,
-            rotation: keywords.take("environment_rotation")?,
-            strength: keywords.take("environment_strength")?,
-            options: read_options(&mut keywords)?,
-            off: switches.off,
-        };
-        let strict = keywords.take("strict")?.unwrap_or(false);
         let threads = keywords.take("threads")?.unwrap_or(0);
+        let environment = keywords.take::<Bound<'_, PyAny>>("environment")?;
+        let array = environment.as_ref().map(environment_array).transpose()?.flatten();
+        let word = environment.filter(|_| array.is_none()).map(|given| environment_word(&given)).transpose()?;
+        let mut asked = job::take_scene(&mut keywords, word.into_iter().collect())?;
         keywords.finish()?;
-        let finite = |x: Option<f64>| x.is_none_or(f64::is_finite);
-        if !finite(order.rotation) || !finite(order.strength) || order.strength.is_some_and(|s| s < 0.0) {
-            return Err(usage(
-                "Scene: environment_rotation and environment_strength are finite, and the strength not negative",
-                "degrees, and a factor from 0 up",
-            ));
+        if asked.frames.is_some_and(|frames| frames.single().is_none()) {
+            return Err(usage("Scene: a scene is one frame", "give frame a whole number from 0 up"));
         }
+        asked.path.clone_from(&path);
+        let said = Said::of(py, bytes.is_none(), options)?;
+        let mut order = asked.order();
+        order.environment = array.or(order.environment);
         let done = work(py, threads, |_| match &bytes {
             Some(bytes) => load_bytes(bytes, &order, rayon::current_num_threads()),
             None => load(&order, rayon::current_num_threads(), &Stop::default()),
         })?;
         let loaded = done.whole()?;
-        if strict && !loaded.scene.warnings.is_empty() {
+        if asked.strict && !loaded.scene.warnings.is_empty() {
             let list = loaded.scene.warnings.join("\n");
             return Err(usage(format!("strict=True, and something is ignored or approximated:\n{list}"), "mend it"));
         }
         warn(py, &loaded.scene.warnings)?;
-        Ok(Scene { loaded, path, switches, said })
+        Ok(Scene { loaded, path, asked, said })
     }
 
     /// Whatever of the scene is ignored or approximated, a sentence each.
@@ -112,107 +99,53 @@ impl Scene {
         self.loaded.scene.cameras.iter().map(|camera| camera.name.clone()).collect()
     }
 
-    /// Renders the scene and returns an Image.
-    ///
-    /// The options are those of `caustique render`; the same ones with the same seed give the same bytes in every
-    /// layer, here and there, whatever the number of threads.
-    ///
-    /// method                    'auto', 'path', 'light', 'bdpt', 'pm', 'ppm', 'sppm', 'appm', 'cppm', 'bpm', 'vcm' or 'mlt'
-    /// iterations, time,         when to stop: after so many iterations, seconds, or at an estimated relative error,
-    /// target_error              whichever comes first; after 64 iterations if none is given
-    /// width, height             pixels; one given keeps the camera's aspect
-    /// camera                    by name; else the first
-    /// crop                      a window (left, top, width, height) in pixels, or in shares of the picture
-    /// filter                    pixel filter: 'box', 'gaussian' or 'blackman-harris', or one with its width in pixels,
-    ///                           ('gaussian', 2.0)
-    /// seed                      another number, other noise
-    /// max_depth                 longest light path in segments
-    /// photons                   light paths of an iteration
-    /// levels                    bandwidth levels, 1 to 5, each 1/sqrt(2) of the next larger
-    /// alpha                     how fast bandwidths shrink, in (0, 1]
-    /// initial_bandwidth         'knn', 'footprint', or a length in metres
-    /// knn                       photons within the largest bandwidth to begin with
-    /// guide                     True or False: whether light paths start towards mirrors and glass
-    /// cppm_grid                 of cppm: (annuli, sectors) in which photons are counted, (2, 6) if not given
-    /// cppm_k, cppm_beta,        of cppm: factor of a reduction (0.8), growth of the counts for a test (1.2), and
-    /// cppm_significance         probability of taking uniform photons for others (0.05)
-    /// cppm_plus                 of cppm: red, green and blue apart
-    /// finish                    False leaves the estimate as it is
-    /// denoise                   'auto', 'oidn', 'own' or 'none'
-    /// model                     'compact' or a path: the network that combines levels
-    /// layers                    'all', 'comp', 'beauty', or names separated by commas
-    /// reproducible              leave clocks and threads out of the header
-    /// shard                     (index, count): every count-th iteration alone; `merge` joins what the shards save
-    /// checkpoint                a file that the state is saved to; it stays, so that the render can be extended
-    /// checkpoint_every          seconds between two saves
-    /// overwrite                 start anew although the checkpoint of a render that was stopped is there
-    /// resume                    a checkpoint to go on from: the same options, but for when to stop
-    /// threads                   0 takes all cores
-    /// progress                  called with a Progress after every iteration, in the calling thread; False ends it
-    ///
-    /// An exception of `progress`, or Ctrl-C, ends the render: the running iteration is given up, and what is finished, if
-    /// anything is, is the attribute `image` of the exception. Other threads of Python run meanwhile.
-    #[pyo3(
-        signature = (**options),
-        text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
-            height=None, camera=None, crop=None, filter=None, seed=0, max_depth=None, photons=None, levels=None, \
-            alpha=None, initial_bandwidth=None, knn=None, guide=None, cppm_grid=None, cppm_k=None, cppm_beta=None, \
-            cppm_significance=None, cppm_plus=False, finish=None, denoise=None, model=None, layers='all', \
-            reproducible=False, shard=None, checkpoint=None, checkpoint_every=300.0, overwrite=False, \
-            resume=None, threads=0, progress=None)"
-    )]
+    // Signature and text are made from the definition of options: scripts/generate.sh.
+    #[doc = include_str!("render.txt")]
+    #[pyo3(signature = (**options), text_signature = None)]
     fn render(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Image> {
         let mut keywords = Keywords::of(py, "render", options);
-        let approach = Approach::take(&mut keywords, &Approach::usual())?;
-        let shard = job::shard(&mut keywords)?;
-        let common = Common { shard, ..Common::take(&mut keywords, self.switches)? };
-        let view = job::view(&mut keywords)?;
-        let saving = saving(&mut keywords)?;
-        let resume: Option<PathBuf> = keywords.take("resume")?;
-        let overwrite = keywords.take("overwrite")?.unwrap_or(false);
-        let goes_on =
-            |saving: &Saving| resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, &saving.path));
-        if let Some(Saving { path, .. }) = saving.as_ref().filter(|saving| !goes_on(saving)) {
-            let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
-            checkpoint::check_replaceable(path, overwrite, &remedy).map_err(raised)?;
-        }
-        let layers = keywords.take("layers")?.unwrap_or_else(|| "all".to_string());
-        let reproducible = keywords.take("reproducible")?.unwrap_or(false);
         let threads = keywords.take("threads")?.unwrap_or(0);
         let progress: Option<Py<PyAny>> = keywords.take("progress")?;
+        let (asked, run) = job::take(&mut keywords, &job::of_render(), &self.asked)?;
         keywords.finish()?;
-        if !self.said.of_files && (shard.is_some() || saving.is_some() || resume.is_some()) {
+        let saving = run.saving(None);
+        saving.iter().try_for_each(|saving| atomic::check_writable(&saving.path)).map_err(raised)?;
+        let goes_on =
+            |saving: &Saving| run.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, &saving.path));
+        if let Some(Saving { path, .. }) = saving.as_ref().filter(|saving| !goes_on(saving)) {
+            let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
+            checkpoint::check_replaceable(path, run.overwrite, &remedy).map_err(raised)?;
+        }
+        if !self.said.of_files && (asked.shard.is_some() || saving.is_some() || run.resume.is_some()) {
             let cause = "render: shard, checkpoint and resume need a scene that another process can read";
             return Err(usage(
                 cause,
                 "write caustique.pack's bytes and an environment's array to files, and read them",
             ));
         }
-        let settings = approach.settings(&common, approach.way())?;
+        let settings = asked.settings().map_err(raised)?;
+        let view = asked.view().map_err(raised)?;
         let arguments = self.arguments(py, options)?;
         let progress = progress.map(Arc::new);
         let done = work(py, threads, |caller| {
-            let allowed = |way, size| approach.allowed(&common, way, size);
-            let auto = match approach.method {
-                None => Some(Auto { allowed: &allowed, finish: approach.pilot_finish() }),
-                Some(_) => None,
-            };
+            let allowed = |candidate, size| asked.allowed(candidate, size);
+            let auto = asked.method.0.is_none().then(|| Auto { allowed: &allowed, finish: asked.pilot_finish() });
             let order = Order {
                 scene: self.order(),
                 view,
                 settings,
-                photons: approach.photons,
-                max_depth: common.max_depth,
-                switches: self.switches,
+                photons: asked.photons,
+                max_depth: asked.max_depth,
+                switches: self.asked.switches(),
                 auto,
-                finish: approach.finish_order(),
-                layers,
+                finish: (!asked.no_combine).then(|| asked.finish.order()),
+                layers: run.layers.clone(),
                 naming: Naming::Plain,
                 arguments,
-                reproducible,
-                memory: None,
+                reproducible: run.reproducible,
+                memory: run.cap(),
                 saving,
-                resume,
+                resume: run.resume.clone(),
             };
             pipeline::render_loaded(order, &self.loaded, &mut Watcher { caller, progress })
         })?;
@@ -230,35 +163,27 @@ impl Scene {
         delivered(py, delivery)
     }
 
-    /// What a render would simulate, why, and what it warns of: the object of `caustique plan --json`, a dict. The
-    /// options are those of `render`.
-    #[pyo3(
-        signature = (**options),
-        text_signature = "($self, *, method='auto', iterations=None, time=None, target_error=None, width=None, \
-            height=None, camera=None, crop=None, filter=None, seed=0, max_depth=None, photons=None, levels=None, \
-            alpha=None, initial_bandwidth=None, knn=None, guide=None, cppm_grid=None, cppm_k=None, cppm_beta=None, \
-            cppm_significance=None, cppm_plus=False, finish=None, denoise=None, model=None, threads=0)"
-    )]
+    #[doc = include_str!("plan.txt")]
+    #[pyo3(signature = (**options), text_signature = None)]
     fn plan<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let mut keywords = Keywords::of(py, "plan", options);
-        let approach = Approach::take(&mut keywords, &Approach::usual())?;
-        let common = Common::take(&mut keywords, self.switches)?;
-        let view = job::view(&mut keywords)?;
         let threads = keywords.take("threads")?.unwrap_or(0);
+        let (asked, _) = job::take(&mut keywords, &job::of_plan(), &self.asked)?;
         keywords.finish()?;
-        let settings = approach.settings(&common, approach.way())?;
+        let settings = asked.settings().map_err(raised)?;
+        let view = asked.view().map_err(raised)?;
         let Loaded { scene, removed } = &self.loaded;
         let done = work(py, threads, |caller| {
             let camera = scene.camera(&view)?;
             check::media(&self.path, &settings, scene)?;
-            let choice = match approach.method {
+            let choice = match asked.method.0 {
                 Some(_) => None,
                 None => {
-                    let make = |way| approach.allowed(&common, way, camera.size());
-                    choose((scene, &camera), &mut approach.pilot_finish(), make, || caller.stops())
+                    let make = |candidate| asked.allowed(candidate, camera.size());
+                    choose((scene, &camera), &mut asked.pilot_finish(), make, || caller.stops())
                 }
             };
-            let Common { max_depth, switches, .. } = common;
+            let (max_depth, switches) = (asked.max_depth, self.asked.switches());
             let asked = pipeline::plan::Asked { choice: choice.as_ref(), max_depth, switches };
             let mut plan = pipeline::plan::plan(&asked, settings.method, (scene, &camera), removed);
             plan.warnings.splice(0..0, scene.warnings.iter().cloned());
@@ -310,7 +235,7 @@ impl Scene {
             rotation: None,
             strength: None,
             options: gltf::ReadOptions::default(),
-            off: self.switches.off,
+            off: self.asked.switches().off,
         }
     }
 
@@ -355,16 +280,6 @@ fn said(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &[&str]) -> Py
     })
 }
 
-/// Where and how often a render is saved, from the keywords `checkpoint checkpoint_every`.
-fn saving(keywords: &mut Keywords<'_>) -> PyResult<Option<Saving>> {
-    let path: Option<PathBuf> = keywords.take("checkpoint")?;
-    let every = job::seconds(keywords, "checkpoint_every")?.unwrap_or(EVERY);
-    if let Some(path) = &path {
-        atomic::check_writable(path).map_err(raised)?;
-    }
-    Ok(path.map(|path| Saving { path, every, keep: true }))
-}
-
 /// The image of a render; of one that could not be finished the error, with the image as its attribute.
 pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
     let (image, refusal) = Image::of(delivery);
@@ -373,34 +288,23 @@ pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
     Err(error)
 }
 
-/// A path, a colour (r, g, b), or an array (H, W, 3).
-fn environment(given: Bound<'_, PyAny>) -> PyResult<Environment> {
-    if let Ok(path) = given.extract::<PathBuf>() {
-        return Ok(Environment::File(path));
+/// The word that stands for an environment that is a path or a colour (r, g, b).
+fn environment_word(given: &Bound<'_, PyAny>) -> PyResult<OsString> {
+    let mut word = OsString::from("--env=");
+    match given.extract::<[f32; 3]>() {
+        Ok(color) => word.push(color.map(|c| c.to_string()).join(",")),
+        Err(_) => word.push(given.extract::<PathBuf>()?),
     }
-    if let Ok(color) = given.extract::<[f32; 3]>() {
-        return match color.iter().all(|x| *x >= 0.0 && x.is_finite()) {
-            true => Ok(Environment::Color(color.into())),
-            false => Err(usage("environment: a colour is not finite or negative", "radiance (r, g, b) from 0 up")),
-        };
-    }
-    let (width, height, texels) = radiance("environment", &given)?;
-    Ok(Environment::Image(EnvironmentSource::Image { width, height, texels }))
+    Ok(word)
 }
 
-fn read_options(keywords: &mut Keywords<'_>) -> PyResult<gltf::ReadOptions> {
-    let units = [
-        ("auto", gltf::LightUnits::Auto),
-        ("radiometric", gltf::LightUnits::Radiometric),
-        ("photometric", gltf::LightUnits::Photometric),
-    ];
-    let glass = [("auto", gltf::Glass::Auto), ("solid", gltf::Glass::Solid), ("thin", gltf::Glass::Thin)];
-    Ok(gltf::ReadOptions {
-        light_units: keywords.choice("light_units", &units)?.unwrap_or_default(),
-        glass: keywords.choice("glass", &glass)?.unwrap_or_default(),
-        allow_outside: keywords.take("allow_outside")?.unwrap_or(false),
-        frame: keywords.take("frame")?.map(|number| gltf::Frame { number, rate: None, of_sequence: false }),
-    })
+/// An environment that is an array (H, W, 3).
+fn environment_array(given: &Bound<'_, PyAny>) -> PyResult<Option<Environment>> {
+    if given.extract::<PathBuf>().is_ok() || given.extract::<[f32; 3]>().is_ok() {
+        return Ok(None);
+    }
+    let (width, height, texels) = radiance("environment", given)?;
+    Ok(Some(Environment::Image(EnvironmentSource::Image { width, height, texels })))
 }
 
 /// Tells Python how a render goes.

@@ -3,16 +3,12 @@
 import re
 import shlex
 
-from . import properties
+from . import definition, properties
 from .fault import Fault
 
 #: Options that a file's Arguments may give: those about the picture, and none that names a file, because a .blend may
 #: come from anybody.
-OPTIONS = frozenset("""
-    method photons levels eye-paths initial-bandwidth knn alpha cppm-grid cppm-k cppm-beta cppm-significance cppm-plus
-    radius-rule kernel guide indirect max-depth seed frame-seed time iterations target-error filter effects glass
-    env-rotation env-strength no-combine no-finish denoise layers exr-naming compression reproducible light-units strict
-""".split())
+OPTIONS = frozenset(name.replace("_", "-") for name in definition.FILES_MAY_GIVE) | {"no-finish", "light-units", "strict"}
 
 
 def method(settings):

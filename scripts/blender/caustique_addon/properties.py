@@ -2,19 +2,16 @@
 
 import bpy
 
-METHODS = (
-    ("auto", "Auto", "vcm where mirrors or glass focus light, elsewhere what a short pilot finds to be best"),
-    ("vcm", "VCM", "Vertex connection and merging: all techniques, weighed path by path"),
-    ("path", "Path", "Path tracing: matte scenes under large lamps"),
-    ("bdpt", "BDPT", "Bidirectional path tracing: indirect light without caustics in mirrors or behind glass"),
-    ("sppm", "SPPM", "Stochastic progressive photon mapping: media in which caustics show"),
-)
+from . import definition
 
+#: Methods that artists choose from, and their names here.
+METHODS = tuple(
+    (name, label, definition.help_of("method", name))
+    for name, label in (("auto", "Auto"), ("vcm", "VCM"), ("path", "Path"), ("bdpt", "BDPT"), ("sppm", "SPPM")))
+
+_DENOISERS = {"auto": "Auto", "oidn": "Open Image Denoise", "own": "Own", "none": "No Denoiser"}
 FINISHES = (
-    ("auto", "Auto", "Open Image Denoise where it is found, else the program's own denoiser"),
-    ("oidn", "Open Image Denoise", "Intel's denoiser, bounded by the noise of each pixel"),
-    ("own", "Own", "The program's own denoiser, bounded by the noise of each pixel"),
-    ("none", "No Denoiser", "The finish without a denoiser"),
+    *((name, _DENOISERS.get(name, name), definition.help_of("denoise", name)) for name in definition.names("denoise")),
     ("off", "Off", "The estimate itself, with its noise"),
 )
 
@@ -43,11 +40,11 @@ class Settings(bpy.types.PropertyGroup):
 
     method: bpy.props.EnumProperty(name="Method", items=METHODS, default="auto", description="How light is found")
     seed: bpy.props.IntProperty(
-        name="Seed", min=0, description="Another number, other noise. Animate it to vary the noise from frame to frame")
+        name="Seed", **definition.limits("seed"), description="Another number, other noise. Animate it to vary the noise from frame to frame")
 
     use_iterations: bpy.props.BoolProperty(name="Iterations", default=True, description="Stop after so many iterations")
     iterations: bpy.props.IntProperty(
-        name="Iterations", default=64, min=1, soft_max=4096, description="Most iterations of a frame")
+        name="Iterations", default=64, **definition.limits("iterations"), soft_max=4096, description="Most iterations of a frame")
     use_time: bpy.props.BoolProperty(name="Time", description="Stop after so much time")
     time: bpy.props.FloatProperty(
         name="Time", default=60, min=0.1, soft_max=3600, step=100, precision=1,

@@ -2,14 +2,15 @@
 
 use super::options::ConvergeArgs;
 use crate::cli::say;
-use crate::cli::scene::{Glass, LightUnits, SceneArgs};
 use crate::cli::signals::Interrupt;
 use caustique::camera::Camera;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, Result};
 use caustique::finish::{Denoiser, DenoiserChoice};
 use caustique::peers::{Drivers, Renderer};
 use caustique::report::guests::{Denoising, Driving, Guests};
+use caustique::scene::gltf::{Glass, LightUnits};
 use caustique::scene::{Scene, usd};
+use caustique::settings::SceneOptions;
 
 /// The guests that are asked for; `None` where there are none.
 ///
@@ -22,13 +23,13 @@ pub fn all(
     interrupt: &Interrupt,
     notes: &mut Vec<String>,
 ) -> Result<Option<Guests>> {
-    let mut renderers: Vec<Renderer> = args.with.iter().map(|choice| Renderer::from(*choice)).collect();
+    let mut renderers: Vec<Renderer> = args.with.clone();
     renderers.dedup();
     if renderers.is_empty() {
         return Ok(None);
     }
     let Some(time) = super::time(args) else {
-        let error = Error::new(Kind::Usage, "command line", "--with needs --time: other renderers count no iterations");
+        let error = Error::usage("--with needs --time: other renderers count no iterations");
         return Err(error.hint("add --time SECONDS"));
     };
     let drivers = Drivers::new(&renderers, &args.scene.path, args.camera.as_deref(), camera.size(), threads)?;
@@ -58,7 +59,7 @@ pub fn all(
 
 /// An option or a kind of file that drivers do not know, so that they would render another scene.
 fn refused(args: &ConvergeArgs) -> Option<String> {
-    let SceneArgs { path, frames, env, env_rotation, env_strength, light_units, glass, effects, .. } = &args.scene;
+    let SceneOptions { path, frames, env, env_rotation, env_strength, light_units, glass, effects, .. } = &args.scene;
     let option = [
         ("--env", env.is_some()),
         ("--env-rotation", env_rotation.is_some()),

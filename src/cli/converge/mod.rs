@@ -9,9 +9,9 @@ mod runs;
 
 pub use options::ConvergeArgs;
 
-use super::render::{Method, tell_plan};
+use super::render::tell_plan;
 use super::signals::Interrupt;
-use super::{say, scene};
+use super::{finish, say, scene};
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::finish::Finish;
@@ -86,14 +86,14 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         size: camera.size(),
         machine: machine(threads, &entries),
         settings: settings(args, &rules),
-        metric: args.error_metric.into(),
+        metric: args.error_metric,
         lines: outcome.lines.clone(),
         guests: peers,
         entries,
         rules,
         reference,
     };
-    let look = Look { exposure: args.exposure as f32, tonemap: args.tonemap.into() };
+    let look = Look { exposure: args.exposure as f32, tonemap: args.tonemap };
     let wishes = Wishes { targets: args.targets.clone(), targets_of: more, windows, look, notes };
     let summary = summarize(&subject, &mut outcome, &wishes)?;
     files::write(args, &subject, &mut outcome, &summary, threads)?;
@@ -150,7 +150,7 @@ fn choose_all(
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
         run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, camera.size());
         let make = |way| run.args.allowed(way, camera.size()).map(limits);
-        if run.args.method != Method::Auto {
+        if run.args.method.0.is_some() {
             return Ok(None);
         }
         let mut finish = run.args.pilot_finish();
@@ -183,7 +183,7 @@ fn open(
         tell_plan(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);
         let levels = entry.settings.levels.count;
-        let ready = (!options.no_combine).then(|| options.finish.open(Some(levels))).transpose();
+        let ready = (!options.no_combine).then(|| finish::open(&options.finish, Some(levels))).transpose();
         let ready = ready.map_err(|mut error| {
             if error.kind == Kind::Usage {
                 error.place = place;

@@ -1,16 +1,14 @@
 //! Every option of `caustique converge`.
 
-use crate::cli::number::{between, finite, positive, threads, whole};
-use crate::cli::output::Tonemap;
 use crate::cli::progress::Form;
-use crate::cli::render::Method;
-use crate::cli::scene::SceneArgs;
+use caustique::image::tonemap::ToneMap;
 use caustique::peers::Renderer;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::MAX_SIZE;
+use caustique::settings::number::{Ranged, finite, positive, threads};
+use caustique::settings::{MethodChoice, SceneOptions};
 use caustique::stat::sum::MOST_TERMS;
-use clap::ValueEnum;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -34,7 +32,7 @@ pub struct ConvergeArgs {
 
     /// Methods, each with its defaults and one bandwidth level [default: path,sppm,cppm,vcm, unless there is a --run]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
-    pub methods: Vec<Method>,
+    pub methods: Vec<MethodChoice>,
     /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5';
     /// may be repeated. As there, the picture is finished unless --no-combine is given
     #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
@@ -45,26 +43,26 @@ pub struct ConvergeArgs {
     /// Other renderers on the same scene, at budgets that double up to --time, with and without Open Image Denoise
     /// ('scripts/compare/setup.sh peers' installs them)
     #[arg(long = "with", value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
-    pub with: Vec<RendererChoice>,
+    pub with: Vec<Renderer>,
     /// Stop each run after so many seconds of its own [default: 60, without --iterations]
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop each run after so many iterations
-    #[arg(long, value_name = "N", value_parser = whole(1_u64..=MOST_TERMS), help_heading = "When to stop")]
+    #[arg(long, value_name = "N", whole = 1_u64..=MOST_TERMS, help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Measure at iterations that grow by this factor, in (1, 10]
-    #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, value_parser = between(Excluded(1.0), Included(10.0)), help_heading = "Runs")]
+    #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, between = (Excluded(1.0), Included(10.0)), help_heading = "Runs")]
     pub moments: f64,
     /// Seed; a reference made here has others
-    #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole(0..=u64::MAX), help_heading = "Runs")]
+    #[arg(long, value_name = "S", default_value_t = 0, whole = 0..=u64::MAX, help_heading = "Runs")]
     pub seed: u64,
     /// Repeat everything with so many seeds: means and standard errors
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u64..=1000), help_heading = "Runs")]
+    #[arg(long, value_name = "N", default_value_t = 1, whole = 1_u64..=1000, help_heading = "Runs")]
     pub seeds: u64,
 
     /// Figure of curves, targets and exponents
-    #[arg(long, value_enum, default_value_t = MetricChoice::Relmse, help_heading = "Error")]
-    pub error_metric: MetricChoice,
+    #[arg(long, value_enum, default_value_t, help_heading = "Error")]
+    pub error_metric: Metric,
     /// Errors for the table of times to a given error [default: some that two runs reach]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, help_heading = "Error")]
     pub targets: Vec<f64>,
@@ -80,29 +78,29 @@ pub struct ConvergeArgs {
     /// Method of a reference made here [default: bdpt; vcm where the scene has caustics seen through glass or in
     /// mirrors]
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with = "reference", help_heading = "Error")]
-    pub reference_method: Option<Method>,
+    pub reference_method: Option<MethodChoice>,
     /// Seconds for a reference made here, both halves together [default: 8 times --time]
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
     pub reference_time: Option<f64>,
     /// Iterations of each of the two halves of a reference made here [default: 16 times --iterations, without --time]
-    #[arg(long, value_name = "N", value_parser = whole(2_u64..=MOST_TERMS), conflicts_with = "reference", help_heading = "Error")]
+    #[arg(long, value_name = "N", whole = 2_u64..=MOST_TERMS, conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
     /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]
-    #[arg(long, value_name = "W", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
+    #[arg(long, value_name = "W", whole = 1..=MAX_SIZE, help_heading = "Picture")]
     pub width: Option<u32>,
     /// Height in pixels; without a width the camera's aspect is kept
-    #[arg(long, value_name = "H", value_parser = whole(1..=MAX_SIZE), help_heading = "Picture")]
+    #[arg(long, value_name = "H", whole = 1..=MAX_SIZE, help_heading = "Picture")]
     pub height: Option<u32>,
     /// Camera by name [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
     /// Longest light path in segments, camera to light, of all runs [default: no limit]
-    #[arg(long, value_name = "N", value_parser = whole(1_u32..=1_000_000), help_heading = "Picture")]
+    #[arg(long, value_name = "N", whole = 1_u32..=1_000_000, help_heading = "Picture")]
     pub max_depth: Option<u32>,
 
     #[command(flatten)]
-    pub scene: SceneArgs,
+    pub scene: SceneOptions,
 
     /// A part of the picture to show side by side; may be repeated [default: two, where the runs differ most]
     #[arg(long, value_name = "X,Y,W,H", help_heading = "Page")]
@@ -111,8 +109,8 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Page")]
     pub exposure: f64,
     /// From light to the page's colours
-    #[arg(long, value_enum, default_value_t = Tonemap::Agx, help_heading = "Page")]
-    pub tonemap: Tonemap,
+    #[arg(long, value_enum, default_value_t, help_heading = "Page")]
+    pub tonemap: ToneMap,
 
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
@@ -120,48 +118,6 @@ pub struct ConvergeArgs {
     /// Reports on stderr
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     pub progress: Form,
-}
-
-/// `--with`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum RendererChoice {
-    /// Mitsuba 3: path tracing
-    Mitsuba,
-    /// LuxCore: path tracing, the same with its caustic cache, and bidirectional
-    Luxcore,
-    /// Blender's Cycles: path tracing
-    Cycles,
-}
-
-impl From<RendererChoice> for Renderer {
-    fn from(choice: RendererChoice) -> Renderer {
-        match choice {
-            RendererChoice::Mitsuba => Renderer::Mitsuba,
-            RendererChoice::Luxcore => Renderer::Luxcore,
-            RendererChoice::Cycles => Renderer::Cycles,
-        }
-    }
-}
-
-/// `--error-metric`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum MetricChoice {
-    /// Squared error over the squared reference plus 0.01
-    Relmse,
-    /// The same without the worst 0.5 % of pixels, which fireflies rule
-    RelmseTrimmed,
-    /// Squared error
-    Mse,
-}
-
-impl From<MetricChoice> for Metric {
-    fn from(choice: MetricChoice) -> Metric {
-        match choice {
-            MetricChoice::Relmse => Metric::RelMse,
-            MetricChoice::RelmseTrimmed => Metric::RelMseTrimmed,
-            MetricChoice::Mse => Metric::Mse,
-        }
-    }
 }
 
 /// `--target-of RUN@N`.

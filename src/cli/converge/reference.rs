@@ -4,16 +4,16 @@ use super::options::ConvergeArgs;
 use super::progress::Reporter;
 use super::runs::{self, Run};
 use crate::cli::progress::duration;
-use crate::cli::render::Method;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::plan::{Effect, Presence};
-use caustique::render::{Control, Settings};
+use caustique::render::{Control, Method, Settings};
 use caustique::report::entry::Metric;
 use caustique::report::reference::{Halves, OwnError, Reference};
 use caustique::scene::Scene;
+use caustique::settings::MethodChoice;
 
 /// Where the reference comes from.
 pub enum Source {
@@ -66,12 +66,12 @@ pub fn source(
 fn own(args: &ConvergeArgs, scene: &Scene, camera: &Camera) -> Result<Box<Settings>> {
     let method = match args.reference_method {
         Some(method) => method,
-        None if Presence::of(scene, camera).has(Effect::Sds) => Method::Vcm,
-        None => Method::Bdpt,
+        None if Presence::of(scene, camera).has(Effect::Sds) => MethodChoice(Some(Method::Vcm)),
+        None => MethodChoice(Some(Method::Bdpt)),
     };
     let mut settings = runs::by_method(args, method)?.entry.settings;
-    if settings.method == caustique::render::Method::Pm {
-        let error = Error::new(Kind::Usage, "command line", "pm does not converge: it makes no reference");
+    if settings.method.has_one_map() {
+        let error = Error::usage("pm does not converge: it makes no reference");
         return Err(error.hint("choose another --reference-method"));
     }
     settings.time = args.reference_time;

@@ -2,13 +2,14 @@
 
 use super::options::ConvergeArgs;
 use crate::cli::layout;
-use crate::cli::render::{Job, Method, RenderArgs};
+use crate::cli::render::RenderArgs;
 use crate::cli::usage;
 use caustique::error::{Error, Kind, Result};
-use caustique::render::{Settings, Spent};
+use caustique::render::{Method, Settings, Spent};
 use caustique::report::entry::Entry;
+use caustique::settings::{MethodChoice, RenderOptions};
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
+use clap::{ArgMatches, Args, Command, FromArgMatches};
 
 /// Options beside a render's method that are not a run's: those of the picture itself, which all runs have in common,
 /// and files of its own.
@@ -21,7 +22,7 @@ pub struct Run {
     /// What competes; its finish is not known before libraries are found.
     pub entry: Entry,
     /// All options of a render with this method.
-    pub args: Job,
+    pub args: RenderOptions,
 }
 
 /// All runs that are asked for.
@@ -29,7 +30,7 @@ pub struct Run {
 /// # Errors
 /// Options that a render does not have, or that are not a run's; names given twice.
 pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
-    let usual = [Method::Path, Method::Sppm, Method::Cppm, Method::Vcm];
+    let usual = [Method::Path, Method::Sppm, Method::Cppm, Method::Vcm].map(|method| MethodChoice(Some(method)));
     let methods = if args.methods.is_empty() && args.runs.is_empty() { &usual[..] } else { &args.methods };
     let mut runs: Vec<Run> = methods.iter().map(|method| by_method(args, *method)).collect::<Result<_>>()?;
     for text in &args.runs {
@@ -51,17 +52,17 @@ pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
     }
     let name = |run: usize| &runs[run].entry.name;
     if let Some(twice) = (1..runs.len()).find(|&run| (0..run).any(|other| name(other) == name(run))) {
-        let error = Error::new(Kind::Usage, "command line", format!("two runs are called \"{}\"", name(twice)));
+        let error = Error::usage(format!("two runs are called \"{}\"", name(twice)));
         return Err(error.hint("give each --run a name of its own: --run 'NAME: OPTIONS'"));
     }
     Ok(runs)
 }
 
 /// A method with its defaults and one level.
-pub fn by_method(args: &ConvergeArgs, method: Method) -> Result<Run> {
-    let name = method.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
+pub fn by_method(args: &ConvergeArgs, method: MethodChoice) -> Result<Run> {
+    let name = method.name().to_string();
     let mut words = vec!["--method".to_string(), name.clone()];
-    if method.chosen().has_levels() {
+    if method.0.is_none_or(Method::has_levels) {
         words.extend(["--levels".into(), "1".into()]);
     }
     parse(args, &name, &words.join(" "), words)
@@ -102,7 +103,7 @@ fn refuse_common(command: &Command, matches: &ArgMatches) -> Result<()> {
         if !of_run && !["output", "path"].contains(&id) {
             let option = arg.get_long().unwrap_or(id);
             let cause = format!("--{option} cannot differ from run to run");
-            return Err(Error::new(Kind::Usage, "command line", cause)
+            return Err(Error::usage(cause)
                 .hint("a run has the method and finish options of 'caustique render'; the others, where there are such, concern all runs"));
         }
     }

@@ -3,7 +3,6 @@
 
 use super::options::RenderArgs;
 use super::preview::Target;
-use crate::cli::scene::EnvironmentChoice;
 use crate::cli::{output, print_file};
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
@@ -12,6 +11,7 @@ use caustique::image::{atomic, usd_layer};
 use caustique::pipeline::checkpoint;
 use caustique::pipeline::shard::Tail;
 use caustique::scene::gltf;
+use caustique::settings::EnvironmentChoice;
 use caustique::temporary;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use tempfile::TempDir;
 /// # Errors
 /// The EXR could not be written where it was asked for; the hint says where it is instead.
 pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: Option<&Tail>) -> Result<()> {
-    let options = args.picture.exr_options(args.exr_naming.into());
+    let options = args.picture.exr_options(args.run.exr_naming);
     let into = |path: &Path| {
         exr::write_followed(path, set, attributes, options, |file| tail.map_or(Ok(()), |tail| tail.write(file)))
     };
@@ -56,7 +56,7 @@ pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes
         return None;
     }
     let path = args.output.with_extension("estimate.exr");
-    let options = exr::Options { compression: exr::Compression::None, naming: args.exr_naming.into() };
+    let options = exr::Options { compression: exr::Compression::None, naming: args.run.exr_naming };
     exr::write_followed(&path, set, attributes, options, |_| Ok(())).ok().map(|()| path)
 }
 
@@ -89,13 +89,13 @@ pub fn check_inputs(args: &RenderArgs) -> Result<()> {
 /// # Errors
 /// See [`atomic::check_writable`] and [`checkpoint::check_replaceable`].
 pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
-    args.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
-    let goes_on = |path: &Path| args.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, path));
+    args.run.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
+    let goes_on = |path: &Path| args.run.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, path));
     let Some(path) = args.saving().map(|saving| saving.path).filter(|path| !goes_on(path)) else { return Ok(()) };
     let of_frames = args.job.scene.frames.is_some();
     let going_on = if of_frames { "--skip-existing".into() } else { format!("--resume {}", path.display()) };
     let remedy = format!("go on with {going_on}, or start anew with --overwrite");
-    checkpoint::check_replaceable(&path, args.overwrite, &remedy)
+    checkpoint::check_replaceable(&path, args.run.overwrite, &remedy)
 }
 
 /// Checks that the layer of USD can be written, and has a file to tell of.
@@ -105,7 +105,7 @@ pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
 pub fn check_usd_layer(args: &RenderArgs) -> Result<()> {
     let Some(path) = &args.usd_layer else { return Ok(()) };
     if output::is_stdout(&args.output) {
-        let error = Error::new(Kind::Usage, "command line", "--usd-layer: the EXR is no file that it could point to");
+        let error = Error::usage("--usd-layer: the EXR is no file that it could point to");
         return Err(error.hint("give -o a file, or leave --usd-layer out"));
     }
     output::check(path, "usda")

@@ -2,24 +2,21 @@
 
 mod claim;
 mod files;
-mod job;
 mod options;
 mod preview;
 mod sequence;
 mod summary;
 mod techniques;
 
-pub use job::{Job, Method};
 pub use options::RenderArgs;
 
 use super::finish::tell_missing;
 use super::progress::{Reporter, Turn, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, Result};
 use caustique::film::LayerSet;
 use caustique::image::exr;
-use caustique::pipeline::memory::Cap;
 use caustique::pipeline::plan::why;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
@@ -38,9 +35,9 @@ pub use summary::{Summary, place, tell_finish, tell_picture, tell_unseen};
 pub fn run(args: &RenderArgs) -> Result<()> {
     if !args.has_output() {
         let cause = "the following required arguments were not provided: --output <OUT.exr>";
-        return Err(Error::new(Kind::Usage, "command line", cause).hint("'--help' explains every option"));
+        return Err(Error::usage(cause).hint("'--help' explains every option"));
     }
-    super::pool(args.threads)?.install(|| match args.job.scene.frames {
+    super::pool(args.run.threads)?.install(|| match args.job.scene.frames {
         Some(frames) => sequence::run(args, frames),
         None => {
             sequence::refuse_patterns(args)?;
@@ -54,8 +51,8 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     let settings = args.settings()?;
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
-    let groups = layers::groups_named(&args.layers);
-    layers::selection(&args.layers, &shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
+    let groups = layers::groups_named(&args.run.layers);
+    layers::selection(&args.run.layers, &shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;
@@ -68,7 +65,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
 
 fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<()> {
     let allowed = |way, size| args.job.allowed(way, size);
-    let auto = (args.job.method == Method::Auto).then(|| Auto { allowed: &allowed, finish: args.job.pilot_finish() });
+    let auto = args.job.method.0.is_none().then(|| Auto { allowed: &allowed, finish: args.job.pilot_finish() });
     let order = Order {
         scene: args.job.scene.order(),
         view: args.job.view()?,
@@ -78,13 +75,13 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
         switches: args.job.scene.switches(),
         auto,
         finish: (!args.job.no_combine).then(|| args.job.finish.order()),
-        layers: args.layers.clone(),
-        naming: args.exr_naming.into(),
+        layers: args.run.layers.clone(),
+        naming: args.run.exr_naming,
         arguments: json!(args),
-        reproducible: args.reproducible,
-        memory: args.memory.map(|mib| Cap { bytes: u64::from(mib) << 20 }),
+        reproducible: args.run.reproducible,
+        memory: args.run.cap(),
         saving: args.saving(),
-        resume: args.resume.clone(),
+        resume: args.run.resume.clone(),
     };
     let mut told = Telling {
         args,

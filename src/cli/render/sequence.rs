@@ -2,11 +2,11 @@
 
 use super::claim::{Claim, Claimed};
 use super::options::RenderArgs;
-use crate::cli::frames::{Frames, is_pattern, numbered};
 use crate::cli::progress::Turn;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::error::{Error, Kind, Result};
+use caustique::settings::{Frames, is_pattern, numbered};
 
 /// Renders the frames in order, and ends at the first that fails, as Blender does; those before are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
@@ -24,7 +24,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         // What a run that was stopped has left of it.
         let left = || {
             let left = one.saving().map(|saving| saving.path);
-            left.filter(|path| args.skip_existing && !args.overwrite && path.is_file())
+            left.filter(|path| args.skip_existing && !args.run.overwrite && path.is_file())
         };
         let done = || args.skip_existing && left().is_none() && is_there(&one);
         if done() {
@@ -55,7 +55,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             say(&format!("frame {frame} ({} of {count}): {}", before + 1, one.output.display()));
         }
         // Of several frames some may not have been begun.
-        one.resume = left.clone().or(one.resume.filter(|path| count == 1 || path.exists()));
+        one.run.resume = left.clone().or(one.run.resume.filter(|path| count == 1 || path.exists()));
         super::one(&one, Some(Turn { frame, before, count })).map_err(|error| {
             let of_left = left.filter(|left| error.place == left.display().to_string());
             let error = match of_left {
@@ -81,7 +81,7 @@ fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
     for (option, path) in args.files() {
         if numbered(path, 0).is_none() {
             let cause = format!("{option} {}: all frames have the same name", path.display());
-            let error = Error::new(Kind::Usage, "command line", cause);
+            let error = Error::usage(cause);
             return Err(error.hint("put '####' where the frame's number belongs, such as out.####.exr"));
         }
     }
@@ -98,7 +98,7 @@ pub fn refuse_patterns(args: &RenderArgs) -> Result<()> {
         None => Ok(()),
         Some((option, path)) => {
             let cause = format!("{option} {}: its name has a place for a frame's number", path.display());
-            let error = Error::new(Kind::Usage, "command line", cause);
+            let error = Error::usage(cause);
             Err(error.hint("give --frames, such as --frames 1-100, or another name"))
         }
     }

@@ -44,7 +44,7 @@ fn one(
 ) -> Result<()> {
     let mut set = LayerSet::new(width, height);
     set.push(Layer::interleaved("", "RGB", values.iter().copied()))?;
-    let options = args.picture.exr_options(args.exr_naming.into());
+    let options = args.picture.exr_options(args.run.exr_naming);
     exr::write(&folder.join(format!("{name}.exr")), &set, &Attributes::default(), options)?;
     let (exposure, curve) = args.picture.look(made_for);
     png::write_tonemapped(&folder.join(format!("{name}.png")), width, height, values, exposure, curve)

@@ -21,18 +21,21 @@ use super::{Attributes, Frame, SOFTWARE, header, zip};
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Plane, Sample, check};
 use crate::image::atomic;
+use serde::Serialize;
 
 /// How pixels are packed; all of these are lossless.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum Compression {
-    /// zlib over 16 lines: small and widely read.
+    /// zlib over 16 lines: small files, widely read
     #[default]
     Zip,
-    /// zlib over single lines: the quickest for programs that read lines.
+    /// zlib over single lines: quick access to lines
     Zips,
-    /// Wavelets and Huffman codes: smaller on noise.
+    /// Wavelets: small for noisy pictures
     Piz,
-    /// As they are.
+    /// None: quick and large
     None,
 }
 

@@ -6,7 +6,7 @@ use super::fault;
 use crate::error::Result;
 use crate::material::MediumParameters;
 use crate::math::Rgb;
-use crate::scene::description::ToneCurve;
+use crate::scene::description::ToneMap;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -21,7 +21,7 @@ pub(super) struct SceneExtras {
     pub(super) losses: Vec<String>,
     pub(super) resolution: Option<[u32; 2]>,
     pub(super) exposure: Option<f32>,
-    pub(super) tonemap: Option<ToneCurve>,
+    pub(super) tonemap: Option<ToneMap>,
     pub(super) crop: Option<[f64; 4]>,
     pub(super) film_transparent: bool,
     pub(super) frame: Option<i32>,
@@ -217,37 +217,9 @@ fn check_object(value: &Value, prefix: &str, known: &[&str], place: &str, warnin
             check_object(item, &format!("{path}."), known, place, warnings);
             continue;
         }
-        let near = known.iter().map(|k| (distance(&path, k), k)).min();
+        let near = known.iter().map(|k| (strsim::levenshtein(&path, k), k)).min();
         let near = near.filter(|(d, k)| *d <= 3 || k.starts_with(&path));
         let advice = near.map_or_else(String::new, |(_, k)| format!(" (did you mean \"{k}\"?)"));
         warnings.push(format!("{place}: extras.caustique has no key \"{path}\"{advice}"));
-    }
-}
-
-/// Levenshtein's distance: insertions, deletions and substitutions between two words.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let best = (diagonal + usize::from(x != *y)).min(row[j] + 1).min(row[j + 1] + 1);
-            diagonal = std::mem::replace(&mut row[j + 1], best);
-        }
-    }
-    row[b.len()]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::distance;
-
-    #[test]
-    fn distances() {
-        assert_eq!(distance("kitten", "sitting"), 3);
-        assert_eq!(distance("", "abc"), 3);
-        assert_eq!(distance("angle", "angle_deg"), 4);
-        assert_eq!(distance("radius", "radius"), 0);
     }
 }

@@ -35,32 +35,39 @@ pub use files::{files, hash};
 
 use super::Description;
 use crate::error::{Error, Kind, Result};
+use serde::Serialize;
 use std::fmt::Display;
 use std::path::Path;
 
 /// What the numbers of punctual lights mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum LightUnits {
+    /// By the program that wrote the file
+    ///
     /// `extras.caustique.light_units` of the scene, or else the generator: Blender's exporter multiplies watts by 683
     /// lm/W (and leaves emissive surfaces alone), so its files are photometric. Other files state lamps and emissive
     /// surfaces in one system, so their ratio holds when lamps are taken as they are.
     #[default]
     Auto,
-    /// W/sr and W/m2: taken as they are.
+    /// Watts: W/sr and W/m2, taken as they are
     Radiometric,
-    /// cd and lx: divided by 683 lm/W.
+    /// Lumens: cd and lx, divided by 683 lm/W
     Photometric,
 }
 
 /// What a transmissive mesh without a volume extension is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum Glass {
-    /// Solid where the mesh is closed, thin where it is open.
+    /// Solid if the mesh is closed, thin if it is open
     #[default]
     Auto,
-    /// The boundary of a solid: light refracts.
+    /// The boundary of a solid: light refracts
     Solid,
-    /// A thin wall, as the glTF specification says: light passes straight.
+    /// Thin panes that do not bend light, as the glTF specification says
     Thin,
 }
 

@@ -24,7 +24,7 @@ use std::time::Duration;
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
 /// The converter's files.
-const SOURCES: [(&str, &str); 19] = [
+const SOURCES: [(&str, &str); 20] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
     ("document.py", include_str!("../../../scripts/usd/document.py")),
@@ -37,6 +37,7 @@ const SOURCES: [(&str, &str); 19] = [
     ("materialx.py", include_str!("../../../scripts/usd/materialx.py")),
     ("meshes.py", include_str!("../../../scripts/usd/meshes.py")),
     ("network.py", include_str!("../../../scripts/usd/network.py")),
+    ("options.json", include_str!("../../../scripts/usd/options.json")),
     ("preview.py", include_str!("../../../scripts/usd/preview.py")),
     ("render_settings.py", include_str!("../../../scripts/usd/render_settings.py")),
     ("scene.py", include_str!("../../../scripts/usd/scene.py")),

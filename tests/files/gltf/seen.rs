@@ -3,7 +3,7 @@
 use super::glb::Glb;
 use super::{message, read, try_read};
 use caustique::light::SpotEdge;
-use caustique::scene::description::{Picture, PunctualKind, ToneCurve};
+use caustique::scene::description::{Picture, PunctualKind, ToneMap};
 use caustique::scene::{Crop, View};
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ fn what_the_picture_was_made_for() {
         "environment": {"color": [1, 1, 1], "visible": {"camera": false}},
     }));
     let description = read(&file);
-    let (exposure, tonemap) = (Some(-1.5), Some(ToneCurve::Filmic));
+    let (exposure, tonemap) = (Some(-1.5), Some(ToneMap::Filmic));
     let crop = Some([0.0, 0.0, 0.5, 1.0]);
     let resolution = Some([640, 200]);
     let (frame, frame_rate) = (Some(12), Some([24000, 1001]));

@@ -1,5 +1,6 @@
 """Scenes from numpy meet closed forms; scenes from files give what the command line gives."""
 
+import inspect
 import json
 import os
 import signal
@@ -320,16 +321,16 @@ class Faults(unittest.TestCase):
         scene = ground([])
         for options, fault, hint in [
             ({"method": "photons"}, "method='photons'", "'sppm'"),
-            ({"iterations": 0}, "iterations=0", "above 0"),
+            ({"iterations": 0}, "iterations=0", "from 1 to"),
             ({"method": "path", "photons": 5}, "photons has no effect", "leave photons out"),
             ({"method": "vcm", "levels": 9}, "levels=9", "from 1 to 5"),
             ({"width": 10**5}, "100000", "32768"),
             ({"layers": "Nosy", "method": "path"}, "Nosy", "Noisy"),
             ({"camera": "front"}, "front", "camera"),
             ({"crop": (0, 0, 2, 2.5)}, "crop", "pixels"),
-            ({"filter": "hat"}, "filter='hat'", "gaussian"),
+            ({"filter": "hat"}, "no filter 'hat'", "gaussian"),
             ({"filter": ("box", 99)}, "99", "0.1 to 8"),
-            ({"cppm_k": 0.5, "method": "sppm"}, "cppm_*", "method='cppm'"),
+            ({"cppm_k": 0.5, "method": "sppm"}, "cppm_k has no effect", "method='cppm'"),
             ({"cppm_grid": (9, 9), "method": "cppm"}, "cppm_grid=(9, 9)", "2 to 64"),
             ({"checkpoint_every": 0.0}, "checkpoint_every=0", "above 0"),
         ]:
@@ -341,6 +342,27 @@ class Faults(unittest.TestCase):
             scene.render(width="wide")
         with self.assertRaisesRegex(ValueError, "argument 'seed'"):
             scene.render(seed=-1)
+
+    def test_signatures_name_the_arguments(self):
+        scene = ground([])
+        for call, some in ((scene.plan, {"kernel", "photon_memory"}), (scene.render, {"memory", "radius_rule", "eye_paths"})):
+            names = set(inspect.signature(call).parameters)
+            self.assertLessEqual(some | {"method", "indirect", "threads"}, names)
+            # None is an argument that is left out; a name that is unknown would be a TypeError.
+            with self.assertRaisesRegex(cq.Error, "iterations=0"):
+                call(**dict.fromkeys(names) | {"iterations": 0})
+
+    def test_options_of_the_command_line(self):
+        scene = cq.Scene(TORUS)
+        small = {"method": "sppm", "iterations": 2, "width": 16, "levels": 1, "photons": 2000, "finish": False}
+        plain = scene.render(**small).picture
+        for options in ({"kernel": "gaussian"}, {"radius_rule": "local"}, {"indirect": "paths"}):
+            with self.subTest(**options):
+                self.assertFalse(np.array_equal(scene.render(**small | options).picture, plain))
+        with self.assertRaisesRegex(cq.Error, "kernel='cone' does not exist\nhint: one of 'box'"):
+            scene.render(**small, kernel="cone")
+        with self.assertRaisesRegex(cq.Error, "MiB"):
+            scene.render(method="path", iterations=1, width=2048, memory=1)
 
     def test_scenes_that_are_wrong(self):
         vertices, triangles = square()

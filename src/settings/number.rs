@@ -1,9 +1,67 @@
 //! Parsers of option values: numbers in a range, lists of numbers, fractions.
 
+use clap::Arg;
+use clap::builder::ArgExt;
+use serde::Serialize;
+use serde_json::Number;
 use std::fmt::Display;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
+
+/// Range of an option's values.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Range {
+    /// The smallest value, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min: Option<Number>,
+    /// Values are above `min`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub above_min: bool,
+    /// The largest value, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max: Option<Number>,
+    /// Values are below `max`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub below_max: bool,
+}
+
+impl ArgExt for Range {}
+
+/// An option whose value is a number of a range: attributes of a field in a definition of options.
+pub trait Ranged {
+    /// A whole number.
+    fn whole<T>(self, range: RangeInclusive<T>) -> Self
+    where
+        T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static;
+    /// A finite number.
+    fn between(self, range: (Bound<f64>, Bound<f64>)) -> Self;
+}
+
+impl Ranged for Arg {
+    fn whole<T>(self, range: RangeInclusive<T>) -> Arg
+    where
+        T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static,
+    {
+        let number = |end: &T| end.to_string().parse().ok();
+        let told = Range { min: number(range.start()), max: number(range.end()), ..Range::default() };
+        self.value_parser(whole(range)).add(told)
+    }
+
+    fn between(self, (low, high): (Bound<f64>, Bound<f64>)) -> Arg {
+        let number = |bound: Bound<f64>| match bound {
+            Included(x) | Excluded(x) => Number::from_f64(x),
+            Unbounded => None,
+        };
+        let told = Range {
+            min: number(low),
+            above_min: matches!(low, Excluded(_)),
+            max: number(high),
+            below_max: matches!(high, Excluded(_)),
+        };
+        self.value_parser(between(low, high)).add(told)
+    }
+}
 
 /// A finite number between two bounds.
 pub fn between(low: Bound<f64>, high: Bound<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {

@@ -1,0 +1,228 @@
+//! A description of options for everything that is not the command line: Python's arguments and their stubs, render
+//! settings of USD, the panel of Blender's add-on, and tables in the documentation.
+
+use super::check::takes;
+use super::number::Range;
+use super::parse::command;
+use crate::render::Method;
+use clap::{Arg, Command, ValueEnum};
+use serde::Serialize;
+use std::any::TypeId;
+use std::path::PathBuf;
+
+/// An option.
+#[derive(Clone, Debug, Serialize)]
+pub struct Entry {
+    /// Name of its field, as `max_depth`.
+    pub name: String,
+    /// Its name on the command line, as `--max-depth`.
+    pub option: String,
+    /// What it takes.
+    pub kind: Kind,
+    /// What its values are called in the help, and how many of these there may be.
+    pub values: Vec<String>,
+    /// Its default, where it is one value.
+    pub default: Option<String>,
+    /// Range of a number.
+    pub range: Option<Range>,
+    /// Names to choose from, each with its help.
+    pub choices: Vec<(String, String)>,
+    /// Heading of the help.
+    pub heading: String,
+    /// Its help.
+    pub help: String,
+    /// Methods that take it; empty: all.
+    pub methods: Vec<&'static str>,
+    /// Whether the render settings of a stage of USD may give it.
+    pub stage: bool,
+    /// Its name as an argument of Python's `render`, or of `Scene`; `None`: it is none.
+    pub python: Option<String>,
+    /// Whether it is an argument of `Scene`.
+    pub of_scene: bool,
+    /// Why it is none.
+    pub not_in_python: Option<&'static str>,
+}
+
+/// What an option takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Nothing: it is given or not.
+    Flag,
+    /// A whole number.
+    Integer,
+    /// A number.
+    Number,
+    /// One of some names.
+    Choice,
+    /// `on` or `off`.
+    Switch,
+    /// A file.
+    Path,
+    /// A text of a form of its own.
+    Text,
+}
+
+/// Options that are no arguments of Python, and why.
+const NOT_IN_PYTHON: [(&str, &str); 13] = [
+    ("output", "the picture is an Image: its method save writes it"),
+    ("png", "an argument of Image.save"),
+    ("exposure", "an argument of Image.save"),
+    ("tonemap", "an argument of Image.save"),
+    ("compression", "an argument of Image.save"),
+    ("exr_naming", "layers in memory have plain names"),
+    ("usd_layer", "a file beside the EXR"),
+    ("preview", "the callback progress shows how a render goes"),
+    ("progress", "its progress is a callback"),
+    ("debug_techniques", "files beside the EXR"),
+    ("skip_existing", "a Scene is one frame"),
+    ("frame_seed", "a Scene is one frame"),
+    ("no_checkpoint", "nothing is saved unless checkpoint is given"),
+];
+
+/// Options that are arguments of Python's `Scene`, and their names there.
+const OF_SCENE: [(&str, &str); 10] = [
+    ("frames", "frame"),
+    ("frame_rate", "frame_rate"),
+    ("env", "environment"),
+    ("env_rotation", "environment_rotation"),
+    ("env_strength", "environment_strength"),
+    ("light_units", "light_units"),
+    ("glass", "glass"),
+    ("effects", "effects"),
+    ("allow_outside", "allow_outside"),
+    ("strict", "strict"),
+];
+
+/// Headings of options that a stage of USD may give: those about the picture and the way to it. A stage may come from
+/// anywhere, so files and permissions are the command line's alone.
+const OF_STAGES: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
+/// Options of other headings that a stage may give.
+const ALSO_OF_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
+/// Options of these headings that it may not: files, permissions, memory, and what stages say by other means.
+const NOT_OF_STAGES: [&str; 6] = ["env", "model", "allow_outside", "strict", "photon_memory", "light_units"];
+
+/// Describes the options of a command, in the order of its help.
+pub fn describe(command: &Command) -> Vec<Entry> {
+    command.get_arguments().filter(|arg| arg.get_long().is_some() && arg.get_id() != "help").map(entry).collect()
+}
+
+/// The options that are arguments of Python's `render`, each by its name there.
+pub fn of_python() -> Vec<Entry> {
+    describe(&command()).into_iter().filter(|entry| entry.python.is_some() && !entry.of_scene).collect()
+}
+
+/// The options of a scene, which are arguments of Python's `Scene`.
+pub fn of_scene() -> Vec<Entry> {
+    describe(&command()).into_iter().filter(|entry| entry.of_scene).collect()
+}
+
+fn entry(arg: &Arg) -> Entry {
+    let name = arg.get_id().to_string();
+    let choices = arg.get_possible_values();
+    let help = |value: &clap::builder::PossibleValue| value.get_help().map(ToString::to_string).unwrap_or_default();
+    let kind = kind(arg);
+    let not_in_python = NOT_IN_PYTHON.iter().find(|(option, _)| *option == name).map(|(_, why)| *why);
+    let of_scene = OF_SCENE.iter().find(|(option, _)| *option == name).map(|(_, name)| *name);
+    let python = not_in_python.is_none().then(|| match (of_scene, name.as_str()) {
+        (Some(argument), _) => argument.into(),
+        (None, "no_combine") => "finish".into(),
+        (None, name) => name.into(),
+    });
+    let heading = arg.get_help_heading().unwrap_or_default();
+    let defaults = arg.get_default_values().iter().filter(|_| arg.get_action().takes_values());
+    Entry {
+        option: format!("--{}", arg.get_long().unwrap_or_default()),
+        kind,
+        values: arg.get_value_names().unwrap_or_default().iter().map(ToString::to_string).collect(),
+        default: defaults.map(|value| value.to_string_lossy().into_owned()).find(|value| !value.is_empty()),
+        range: arg.get::<Range>().cloned(),
+        choices: choices.iter().map(|value| (value.get_name().to_string(), help(value))).collect(),
+        heading: heading.into(),
+        help: arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default(),
+        methods: methods(&name),
+        stage: of_stages(&name, heading, kind),
+        python,
+        of_scene: of_scene.is_some(),
+        not_in_python,
+        name,
+    }
+}
+
+fn kind(arg: &Arg) -> Kind {
+    let parsed = arg.get_value_parser().type_id();
+    let is = |types: &[TypeId]| types.iter().any(|one| parsed == *one);
+    let choices = arg.get_possible_values();
+    if !arg.get_action().takes_values() {
+        Kind::Flag
+    } else if choices.iter().map(|value| value.get_name()).eq(["on", "off"]) {
+        Kind::Switch
+    } else if !choices.is_empty() {
+        Kind::Choice
+    } else if is(&[TypeId::of::<u32>(), TypeId::of::<u64>(), TypeId::of::<usize>()]) {
+        Kind::Integer
+    } else if is(&[TypeId::of::<f64>()]) {
+        Kind::Number
+    } else if is(&[TypeId::of::<PathBuf>()]) {
+        Kind::Path
+    } else {
+        Kind::Text
+    }
+}
+
+/// Methods that take an option; empty: all.
+fn methods(option: &str) -> Vec<&'static str> {
+    let taking = Method::value_variants().iter().filter(|method| takes(option, **method));
+    let names: Vec<&str> = taking.map(|method| method.name()).collect();
+    if names.len() == Method::value_variants().len() { Vec::new() } else { names }
+}
+
+fn of_stages(name: &str, heading: &str, kind: Kind) -> bool {
+    let about_the_picture = OF_STAGES.contains(&heading) && !NOT_OF_STAGES.contains(&name);
+    kind != Kind::Path && (about_the_picture || ALSO_OF_STAGES.contains(&name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exceptions_are_options() {
+        let known: Vec<String> = describe(&command()).into_iter().map(|entry| entry.name).collect();
+        // The others are the program's own.
+        let of_program = [
+            "output",
+            "png",
+            "exposure",
+            "tonemap",
+            "compression",
+            "usd_layer",
+            "preview",
+            "debug_techniques",
+            "skip_existing",
+            "progress",
+        ];
+        let listed =
+            NOT_IN_PYTHON.iter().chain(&OF_SCENE).map(|(name, _)| *name).chain(NOT_OF_STAGES).chain(ALSO_OF_STAGES);
+        for name in listed {
+            assert!(known.iter().any(|option| option == name) || of_program.contains(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn an_option_is_described_by_its_definition() {
+        let all = describe(&command());
+        let find = |name: &str| all.iter().find(|entry| entry.name == name).unwrap();
+        let photons = find("photons");
+        assert_eq!((photons.kind, photons.option.as_str(), photons.stage), (Kind::Integer, "--photons", true));
+        let range = serde_json::json!(photons.range);
+        assert_eq!(range, serde_json::json!({"min": 1, "max": 50_000_000}));
+        assert_eq!(photons.methods, ["pm", "ppm", "sppm", "appm", "cppm"]);
+        assert_eq!(
+            serde_json::json!(find("alpha").range),
+            serde_json::json!({"min": 0.0, "above_min": true, "max": 1.0})
+        );
+        assert_eq!((find("guide").kind, find("model").stage, find("resume").kind), (Kind::Switch, false, Kind::Path));
+        assert_eq!(find("method").default.as_deref(), Some("auto"));
+    }
+}

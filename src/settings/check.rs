@@ -1,0 +1,108 @@
+//! Which methods take which options, and what is said of an option that has no effect.
+
+use super::render::RenderOptions;
+use super::values::{BandwidthChoice, Switch};
+use crate::error::{Error, Result};
+use crate::render::{BandwidthRule, KernelChoice, Method, RadiusRule, Settings, Shard};
+use crate::transport::Indirect;
+
+/// Whether a method takes an option, by the name of its field.
+pub fn takes(option: &str, method: Method) -> bool {
+    match option {
+        "photons" | "knn" => method.counts_photons(),
+        "photon_memory" => method.has_one_map(),
+        "levels" => method.has_levels(),
+        "initial_bandwidth" => method.has_bandwidths(),
+        "alpha" | "radius_rule" => method.takes_alpha(),
+        "kernel" => method.takes_kernels(BandwidthRule::Memoryless),
+        "guide" => method.guides(),
+        "indirect" => method.search_with_paths().is_some(),
+        "debug_techniques" => method.has_techniques(),
+        option => !option.starts_with("cppm_") || method.rules().contains(&BandwidthRule::ChiSquared),
+    }
+}
+
+/// The error of an option that has no effect; it has with the method `other`.
+fn no_effect(option: &str, with: &str, other: &str) -> Error {
+    let option = format!("--{}", option.replace('_', "-"));
+    let error = Error::usage(format!("{option} has no effect {with}"));
+    error.hint(format!("leave {option} out, or choose --method {other}"))
+}
+
+impl RenderOptions {
+    /// The error of an option that has no effect on the method.
+    pub fn no_effect(&self, option: &str, chosen: Option<Method>, other: &str) -> Error {
+        let plus = if self.cppm_plus { " --cppm-plus" } else { "" };
+        match chosen {
+            None => no_effect(option, &format!("before a method is chosen{}", plus.replace(" --", ", with --")), other),
+            Some(method) => no_effect(option, &format!("with --method {}{plus}", method.name()), other),
+        }
+    }
+
+    /// Options with a value that asks for something.
+    fn given(&self) -> [(&'static str, bool); 14] {
+        [
+            ("photons", self.photons.is_some()),
+            ("photon_memory", self.photon_memory.is_some()),
+            ("levels", self.levels.is_some_and(|levels| levels > 1)),
+            ("knn", self.knn.is_some()),
+            ("initial_bandwidth", self.initial_bandwidth.is_some()),
+            ("alpha", self.alpha.is_some()),
+            ("radius_rule", self.radius_rule.is_some()),
+            ("cppm_grid", self.cppm_grid.is_some()),
+            ("cppm_k", self.cppm_k.is_some()),
+            ("cppm_beta", self.cppm_beta.is_some()),
+            ("cppm_significance", self.cppm_significance.is_some()),
+            ("cppm_plus", self.cppm_plus),
+            ("guide", self.guide == Some(Switch::On)),
+            ("indirect", self.indirect == Some(Indirect::Paths)),
+        ]
+    }
+
+    /// Errors: options that have no effect on the method. `chosen`: the method if one is chosen, to name it.
+    pub(super) fn check_method(&self, method: Method, chosen: Option<Method>, rule: RadiusRule) -> Result<()> {
+        let local = rule == RadiusRule::Local;
+        if self.kernel.is_some_and(|kernel| kernel != KernelChoice::Box) && (local || !takes("kernel", method)) {
+            let what = if local { "the local rule" } else { method.name() };
+            return Err(Error::usage(format!("{what} needs the box kernel"))
+                .hint("leave --kernel out, or choose --method sppm with the memoryless rule, or appm"));
+        }
+        let by_neighbours = self.initial_bandwidth == Some(BandwidthChoice::Knn);
+        let contradicted = |option: &str| match option {
+            "initial_bandwidth" => by_neighbours && !method.counts_photons(),
+            "radius_rule" => self.radius_rule.is_some_and(|rule| !method.rules().contains(&rule.into())),
+            "guide" => self.cppm_plus,
+            "indirect" => local,
+            _ => false,
+        };
+        let idle = |(option, given): &(&str, bool)| *given && (!takes(option, method) || contradicted(option));
+        let Some((option, _)) = self.given().into_iter().find(idle) else { return Ok(()) };
+        let other = match option {
+            "photon_memory" => "pm",
+            option if option.starts_with("cppm") => "cppm",
+            _ => "sppm",
+        };
+        let shown =
+            if option == "initial_bandwidth" && method.has_bandwidths() { "initial_bandwidth knn" } else { option };
+        Err(self.no_effect(shown, chosen, other))
+    }
+
+    /// Errors: a shard that has nothing to render, or that depends on the others.
+    pub(super) fn check_shard(&self, settings: &Settings) -> Result<()> {
+        let Settings { shard: Shard { index, count }, iterations, method, .. } = *settings;
+        if let Some(n) = iterations.filter(|n| index >= *n) {
+            let error = Error::usage(format!("shard {index} of {count} holds none of {n} iterations"));
+            return Err(error.hint("use fewer shards or more --iterations"));
+        }
+        if self.shard.is_some() && !settings.is_memoryless() {
+            let rule = if method.rules().len() > 1 { " with local statistics" } else { "" };
+            let name = self.method.name();
+            let cause =
+                format!("--shard cannot divide --method {name}{rule}: its bandwidths depend on all iterations before");
+            return Err(
+                Error::usage(cause).hint("choose --method sppm with the memoryless rule, or render on one machine")
+            );
+        }
+        Ok(())
+    }
+}

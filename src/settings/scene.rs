@@ -1,0 +1,148 @@
+//! Options about a scene: where it is, how it is read, and which of its effects are simulated.
+
+use super::frames::{Frames, numbered};
+use super::number::{Ranged, rgb, strength};
+use crate::pipeline::load::{Environment, Order};
+use crate::plan::Switches;
+use crate::scene::gltf::{self, Glass, LightUnits};
+use serde::{Serialize, Serializer};
+use std::ops::Bound::{Excluded, Unbounded};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A scene file and how it is read.
+#[derive(clap::Args, Clone, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[command(next_help_heading = "Light and glass")]
+pub struct SceneOptions {
+    /// Scene: .glb or .gltf, as Blender exports it, or a stage of USD (.usd, .usda, .usdc, .usdz)
+    #[arg(value_name = "SCENE", help_heading = None::<&str>)]
+    #[serde(rename = "scene", serialize_with = "lossy")]
+    pub path: PathBuf,
+    /// Frames of the scene's animation, such as 5, 1-100 or 1-100,2. In the names of files, also in that of the scene,
+    /// '####' stands for the frame's number [default: the moment of the first key]
+    #[arg(long, value_name = "A-B[,STEP]", help_heading = "Picture")]
+    pub frames: Option<Frames>,
+    /// Frames a second, where the scene does not tell: frame N is at N / FPS seconds [default: 24]
+    #[arg(long, value_name = "FPS", between = (Excluded(0.0), Unbounded), requires = "frames", help_heading = "Picture")]
+    pub frame_rate: Option<f64>,
+    /// The file is one of a sequence, of which each has a frame to itself
+    #[arg(skip)]
+    #[serde(skip)]
+    of_sequence: bool,
+    /// Light from all around: a latitude-longitude image (.exr or .hdr), or one colour R,G,B (radiance)
+    #[arg(long, value_name = "FILE|R,G,B")]
+    pub env: Option<EnvironmentChoice>,
+    /// Turn the environment about the vertical, counter-clockwise seen from above (degrees)
+    #[arg(long, value_name = "DEG", between = (Unbounded, Unbounded), allow_negative_numbers = true)]
+    pub env_rotation: Option<f64>,
+    /// Make the environment so many times as bright
+    #[arg(long, value_name = "S", value_parser = strength)]
+    pub env_strength: Option<f64>,
+    /// Units of lamps: 'photometric' is what Blender's exporter writes unless told otherwise, 683 lumen to the watt
+    #[arg(long, value_enum, default_value_t)]
+    pub light_units: LightUnits,
+    /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light,
+    /// and says so
+    #[arg(long, value_enum, default_value_t)]
+    pub glass: Glass,
+    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: classes of light paths
+    /// (emission, direct, indirect, glossy, caustic, sds), and dispersion, volume (or medium), depth_of_field,
+    /// environment, alpha (cut-outs), textures. 'caustique plan' lists what a scene calls for [default: all that it
+    /// calls for]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
+    pub effects: Option<Switches>,
+    /// Let the scene name files (buffers, textures, its environment) outside its own folder
+    #[arg(long)]
+    pub allow_outside: bool,
+    /// Take anything in the scene that is ignored or approximated as an error
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// `--env`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum EnvironmentChoice {
+    /// One radiance from everywhere.
+    Color([f32; 3]),
+    /// An image.
+    File(#[serde(serialize_with = "lossy")] PathBuf),
+}
+
+impl FromStr for EnvironmentChoice {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match rgb(text) {
+            Some(color) => color.map(EnvironmentChoice::Color),
+            None => Ok(EnvironmentChoice::File(text.into())),
+        }
+    }
+}
+
+impl SceneOptions {
+    /// A file without any options but where what it names may lie.
+    pub fn of(path: &Path, allow_outside: bool) -> SceneOptions {
+        SceneOptions {
+            path: path.into(),
+            frames: None,
+            frame_rate: None,
+            of_sequence: false,
+            env: None,
+            env_rotation: None,
+            env_strength: None,
+            light_units: LightUnits::default(),
+            glass: Glass::default(),
+            effects: None,
+            allow_outside,
+            strict: false,
+        }
+    }
+
+    /// The same of one frame: a scene whose name is a pattern is a file for each, unless there is a file of that very name.
+    pub fn at(&self, frame: u32) -> SceneOptions {
+        let file = numbered(&self.path, frame).filter(|_| !self.path.exists());
+        let of_sequence = self.of_sequence || file.is_some();
+        let path = file.unwrap_or_else(|| self.path.clone());
+        SceneOptions { path, frames: Some(Frames::one(frame)), of_sequence, ..self.clone() }
+    }
+
+    /// What is asked of the pipeline.
+    pub fn order(&self) -> Order {
+        let environment = self.env.clone().map(|choice| match choice {
+            EnvironmentChoice::Color(color) => Environment::Color(color.into()),
+            EnvironmentChoice::File(path) => Environment::File(path),
+        });
+        Order {
+            path: self.path.clone(),
+            environment,
+            rotation: self.env_rotation,
+            strength: self.env_strength,
+            options: self.read_options(),
+            off: self.switches().off,
+        }
+    }
+
+    /// `--effects`.
+    pub fn switches(&self) -> Switches {
+        self.effects.unwrap_or_default()
+    }
+
+    fn read_options(&self) -> gltf::ReadOptions {
+        gltf::ReadOptions {
+            light_units: self.light_units,
+            glass: self.glass,
+            allow_outside: self.allow_outside,
+            frame: self.frames.and_then(Frames::single).map(|number| gltf::Frame {
+                number,
+                rate: self.frame_rate,
+                of_sequence: self.of_sequence,
+            }),
+        }
+    }
+}
+
+/// A path as JSON, as far as it is text.
+fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
+}
