@@ -67,7 +67,7 @@ fn load(path: &Path) -> Result<Library, Refusal> {
         let missing = Refusal::by_loader(path, &error).reason;
         Refusal::new(path, format!("not Embree 3 or 4 ({missing})"))
     })?;
-    let path = file_of(common.new_device as *const _).unwrap_or_else(|| path.to_owned());
+    let path = file_of(common.new_device as usize).unwrap_or_else(|| path.to_owned());
 
     let version = probe::version(&common).map_err(|reason| Refusal::new(&path, reason))?;
     let trace = match version.major {

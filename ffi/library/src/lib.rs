@@ -1,7 +1,7 @@
 //! Finds and opens shared libraries at run time: the part that the bindings of Embree, Open Image Denoise and ONNX
 //! Runtime have in common.
 
-use std::ffi::{OsStr, c_void};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 pub use libloading::Library;
@@ -96,8 +96,8 @@ pub fn file_name(path: &Path) -> &str {
 
 /// The file that holds the code or data at `address`, by the name that the loader was given.
 #[cfg(unix)]
-pub fn file_of(address: *const c_void) -> Option<PathBuf> {
-    use std::ffi::{CStr, c_char, c_int};
+pub fn file_of(address: usize) -> Option<PathBuf> {
+    use std::ffi::{CStr, c_char, c_int, c_void};
     use std::os::unix::ffi::OsStrExt;
 
     #[repr(C)]
@@ -114,7 +114,7 @@ pub fn file_of(address: *const c_void) -> Option<PathBuf> {
     let mut info =
         DlInfo { file_name: null as *const _, file_base: null, symbol_name: null as *const _, symbol_address: null };
     // SAFETY: `dladdr` only looks the address up, and fills in `info` when it returns non-zero.
-    if unsafe { dladdr(address, &mut info) } == 0 || info.file_name.is_null() {
+    if unsafe { dladdr(address as *const c_void, &mut info) } == 0 || info.file_name.is_null() {
         return None;
     }
     // SAFETY: a non-null name is a C string that lives as long as the library. The bindings never unload one.
@@ -124,7 +124,7 @@ pub fn file_of(address: *const c_void) -> Option<PathBuf> {
 
 /// The file that holds the code or data at `address`: this system cannot tell.
 #[cfg(not(unix))]
-pub fn file_of(_address: *const c_void) -> Option<PathBuf> {
+pub fn file_of(_address: usize) -> Option<PathBuf> {
     None
 }
 
@@ -170,8 +170,8 @@ mod tests {
 
     #[test]
     fn the_file_of_this_function_is_the_test_program() {
-        let address = file_of as fn(*const c_void) -> Option<PathBuf>;
-        let found = file_of(address as *const c_void).and_then(|path| path.canonicalize().ok());
+        let address = file_of as fn(usize) -> Option<PathBuf>;
+        let found = file_of(address as usize).and_then(|path| path.canonicalize().ok());
         assert_eq!(found, std::env::current_exe().ok());
     }
 }

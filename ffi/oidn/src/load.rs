@@ -84,7 +84,7 @@ fn load(path: &Path) -> Result<Library, Refusal> {
         let missing = Refusal::by_loader(path, &error).reason;
         Refusal::new(path, format!("not Open Image Denoise 2 ({missing})"))
     })?;
-    let path = file_of(functions.new_device as *const _).unwrap_or_else(|| path.to_owned());
+    let path = file_of(functions.new_device as usize).unwrap_or_else(|| path.to_owned());
     let path = path.canonicalize().unwrap_or(path);
     // Its worker threads may still be on their way out when the last device is released, so its code must stay
     // mapped. Nothing of it has run before this line but initialisers.
