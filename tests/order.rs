@@ -107,23 +107,66 @@ fn the_order_test_finds_planted_faults() {
     assert_eq!(broken(&order, "math", "use embree_crate::scene;"), [] as [&str; 0]);
 }
 
-/// The modules of a room below `src`, each with its text, but for what is in the room's `mod.rs`; those in folders of
-/// their own count as one.
-fn room(root: &Path, name: &str) -> Vec<(String, String)> {
+/// The folders that hold the modules of one parent: `src`, the sources of each crate in `ffi`, and all folders below.
+fn folders(root: &Path) -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> =
+        files("src").into_iter().chain(files("ffi")).filter_map(|file| parent(&file)).collect();
+    found.retain(|folder| folder.components().any(|part| part.as_os_str() == "src"));
+    found.sort();
+    found.dedup();
+    assert!(found.contains(&root.join("src")) && found.contains(&root.join("ffi/embree/src")), "{found:?}");
+    found
+}
+
+fn parent(file: &Path) -> Option<PathBuf> {
+    file.parent().map(Path::to_path_buf)
+}
+
+/// The modules in a folder, each with its code. A folder inside counts as one module. The code of the parent itself
+/// (`mod.rs`, `lib.rs`, `main.rs`) is left out: it may name all of its modules.
+fn modules(folder: &Path, path: &str) -> Vec<(String, String)> {
     let mut modules: HashMap<String, String> = HashMap::new();
-    for file in files(&format!("src/{name}")) {
-        let inside = file.strip_prefix(root.join("src").join(name)).expect("it is below the room");
-        let own = inside.components().next().expect("it has a name").as_os_str().to_string_lossy().replace(".rs", "");
-        if own != "mod" && own != "tests" {
-            *modules.entry(own).or_default() += &shipped(&fs::read_to_string(&file).expect("it can be read"));
+    for file in files(&folder.to_string_lossy()) {
+        let inside = file.strip_prefix(folder).expect("it is below the folder").with_extension("");
+        let mut place: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        if place.last().is_some_and(|name| name == "mod") {
+            place.pop();
         }
+        let Some(own) = place.first().filter(|name| !["lib", "main", "tests"].contains(&name.as_str())) else {
+            continue;
+        };
+        let code = shipped(&fs::read_to_string(&file).expect("it can be read"));
+        *modules.entry(own.clone()).or_default() += &from_parent(&code, path, place.len());
     }
     let mut modules: Vec<(String, String)> = modules.into_iter().collect();
     modules.sort();
     modules
 }
 
-/// Names that a module gives to others of its room.
+/// Code with every path into the module `path` (empty for the crate) written as `parent::...`, and no other path that
+/// begins with `crate` or `super`. The code lies `depth` modules below.
+fn from_parent(code: &str, path: &str, depth: usize) -> String {
+    let code = if path.is_empty() {
+        code.replace("crate::", "parent::")
+    } else {
+        code.replace(&format!("crate::{path}::"), "parent::").replace("crate::", "outside::")
+    };
+    let mut rest = code.as_str();
+    let mut written = String::new();
+    while let Some(at) = rest.find("super::") {
+        written += &rest[..at];
+        let mut levels = 0;
+        rest = &rest[at..];
+        while let Some(after) = rest.strip_prefix("super::") {
+            levels += 1;
+            rest = after;
+        }
+        written += if levels == depth { "parent::" } else { "elsewhere::" };
+    }
+    written + rest
+}
+
+/// Names that a module gives to others of its parent.
 fn given(text: &str) -> Vec<String> {
     let kinds = ["fn ", "const fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
     let name = |line: &str| {
@@ -135,24 +178,24 @@ fn given(text: &str) -> Vec<String> {
     text.lines().filter_map(name).filter(|name| !name.is_empty()).collect()
 }
 
-/// The modules of a room that use each other in a circle.
-fn circle(room: &str, modules: &[(String, String)]) -> Vec<String> {
+/// The modules of one parent that use each other in a circle.
+fn circle(modules: &[(String, String)]) -> Vec<String> {
     let mut home: HashMap<String, &str> = HashMap::new();
     for (own, text) in modules {
         for name in given(text) {
             home.entry(name).or_insert(own);
         }
+    }
+    for (own, _) in modules {
         home.insert(own.clone(), own);
     }
     let uses = |(own, text): &(String, String)| -> Vec<&str> {
-        // Other rooms may have modules of the same names.
-        let text = text.replace(&format!("crate::{room}::"), "super::").replace("crate::", "other::");
-        let named = used(&text.replace("super::super::", "super::").replace("super::", "crate::"));
+        let named = used(&text.replace("parent::", "crate::"));
         named.iter().filter_map(|name| home.get(name).copied()).filter(|other| other != own).collect()
     };
     let edges: Vec<(&str, Vec<&str>)> = modules.iter().map(|module| (module.0.as_str(), uses(module))).collect();
     let mut left: Vec<&str> = edges.iter().map(|(own, _)| *own).collect();
-    // What uses nothing that is left is in no circle, and neither is what nothing left uses.
+    // A module that uses none of those left is in no circle, and neither is one that none of them uses.
     loop {
         let before = left.len();
         let of = |own: &str| edges.iter().find(|(name, _)| *name == own).map_or(&[][..], |(_, others)| &others[..]);
@@ -170,30 +213,43 @@ fn circle(room: &str, modules: &[(String, String)]) -> Vec<String> {
 }
 
 #[test]
-fn no_room_is_a_circle() {
+fn no_modules_use_each_other_in_a_circle() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let lib = fs::read_to_string(root.join("src/lib.rs")).expect("src/lib.rs can be read");
     let mut faults = Vec::new();
-    for name in order(&lib).keys().filter(|name| root.join("src").join(name).is_dir()) {
-        let found = circle(name, &room(root, name));
+    for folder in folders(root) {
+        let inside = folder.to_string_lossy();
+        let path = inside.rsplit_once("/src").map_or("", |(_, path)| path.trim_matches('/')).replace('/', "::");
+        let mut modules = modules(&folder, &path);
+        // The program uses the library by its name.
+        modules.retain(|(own, _)| !(path.is_empty() && folder == root.join("src") && own == "cli"));
+        let found = circle(&modules);
         if !found.is_empty() {
-            faults.push(format!("{name}: {}", found.join(", ")));
+            faults.push(format!("{inside}: {}", found.join(", ")));
         }
     }
-    assert!(faults.is_empty(), "files that use each other in a circle:\n{}", faults.join("\n"));
+    assert!(faults.is_empty(), "modules that use each other in a circle:\n{}", faults.join("\n"));
 }
 
 #[test]
 fn the_circle_test_finds_planted_faults() {
-    let modules = |texts: [&str; 3]| -> Vec<(String, String)> {
-        ["a", "b", "c"].into_iter().zip(texts).map(|(name, text)| (name.into(), text.into())).collect()
+    let circle = |texts: [&str; 3]| -> Vec<String> {
+        let place = |(name, text): (&str, &str)| (name.into(), from_parent(text, "outer::room", 1));
+        circle(&["a", "b", "c"].into_iter().zip(texts).map(place).collect::<Vec<(String, String)>>())
     };
-    let right = ["pub struct A;", "use super::a::A;\npub(super) fn b() {}", "use crate::room::{A, b};"];
-    assert_eq!(circle("room", &modules(right)), [] as [&str; 0]);
-    let wrong = ["use super::c;\npub struct A;", right[1], right[2]];
-    assert_eq!(circle("room", &modules(wrong)), ["a", "b", "c"]);
-    let by_item = ["use super::b;\npub struct A;", right[1], ""];
-    assert_eq!(circle("room", &modules(by_item)), ["a", "b"]);
+    let right = ["pub struct A;", "use super::a::A;\npub(super) fn b() {}", "use crate::outer::room::{A, b};"];
+    assert_eq!(circle(right), [] as [&str; 0]);
+    assert_eq!(circle(["use super::c;\npub struct A;", right[1], right[2]]), ["a", "b", "c"]);
+    assert_eq!(circle(["use super::b;\npub struct A;", right[1], ""]), ["a", "b"]);
+    // Modules of the same names elsewhere are others.
+    assert_eq!(circle(["use crate::room::b;\nuse super::super::b;\npub struct A;", right[1], ""]), [] as [&str; 0]);
+}
+
+#[test]
+fn paths_of_nested_files_are_resolved() {
+    assert_eq!(from_parent("use super::super::x;", "a", 2), "use parent::x;");
+    assert_eq!(from_parent("use super::x;", "a", 2), "use elsewhere::x;");
+    assert_eq!(from_parent("use crate::a::x; use crate::x;", "a", 2), "use parent::x; use outside::x;");
+    assert_eq!(from_parent("use crate::x;", "", 1), "use parent::x;");
 }
 
 /// The part of a file that ships: what stands before its tests, without comments.

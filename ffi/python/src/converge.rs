@@ -4,13 +4,12 @@ use crate::error::{raised, usage};
 use crate::image::{Image, picture};
 use crate::job;
 use crate::keywords::{Keywords, choice};
-use crate::scene::Scene;
 use crate::value::to_python;
 use crate::work::{Caller, work};
 use caustique::camera::Camera;
 use caustique::error::Result;
 use caustique::finish::Finish;
-use caustique::pipeline::{Ready, check, finish, memory, plan, sized};
+use caustique::pipeline::{Loaded, Ready, check, finish, memory, plan, sized};
 use caustique::plan::{Effect, Presence};
 use caustique::render::auto::choose;
 use caustique::render::{Control, Method, Settings, Spent};
@@ -21,12 +20,13 @@ use caustique::report::race::{Field, Rules, race};
 use caustique::report::reference::{Halves, Reference};
 use caustique::report::summary::{Subject, Wishes, summarize};
 use caustique::scene::Scene as Built;
-use caustique::settings::{MethodChoice, RenderOptions};
+use caustique::settings::{MethodChoice, RenderOptions, SceneOptions};
 use caustique::stat::sum::MOST_TERMS;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use serde_json::{Value, json};
 use std::ops::Bound::{Excluded, Unbounded};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Seconds of each run where nothing says when to stop, as on the command line.
@@ -62,15 +62,23 @@ struct Own {
     time: Option<f64>,
 }
 
-/// See [`Scene`]'s method of this name.
+/// The scene that methods are compared on.
+pub struct Compared<'a> {
+    pub path: &'a Path,
+    pub loaded: &'a Loaded,
+    /// The options that the scene was read with.
+    pub asked: &'a SceneOptions,
+}
+
+/// The method `converge` of `Scene`.
 pub fn converge<'py>(
-    scene: &Scene,
+    scene: &Compared<'_>,
     py: Python<'py>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut keywords = Keywords::of(py, "converge", options);
     let given: Option<Bound<'_, PyAny>> = keywords.take("reference")?;
-    let (common, _) = job::take(&mut keywords, &job::named(&COMMON), &scene.asked)?;
+    let (common, _) = job::take(&mut keywords, &job::named(&COMMON), scene.asked)?;
     let own = Own {
         method: keywords.choice::<MethodChoice>("reference_method")?.and_then(|method| method.0),
         iterations: keywords.number("reference_iterations", 1..=MOST_TERMS, "a whole number above 0")?,
@@ -180,15 +188,15 @@ impl Comparison {
 
     fn run(
         self,
-        (scene, camera): (&Scene, &Camera),
+        (scene, camera): (&Compared<'_>, &Camera),
         (settings, own): (Vec<Settings>, Settings),
         reference: Option<Reference>,
         told: &Told<'_>,
     ) -> Result<Value> {
         let built = &scene.loaded.scene;
         for of in &settings {
-            check::media(&scene.path, of, built)?;
-            check::bandwidth(&scene.path, of, built)?;
+            check::media(scene.path, of, built)?;
+            check::bandwidth(scene.path, of, built)?;
         }
         let (entries, mut finishes) = self.entries((scene, camera), settings, told)?;
         memory::check_all((built, camera), entries.iter().map(|entry| &entry.settings))?;
@@ -238,7 +246,7 @@ impl Comparison {
     /// What competes: with auto settled, and finishes opened.
     fn entries(
         &self,
-        (scene, camera): (&Scene, &Camera),
+        (scene, camera): (&Compared<'_>, &Camera),
         settings: Vec<Settings>,
         told: &Told<'_>,
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {

@@ -1,6 +1,6 @@
 //! A scene, and what can be done with it.
 
-use crate::converge;
+use crate::converge::{self, Compared};
 use crate::error::{raised, usage};
 use crate::image::{Image, radiance};
 use crate::job;
@@ -216,7 +216,8 @@ impl Scene {
             seed=0, seeds=1, max_depth=None, width=None, height=None, camera=None, threads=0, progress=None)"
     )]
     fn converge<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        converge::converge(self, py, options)
+        let Scene { path, loaded, asked, .. } = self;
+        converge::converge(&Compared { path, loaded, asked }, py, options)
     }
 
     fn __repr__(&self) -> String {

@@ -157,7 +157,8 @@ impl Watch for Telling<'_> {
             say(&format!("method: {why}"));
         }
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
-        self.preview = Preview::of(self.args, self.made_for);
+        let RenderArgs { output, preview, picture, .. } = self.args;
+        self.preview = preview.as_ref().map(|target| Preview::new(target, output, picture, self.made_for));
         tell_plan(&self.args.job.scene.path, &plan.warnings);
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }

@@ -1,7 +1,7 @@
 //! `--preview`: the picture while it renders, in a file that is rewritten every few seconds, or in a running tev.
 
-use super::options::RenderArgs;
-use crate::cli::{output, say};
+use crate::cli::output::{self, PictureArgs};
+use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, Attributes, Compression, Frame};
@@ -10,7 +10,7 @@ use caustique::render::Clock;
 use caustique::scene::description::Picture;
 use serde::Serialize;
 use std::net::TcpStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
@@ -75,8 +75,11 @@ impl Target {
 
 /// Shows pictures, and paces them.
 pub struct Preview<'a> {
-    args: &'a RenderArgs,
     target: &'a Target,
+    /// The exposure and the tone curve that the user gave.
+    look: &'a PictureArgs,
+    /// The picture's name in tev: the output's path.
+    name: String,
     made_for: Picture,
     clock: Clock,
     /// When the next picture is due, and since when the current one is made (seconds).
@@ -88,11 +91,10 @@ pub struct Preview<'a> {
 }
 
 impl<'a> Preview<'a> {
-    /// Of a render that asks for one.
-    pub fn of(args: &'a RenderArgs, made_for: Picture) -> Option<Preview<'a>> {
-        let target = args.preview.as_ref()?;
-        let clock = Clock::start();
-        Some(Preview { args, target, made_for, clock, next: 0.0, began: 0.0, tev: None, failed: false })
+    /// A preview of the picture that is written to `output`.
+    pub fn new(target: &'a Target, output: &Path, look: &'a PictureArgs, made_for: Picture) -> Preview<'a> {
+        let name = output.display().to_string();
+        Preview { target, look, name, made_for, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false }
     }
 
     /// Whether a picture is due.
@@ -115,7 +117,7 @@ impl<'a> Preview<'a> {
     fn write(&mut self, set: &LayerSet, frame: Option<Frame>) -> Result<()> {
         match self.target {
             Target::Png(path) => {
-                let (exposure, curve) = self.args.picture.look(&self.made_for);
+                let (exposure, curve) = self.look.look(&self.made_for);
                 png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, curve)
             }
             Target::Exr(path) => {
@@ -130,7 +132,7 @@ impl<'a> Preview<'a> {
 
     /// Sends the picture to tev, which keeps it under the output's name.
     fn stream(&mut self, set: &LayerSet) -> std::io::Result<()> {
-        let name = self.args.output.display().to_string();
+        let name = self.name.clone();
         let beauty = set.beauty().map_err(std::io::Error::other)?;
         let side = |pixels: usize| u32::try_from(pixels).map_err(std::io::Error::other);
         let (width, height) = (side(set.width)?, side(set.height)?);
