@@ -82,7 +82,7 @@ impl MergeArgs {
         let model = self.model.clone().or_else(|| asked(arguments, "model"));
         let here = self.denoise.is_some() || self.model.is_some();
         let none = self.no_combine || (!here && asked(arguments, "no-combine") == Some(true));
-        (!none).then(|| finish::Order { denoiser: denoise, model })
+        (!none).then_some(finish::Order { denoiser: denoise, model })
     }
 
     fn naming(&self, arguments: &Value) -> Naming {
@@ -106,7 +106,7 @@ fn join(args: &MergeArgs) -> Result<()> {
     let order = merge::Order {
         finish: args.finish(&arguments),
         layers: args.layers.clone().or_else(|| asked(&arguments, "layers")).unwrap_or_else(|| "all".into()),
-        naming: naming,
+        naming,
         reproducible: args.reproducible,
     };
     let made_for = shards.facts().map(|facts| facts.made_for).unwrap_or_default();

@@ -107,7 +107,7 @@ impl Accuracy {
     /// Between what the error lies in [`CONFIDENCE`] of all pictures. Where few bright samples hold the noise, the upper
     /// end is what the error would be with all of it: as if the pixels that were left out were as well told as others.
     /// The bias is that of edges there. Light that photons have not brought is none at the lower end, and at the upper as
-    /// much as [`OF_THREE`] says, but no more than all.
+    /// much as the rule of three says, but no more than all.
     pub fn interval(&self, iterations: u64) -> [f64; 2] {
         let factor = (DEVIATIONS * MODEL.hypot(0.5 * self.doubt)).exp();
         let (noise, bias) = (self.noise(iterations), self.squared_bias);

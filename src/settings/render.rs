@@ -1,6 +1,9 @@
 //! What is rendered and how: every option that `caustique render`, `caustique plan` and Python's `render` have in common,
 //! with its default, unit, range and help; and the [`Settings`] that they come to.
 
+// Help names defaults in brackets, which are no links.
+#![allow(rustdoc::broken_intra_doc_links)]
+
 use super::finish::FinishOptions;
 use super::frames::Frames;
 use super::number::Ranged;

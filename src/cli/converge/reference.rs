@@ -10,7 +10,6 @@ use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Method, Settings};
-use caustique::report::entry::Metric;
 use caustique::report::reference::{Halves, OwnError, Reference};
 use caustique::scene::Scene;
 use caustique::settings::MethodChoice;
@@ -34,7 +33,7 @@ pub fn source(
     seeds: &[u64],
     notes: &mut Vec<String>,
 ) -> Result<Source> {
-    let metric = Metric::from(args.error_metric);
+    let metric = args.error_metric;
     let Some(path) = &args.reference else { return own(args, scene, camera).map(Source::Own) };
     let (mut reference, header) = Reference::read(path, camera.size())?;
     if let Some(error) = args.reference_error {
