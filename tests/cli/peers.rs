@@ -8,8 +8,8 @@ use std::process::{Command, Stdio};
 /// A comparison with other renderers; the finishes of ours are of no interest.
 const SMALL: &str = "converge scene.glb --width 48 --height 36 --methods path --no-finish --reference reference.exr --progress none -o out";
 
-/// A folder with a reference, and the script in place of a Python: it is called `-I -B -c PROBE MODULES` or `-I -B DRIVER
-/// SCENE OUT --mode=.. ..`, and finds all modules.
+/// A folder with a reference, and the script in place of a Python: it is called `-I -B -c PROBE MODULES` or `-I -B FOLDER
+/// DRIVER SCENE OUT --mode=.. ..`, and finds all modules.
 fn folder(script: &str) -> Folder {
     let folder = Folder::new();
     let size = "--width 48 --height 36 --no-combine --layers beauty";
@@ -35,7 +35,7 @@ fn report(folder: &Folder) -> Value {
 
 const ANSWERS: &str = r#"
 case "$*" in
-*--mode=path\ *) cp same.exr "$5" ;;
+*--mode=path\ *) cp same.exr "$6" ;;
 *--mode=path_cache\ *) echo 'PEER {"cannot": ["spots", "fog"]}'; exit 0 ;;
 *) echo 'it is broken' >&2; exit 3 ;;
 esac
@@ -68,7 +68,7 @@ fn peers_are_curves_or_rows_with_a_reason() {
     assert!(
         calls
             .lines()
-            .all(|line| line.contains("luxcore_driver.py scene.glb ") && line.contains("--width=48 --height=36"))
+            .all(|line| line.contains("luxcore_driver scene.glb ") && line.contains("--width=48 --height=36"))
     );
     assert!(calls.lines().all(|line| line.contains("--seed=3")));
 

@@ -126,7 +126,7 @@ fn files_that_are_no_networks_are_errors_with_advice() {
         let error = Combiner::new(&Model::from_file(&path).unwrap(), &runtime).err().unwrap();
         assert_eq!(error.kind, Kind::Model);
         assert!(error.to_string().starts_with(&format!("model {}: ", path.display())), "{error}");
-        assert!(error.hint.unwrap().contains("export.py"));
+        assert!(error.hint.unwrap().contains("export_network.py"));
     }
     let error = Model::open("paper").unwrap_err();
     assert!(error.hint.unwrap().contains("--arch paper"));

@@ -58,8 +58,12 @@ const UNSAID: [(&str, &[&str]); 6] = [
     ),
     ("no mesh has a rim of one edge", &["edge has one face only"]),
     (
-        "tests/python/usd_render.py says it, by a variable of the environment",
-        &["{} is no number of seconds", "give a whole number from 1 to 2000000, or none"],
+        "tests/python/usd_render.py says it, by a variable of the environment or a signal",
+        &[
+            "{} is no number of seconds",
+            "give a whole number from 1 to 2000000, or none",
+            "interrupted while the stage was read",
+        ],
     ),
     ("they are no messages", &["caustique checkpoint 4n", "caustique checkpoint ", "not said", "default material"]),
 ];
