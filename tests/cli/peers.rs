@@ -66,9 +66,7 @@ fn peers_are_curves_or_rows_with_a_reason() {
     let budgets: Vec<f64> = calls.lines().filter_map(budget).collect();
     assert_eq!(budgets, [0.05, 0.1, 0.2, 0.4, 0.8]);
     assert!(
-        calls
-            .lines()
-            .all(|line| line.contains("luxcore_driver scene.glb ") && line.contains("--width=48 --height=36"))
+        calls.lines().all(|line| line.contains("luxcore_driver scene.glb ") && line.contains("--width=48 --height=36"))
     );
     assert!(calls.lines().all(|line| line.contains("--seed=3")));
 
