@@ -89,8 +89,8 @@ fn light_that_no_photon_has_brought_is_in_the_interval() {
     }
 }
 
-/// With kernels that find photons next to nothing is added to the error of a room. It is not most of that of the dial,
-/// to which some ten photons have come.
+/// With kernels that find photons next to nothing is added to the error of a room. It is not most of the error of the
+/// dial, to which some seven photons come: over seeds, 2 / (7 + 2) of the squared error is expected.
 #[test]
 fn errors_are_as_they_were_where_photons_come() {
     let nearest = InitialBandwidth::Nearest(20);
@@ -101,8 +101,15 @@ fn errors_are_as_they_were_where_photons_come() {
         println!("{method:?}: {:.5} of {told:.4}, {:?}", unseen.squared.sqrt(), picture.photon_record.counts);
         assert!(told / without - 1.0 < 0.001 && !unseen.rules(told), "{method:?}: {told} {without}");
     }
-    let (picture, accuracy) = rendered(&dial(), &settings(Method::Sppm, nearest));
-    assert!(!picture.unseen().rules(accuracy.error(ITERATIONS)));
+    let dial = dial();
+    let (mut unseen, mut estimated) = (0.0, 0.0);
+    for seed in 1..=8 {
+        let (picture, accuracy) = rendered(&dial, &Settings { seed, ..settings(Method::Sppm, nearest) });
+        unseen += picture.unseen().squared;
+        estimated += accuracy.error(ITERATIONS).powi(2);
+    }
+    println!("dial: {:.3} of the squared error", unseen / estimated);
+    assert!(2.0 * unseen < estimated, "{unseen} {estimated}");
 }
 
 /// Counts of shards, and of a render that was interrupted, are those of the whole.
