@@ -62,10 +62,11 @@ mod ray;
 mod scene;
 mod transform;
 
+pub use caustique_library::Version;
 pub use device::Device;
 pub use error::Error;
 pub use filter::{Candidate, Filter};
 pub use geometry::{Bounds, GeometryId, MAX_GEOMETRY_ID};
-pub use library::{LIBRARY_VARIABLE, Library, Version};
+pub use library::{LIBRARY_VARIABLE, Library};
 pub use ray::{Hit, Ray};
 pub use scene::{Scene, SceneBuilder};

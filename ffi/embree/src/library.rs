@@ -4,28 +4,13 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use caustique_library::Version;
+
 use crate::api::{Common, Trace};
 
 /// Name of the environment variable that, when set and not empty, holds the path of the Embree library to
 /// use. Nothing else is tried then.
 pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_EMBREE";
-
-/// Embree's version number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Version {
-    /// 3 or 4.
-    pub major: u32,
-    /// As in 4.3.
-    pub minor: u32,
-    /// As in 4.3.3.
-    pub patch: u32,
-}
-
-impl fmt::Display for Version {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}.{}", self.major, self.minor, self.patch)
-    }
-}
 
 /// An opened and tried Embree library. Clones share it.
 #[derive(Clone)]

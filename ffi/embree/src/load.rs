@@ -54,9 +54,7 @@ impl Library {
 
 fn load_first(names: &[&str]) -> Result<Library, Error> {
     let names: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
-    first_of(&names, load).map_err(|refusals| Error::NotFound {
-        tried: refusals.into_iter().map(|refusal| (refusal.path, refusal.reason)).collect(),
-    })
+    first_of(&names, load).map_err(|tried| Error::NotFound { tried })
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {

@@ -7,11 +7,13 @@
 use std::mem::offset_of;
 use std::sync::Arc;
 
+use caustique_library::Version;
+
 use crate::api::{self, Common, RawRay, RawRayHit};
 use crate::device::Device;
 use crate::error::Error;
 use crate::geometry::GeometryId;
-use crate::library::{Library, Version};
+use crate::library::Library;
 use crate::ray::Ray;
 use crate::scene::{Scene, SceneBuilder};
 

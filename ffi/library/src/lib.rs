@@ -2,12 +2,30 @@
 //! Runtime have in common.
 
 use std::ffi::OsStr;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 pub use libloading::Library;
 
 /// Levels of folders that [`below`] searches under a folder.
 const DEPTH: usize = 3;
+
+/// The version number of a library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Version {
+    /// As in 4.
+    pub major: u32,
+    /// As in 4.3.
+    pub minor: u32,
+    /// As in 4.3.3.
+    pub patch: u32,
+}
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}.{}", self.major, self.minor, self.patch)
+    }
+}
 
 /// A library file that cannot be used, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,16 +70,19 @@ pub unsafe fn open(path: &Path) -> Result<Library, Refusal> {
 /// The first of `candidates` that `load` accepts.
 ///
 /// # Errors
-/// The refusal of every candidate, in order.
-pub fn first_of<T>(candidates: &[PathBuf], load: impl Fn(&Path) -> Result<T, Refusal>) -> Result<T, Vec<Refusal>> {
-    let mut refusals = Vec::new();
+/// Every candidate with the reason of its refusal, in order.
+pub fn first_of<T>(
+    candidates: &[PathBuf],
+    load: impl Fn(&Path) -> Result<T, Refusal>,
+) -> Result<T, Vec<(PathBuf, String)>> {
+    let mut tried = Vec::new();
     for candidate in candidates {
         match load(candidate) {
             Ok(library) => return Ok(library),
-            Err(refusal) => refusals.push(refusal),
+            Err(Refusal { path, reason }) => tried.push((path, reason)),
         }
     }
-    Err(refusals)
+    Err(tried)
 }
 
 /// The files below `folders` whose names begin with `stem`. In each folder the longest name, which holds the fullest
@@ -156,8 +177,8 @@ mod tests {
             }
         };
         assert_eq!(first_of(&candidates, load("b")), Ok("b"));
-        let refusals = first_of(&candidates, load("d")).unwrap_err();
-        assert_eq!(refusals, ["a", "b", "c"].map(|name| Refusal::new(Path::new(name), "broken")));
+        let tried = first_of(&candidates, load("d")).unwrap_err();
+        assert_eq!(tried, ["a", "b", "c"].map(|name| (PathBuf::from(name), "broken".to_owned())));
     }
 
     #[test]

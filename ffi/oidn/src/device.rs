@@ -3,9 +3,11 @@
 use std::ffi::{CStr, c_char, c_int};
 use std::sync::Arc;
 
+use caustique_library::Version;
+
 use crate::api::{self, Functions, Handle};
 use crate::error::Error;
-use crate::library::{Library, Version};
+use crate::library::Library;
 use crate::limits::MAX_THREADS;
 
 /// A device that denoises on the processor. Clones share it; it may be used from several threads, whose pictures are

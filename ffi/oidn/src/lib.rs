@@ -61,8 +61,9 @@ mod library;
 mod limits;
 mod load;
 
+pub use caustique_library::Version;
 pub use device::Device;
 pub use error::Error;
 pub use filter::{Filter, Input, Quality};
-pub use library::{LIBRARY_VARIABLE, Library, Version};
+pub use library::{LIBRARY_VARIABLE, Library};
 pub use limits::{MAX_SIDE, MAX_THREADS};

@@ -4,28 +4,13 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use caustique_library::Version;
+
 use crate::api::Functions;
 
 /// Name of the environment variable that, when set and not empty, holds the path of the library to use. Nothing else
 /// is tried then.
 pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_OIDN";
-
-/// Open Image Denoise's version number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Version {
-    /// Always 2.
-    pub major: u32,
-    /// As in 2.5.
-    pub minor: u32,
-    /// As in 2.5.1.
-    pub patch: u32,
-}
-
-impl fmt::Display for Version {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}.{}", self.major, self.minor, self.patch)
-    }
-}
 
 /// An opened Open Image Denoise that has made a device. Clones share it.
 #[derive(Clone)]

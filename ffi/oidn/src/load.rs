@@ -66,9 +66,7 @@ fn load_named(path: &Path) -> Result<Library, Error> {
 }
 
 fn load_first(candidates: &[PathBuf]) -> Result<Library, Error> {
-    first_of(candidates, load).map_err(|refusals| Error::NotFound {
-        tried: refusals.into_iter().map(|refusal| (refusal.path, refusal.reason)).collect(),
-    })
+    first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
 }
 
 /// The names and files to try when no file is named, in order.
