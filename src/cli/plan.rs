@@ -48,7 +48,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     let Loaded { scene, removed } = scene::read(&job.scene, Form::beside(args.json), rayon::current_num_threads())?;
     let camera = scene.camera(&job.view()?)?;
     check::media(&job.scene.path, &settings, &scene)?;
-    let make = |way| job.allowed(way, camera.size());
+    let make = |candidate| job.allowed(candidate, camera.size());
     let choice = if job.method.0.is_none() {
         let mut finish = job.pilot_finish();
         let tried = || choose((&scene, &camera), &mut finish, make, || false);

@@ -304,7 +304,7 @@ pub fn count(n: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use caustique::render::Told;
+    use caustique::render::ErrorCoverage;
 
     #[test]
     fn sentences_are_for_people() {
@@ -316,12 +316,12 @@ mod tests {
             light_paths: 1_200_000,
             photons: 1,
             error: Some(0.031),
-            told: Told::All,
+            told: ErrorCoverage::All,
             finished: None,
             expected: None,
         };
         assert_eq!(sentence(&progress), "iteration 12 of 64, 3.1 s, 4 min 10 s left, 387 k photons/s, error 3.1 %");
-        let noise = Progress { told: Told::Noise, remaining: None, iterations: None, ..progress };
+        let noise = Progress { told: ErrorCoverage::Noise, remaining: None, iterations: None, ..progress };
         assert_eq!(sentence(&noise), "iteration 12, 3.1 s, 387 k photons/s, error 3.1 % (noise only)");
         let known = Progress { finished: Some(0.021), expected: Some((0.01, 40.0)), ..noise };
         assert_eq!(sentence(&known), "iteration 12, 3.1 s, 387 k photons/s, error 2.1 % now, 1.0 % in about 40.0 s");

@@ -14,9 +14,9 @@
 pub mod bound;
 mod conserve;
 pub mod denoiser;
+pub mod halves;
 pub mod parts;
 pub mod statistical;
-pub mod told;
 mod verdict;
 mod window;
 
@@ -133,7 +133,7 @@ impl Estimate {
     /// The estimate by the first two quarters alone.
     #[must_use]
     pub fn first_half(&self, quarters: &[Vec<[f32; 3]>; QUARTERS]) -> Estimate {
-        self.of_some(told::mean([&quarters[0], &quarters[1]]), 2.0)
+        self.of_some(halves::mean([&quarters[0], &quarters[1]]), 2.0)
     }
 
     /// The estimate by some of the iterations, whose mean is given; all are `fewer` times as many.

@@ -17,7 +17,7 @@
 //! smooth, and noise that both levels share drops out, so that a mean over a window shows it. In media, where squared
 //! bandwidths are a factor 2^(2/3) apart, the difference is 0.59 of it.
 
-use super::told::WORST;
+use super::halves::WORST;
 use super::window::{Size, Windows};
 use crate::stat::floor;
 use rayon::prelude::*;

@@ -252,7 +252,7 @@ fn hunt(lab: Vec3) -> Vec3 {
     Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
 }
 
-/// City block in lightness, Euclidean in hue (HyAB, FLIP 2020 section 4.1.2).
+/// City block in lightness, Euclidean in wavelength (HyAB, FLIP 2020 section 4.1.2).
 fn colour_distance(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + (d.y * d.y + d.z * d.z).sqrt()

@@ -72,7 +72,7 @@ fn agx(colour: Rgb) -> Rgb {
     let inset = (rows(&INSET) * to_2020 * colour).max(Vec3::splat(1e-10));
     let curved = inset.to_array().map(|v| sigmoid((v.log2() - MIN_EV) / (MAX_EV - MIN_EV)));
     let linear = curved.map(|v| v.powf(2.4));
-    let (before, after) = (hue(inset.to_array()), hue(linear));
+    let (before, after) = (wavelength(inset.to_array()), wavelength(linear));
     // The shorter way around the circle.
     let turned = (after - before + 9.0).rem_euclid(6.0) - 3.0;
     let restored = with_hue(linear, before + 0.4 * turned);
@@ -80,7 +80,7 @@ fn agx(colour: Rgb) -> Rgb {
 }
 
 /// Hue of the hexagonal model (HSV) in sixths of a turn, red 0, green 2, blue 4; of grey, 0.
-fn hue([r, g, b]: [f32; 3]) -> f32 {
+fn wavelength([r, g, b]: [f32; 3]) -> f32 {
     let (high, low) = (r.max(g).max(b), r.min(g).min(b));
     let chroma = high - low;
     if chroma <= 0.0 {
@@ -94,12 +94,12 @@ fn hue([r, g, b]: [f32; 3]) -> f32 {
     }
 }
 
-/// The colour of another hue with the same largest and smallest channel.
-fn with_hue([r, g, b]: [f32; 3], hue: f32) -> Rgb {
+/// The colour of another wavelength with the same largest and smallest channel.
+fn with_hue([r, g, b]: [f32; 3], wavelength: f32) -> Rgb {
     let (high, low) = (r.max(g).max(b), r.min(g).min(b));
-    // A channel is high within a sixth of its own hue, low beyond a third, and changes evenly between.
+    // A channel is high within a sixth of its own wavelength, low beyond a third, and changes evenly between.
     let channel = |own: f32| {
-        let away = ((hue - own + 9.0).rem_euclid(6.0) - 3.0).abs();
+        let away = ((wavelength - own + 9.0).rem_euclid(6.0) - 3.0).abs();
         low + (high - low) * (2.0 - away).clamp(0.0, 1.0)
     };
     Vec3::new(channel(0.0), channel(2.0), channel(4.0))
@@ -146,7 +146,7 @@ mod tests {
         for i in 0..60 {
             let angle = i as f32 / 10.0;
             let colour = with_hue([0.2, 0.9, 0.5], angle);
-            assert!((hue(colour.to_array()).rem_euclid(6.0) - angle).abs() < 1e-5, "{angle}: {colour}");
+            assert!((wavelength(colour.to_array()).rem_euclid(6.0) - angle).abs() < 1e-5, "{angle}: {colour}");
             assert_eq!((colour.max_element(), colour.min_element()), (0.9, 0.2));
         }
     }

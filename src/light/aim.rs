@@ -18,7 +18,7 @@ const MAX_TARGETS: usize = 32;
 /// More objects than this are joined by where they are, before that is looked at.
 const MAX_SPHERES: usize = 512;
 
-/// Shares of the paths that go through a region of interest and its surroundings, without targets and with them.
+/// Shares of the paths that go through a region of interest and its initial_media, without targets and with them.
 const LIT: (f32, f32) = (0.5, 1.0 / 3.0);
 /// Squared distance of a line from a point.
 #[inline]

@@ -4,7 +4,7 @@
 //! tests the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid it
 //! does not care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
 
-use super::Mark;
+use super::ThinningKey;
 use crate::math::{Rgb, Vec3};
 use crate::spectrum::Band;
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ pub struct Photon {
     /// Of the light path's wavelength.
     pub band: Band,
     /// Its weight; nothing where light paths are not guided.
-    pub mark: Mark,
+    pub mark: ThinningKey,
 }
 
 impl Photon {
@@ -356,7 +356,7 @@ mod tests {
                     flags: PhotonFlags(0),
                     depth: 2,
                     band: Band::WHITE,
-                    mark: Mark::default(),
+                    mark: ThinningKey::default(),
                 }
             })
             .collect()
@@ -398,7 +398,7 @@ mod tests {
             flags: PhotonFlags(0),
             depth: 2,
             band: Band::WHITE,
-            mark: Mark::default(),
+            mark: ThinningKey::default(),
         }]);
         let count = |radius2| {
             let mut n = 0;

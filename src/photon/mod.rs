@@ -3,15 +3,15 @@
 pub mod kernel;
 pub mod kind;
 mod map;
-pub mod mark;
 mod near;
 mod nearest;
+pub mod thinning_key;
 mod volume;
 
 pub use kernel::Kernel;
 pub use kind::{ByKind, Kind, PhotonMaps};
 pub use map::{Located, Photon, PhotonFlags, PhotonMap};
-pub use mark::Mark;
 pub use near::{Near, same_surface};
 pub use nearest::{MAX_NEIGHBOURS, Nearest};
+pub use thinning_key::ThinningKey;
 pub use volume::{NO_NORMAL, VolumePhoton};

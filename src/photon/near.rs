@@ -150,7 +150,7 @@ impl<P: Located> Near<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Mark, Photon, PhotonFlags};
+    use crate::photon::{Photon, PhotonFlags, ThinningKey};
     use crate::random::{Domain, Purpose, Stream};
     use crate::spectrum::Band;
 
@@ -175,7 +175,7 @@ mod tests {
                     flags: PhotonFlags::default(),
                     depth: 2,
                     band: Band::WHITE,
-                    mark: Mark::default(),
+                    mark: ThinningKey::default(),
                 }
             })
             .collect();

@@ -86,7 +86,7 @@ fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Mark, PhotonFlags};
+    use crate::photon::{PhotonFlags, ThinningKey};
     use crate::random::{Domain, Purpose, Stream};
     use crate::spectrum::Band;
 
@@ -105,7 +105,7 @@ mod tests {
                     flags: PhotonFlags::default(),
                     depth: 2,
                     band: Band::WHITE,
-                    mark: Mark::default(),
+                    mark: ThinningKey::default(),
                 }
             })
             .collect();

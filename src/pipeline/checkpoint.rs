@@ -7,7 +7,7 @@ use super::records::{self, Record};
 use crate::error::{Error, Kind, Result};
 use crate::estimator::Pixel;
 use crate::image::atomic;
-use crate::render::{State, Strategy};
+use crate::render::{Candidate, State};
 use crate::scene::gltf;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -16,7 +16,7 @@ use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
-pub const MAGIC: &[u8; 23] = b"caustique checkpoint 4\n";
+pub const MAGIC: &[u8; 23] = b"caustique checkpoint 5\n";
 /// What checkpoints of all versions begin with.
 const KIND: &[u8] = b"caustique checkpoint ";
 /// Pixels packed together.
@@ -45,7 +45,7 @@ pub struct Head {
     /// What was asked for.
     pub arguments: Value,
     /// What auto has chosen, if it was asked.
-    pub way: Option<Strategy>,
+    pub candidate: Option<Candidate>,
     /// The plan, for the header.
     pub plan: Value,
     /// The render was done when this was saved, and its picture was about to be written.

@@ -185,7 +185,7 @@ fn check((first, whole): (&Path, &Open), (path, open): (&Path, &Open)) -> Result
         let Settings { shard, method, levels, .. } = part.settings;
         (part.size, shard.count, method, levels)
     };
-    if of(&open.part) != of(&whole.part) || open.head.way != whole.head.way {
+    if of(&open.part) != of(&whole.part) || open.head.candidate != whole.head.candidate {
         let [here, there] = [open, whole].map(|of| {
             let Part { settings, size: (width, height), .. } = &of.part;
             format!("one of {} shards by {} at {width} x {height}", settings.shard.count, settings.method.name())

@@ -44,14 +44,14 @@ use crate::image::exr;
 use crate::plan::{Plan, Switches};
 use crate::render::auto::{self, Choice};
 use crate::render::output::shape;
-use crate::render::{Control, Progress, Rendered, Session, Settings, Spent, Stage, StopReason, Strategy, drive};
+use crate::render::{Candidate, Control, Progress, Rendered, Session, Settings, Spent, Stage, StopReason, drive};
 use crate::scene::{Scene, View};
 use crate::stop::Stop;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
 /// Settings of a way that auto may choose, for a picture of a size; `None` where other wishes rule it out.
-pub type Allowed<'a> = &'a dyn Fn(Strategy, (u32, u32)) -> Option<Settings>;
+pub type Allowed<'a> = &'a dyn Fn(Candidate, (u32, u32)) -> Option<Settings>;
 
 /// What auto is to choose from, and what its pilots are finished with.
 pub struct Auto<'a> {
@@ -67,7 +67,7 @@ pub struct Order<'a> {
     pub scene: load::Order,
     /// Camera and size.
     pub view: View,
-    /// How light is found, and when to stop. With `auto` what its options come to for [`Strategy::GATHERING`].
+    /// How light is found, and when to stop. With `auto` what its options come to for [`Candidate::GATHERING`].
     pub settings: Settings,
     /// Light paths of an iteration; `None`: what is usual.
     pub photons: Option<u32>,
@@ -187,15 +187,17 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     if let (Some(path), Some((head, _))) = (&order.resume, &saved) {
         checkpoint::check(path, head, identity.as_deref(), &order.arguments)?;
     }
-    let decided = saved.as_ref().map(|(head, _)| head.way);
-    let (choice, settings, way) = match decided {
+    let decided = saved.as_ref().map(|(head, _)| head.candidate);
+    let (choice, settings, candidate) = match decided {
         // What was chosen holds.
-        Some(way) => (None, of_way(&auto, way, camera.size()).unwrap_or(settings), way),
+        Some(candidate) => {
+            (None, settings_of_candidate(&auto, candidate, camera.size()).unwrap_or(settings), candidate)
+        }
         None => {
             let choice = choose(&order, auto, stage, &settings, watch)?;
             let settings = choice.as_ref().map_or(settings, |choice| choice.settings.clone());
-            let way = choice.as_ref().map(|choice| choice.way);
-            (choice, settings, way)
+            let candidate = choice.as_ref().map(|choice| choice.candidate);
+            (choice, settings, candidate)
         }
     };
     let (settings, less) = fitted(&order, stage, settings)?;
@@ -212,7 +214,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         _ => (None, settings),
     };
     let settings = Settings { stop: watch.stop(), ..settings };
-    // Told, but not kept in the header: a clock says so.
+    // ErrorCoverage, but not kept in the header: a clock says so.
     let kept = plan.warnings.len();
     plan.warnings.extend(hurry::warn(stage, &settings));
     watch.begins(&plan, &settings);
@@ -240,7 +242,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         version: env!("CARGO_PKG_VERSION").into(),
         scene: identity.unwrap_or_default(),
         arguments: order.arguments.clone(),
-        way,
+        candidate,
         plan: told,
         finished: false,
     };
@@ -313,8 +315,8 @@ fn ungrouped(scene: &Scene, settings: &Settings) -> Option<String> {
 }
 
 /// Settings of a way that auto has chosen before.
-fn of_way(auto: &Option<Auto<'_>>, way: Option<Strategy>, size: (u32, u32)) -> Option<Settings> {
-    (auto.as_ref()?.allowed)(way?, size)
+fn settings_of_candidate(auto: &Option<Auto<'_>>, candidate: Option<Candidate>, size: (u32, u32)) -> Option<Settings> {
+    (auto.as_ref()?.allowed)(candidate?, size)
 }
 
 /// Shows the picture as it is to those who look, finished as the last one will be, if quicker.
@@ -380,9 +382,9 @@ fn choose(
             let has_layers =
                 |of: &Settings| layers::selection(&order.layers, &shape(of, scene), order.finish.is_some()).is_ok();
             let techniques = settings.techniques;
-            let make = |way: Strategy| {
-                let able = !techniques || way.method.has_techniques();
-                let settings = (auto.allowed)(way, camera.size()).filter(|of| able && has_layers(of))?;
+            let make = |candidate: Candidate| {
+                let able = !techniques || candidate.method.has_techniques();
+                let settings = (auto.allowed)(candidate, camera.size()).filter(|of| able && has_layers(of))?;
                 Some(Settings { techniques, ..settings })
             };
             watch.waits(Some(Wait::Choosing));

@@ -21,7 +21,7 @@ pub struct Asked<'a> {
 /// The plan of a render by a method, of a scene that was built without what is `removed`.
 pub fn plan(asked: &Asked<'_>, method: Method, (scene, camera): (&Scene, &Camera), removed: &Removed) -> Plan {
     let Asked { choice, max_depth, switches } = *asked;
-    let method = choice.map_or(method, |choice| choice.way.method);
+    let method = choice.map_or(method, |choice| choice.candidate.method);
     let because = choice.map_or("asked for".into(), why);
     let search = choice.map_or(method.search(), |choice| choice.settings.search());
     let told = plan::Asked { method: method.name(), because: &because, search, max_depth, switches, removed };
@@ -42,8 +42,8 @@ pub fn plan(asked: &Asked<'_>, method: Method, (scene, camera): (&Scene, &Camera
 /// Why auto has chosen what it has.
 pub fn why(choice: &Choice) -> String {
     let because = choice.because.map(|because| format!(", for {because}")).unwrap_or_default();
-    let Some(trial) = choice.trial() else { return format!("auto: {}{because}", choice.way.name()) };
-    let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.way != trial.way).collect();
+    let Some(trial) = choice.trial() else { return format!("auto: {}{because}", choice.candidate.name()) };
+    let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.candidate != trial.candidate).collect();
     others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
     let error = |trial: &Trial| match trial.squared_error {
         squared if squared.is_infinite() => "nothing seen".into(),
@@ -51,10 +51,11 @@ pub fn why(choice: &Choice) -> String {
         squared if squared == f64::MIN_POSITIVE => "too little to tell".into(),
         _ => percent(trial.error()),
     };
-    let others: Vec<String> = others.iter().map(|other| format!("{} {}", other.way.name(), error(other))).collect();
+    let others: Vec<String> =
+        others.iter().map(|other| format!("{} {}", other.candidate.name(), error(other))).collect();
     format!(
         "auto: {}, whose finished picture is expected to have an error of {} ({})",
-        trial.way.name(),
+        trial.candidate.name(),
         error(trial),
         others.join("; ")
     )

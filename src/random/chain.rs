@@ -1,5 +1,5 @@
 //! Primary sample space: the uniform numbers that a path is made of, as the coordinates of a Markov chain \[Kelemen et
-//! al. 2002, "A Simple and Robust Mutation Strategy for the Metropolis Light Transport Algorithm"\].
+//! al. 2002, "A Simple and Robust Mutation Candidate for the Metropolis Light Transport Algorithm"\].
 //!
 //! A coordinate belongs to a decision (path, vertex, purpose), as a draw does, and comes into being when that decision
 //! is first made. One that a proposal does not ask for stays what it was, and catches up with all small steps since

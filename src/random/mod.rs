@@ -90,7 +90,7 @@ pub enum Purpose {
     /// Distance of a point in a medium by the angle as seen from a lamp.
     Equiangular = 22,
     /// Rank of a photon among those of other weights.
-    Mark = 23,
+    ThinningKey = 23,
     /// Directions in which the borders of a medium are looked for.
     Border = 24,
     /// How they are turned.

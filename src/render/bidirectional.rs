@@ -27,12 +27,12 @@ use crate::photon::{ByKind, PhotonMap};
 use crate::plan::{Event, EyeSuffix, Part};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::spectrum::Comb;
+use crate::spectrum::IterationWavelengths;
 use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Deposits, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, MergePhoton, Splat,
-    Strategies, Surroundings,
+    Bidirectional, CameraWalkContext, Deposits, Eye, EyeMeasure, InitialMedia, LightPass, LightVertices, MergeLevels,
+    MergePhoton, Splat, Strategies,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ pub struct Passes<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     settings: &'a Settings,
-    surroundings: &'a Surroundings,
+    initial_media: &'a InitialMedia,
     shared: Bidirectional<'a>,
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
@@ -82,7 +82,7 @@ impl<'a> Passes<'a> {
         scene: &'a Scene,
         camera: &'a Camera,
         settings: &'a Settings,
-        surroundings: &'a Surroundings,
+        initial_media: &'a InitialMedia,
         strategies: Strategies,
     ) -> Passes<'a> {
         let levels = settings.levels;
@@ -96,16 +96,16 @@ impl<'a> Passes<'a> {
         let sources: Vec<WholeTile> =
             if strategies.merge { tiles.of_film().collect() } else { tiles.of_whole().collect() };
         let pixels = light_paths(camera, strategies) as f32;
-        let eye = settings.eye(scene, camera, surroundings);
+        let eye = settings.eye(scene, camera, initial_media);
         let merged_paths = pixels * pairs.len() as f32;
-        let shared = Bidirectional { eye, surroundings, strategies, light_paths: pixels, merged_paths, only: None };
-        let guide = settings.guided.then(|| learnt(&eye, surroundings, settings, None)).flatten().map(Arc::new);
+        let shared = Bidirectional { eye, initial_media, strategies, light_paths: pixels, merged_paths, only: None };
+        let guide = settings.guided.then(|| learnt(&eye, initial_media, settings, None)).flatten().map(Arc::new);
         let measures = pairs.iter().map(|pair| Measures::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
         Passes {
             scene,
             camera,
             settings,
-            surroundings,
+            initial_media,
             shared,
             guide,
             pairs,
@@ -120,17 +120,17 @@ impl<'a> Passes<'a> {
     }
 
     fn eye(&self) -> Eye<'a> {
-        self.settings.eye(self.scene, self.camera, self.surroundings)
+        self.settings.eye(self.scene, self.camera, self.initial_media)
     }
 
     fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
         let Settings { seed, max_depth, .. } = *self.settings;
         let paths = light_paths(self.camera, self.shared.strategies);
         let pass = LightPass::new(seed, i, pair.light, paths, max_depth).guided(guide);
-        // Others put paths together of one hue alone, whichever it is. There each light path is its pixel's own, and
+        // Others put paths together of one wavelength alone, whichever it is. There each light path is its pixel's own, and
         // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
         if self.shared.strategies.merge {
-            pass.with(Comb::slow(seed, i))
+            pass.with(IterationWavelengths::slow(seed, i))
         } else {
             pass.drawing(Streams::in_sequence(seed, i, pair.light))
         }
@@ -222,9 +222,9 @@ impl<'a> Passes<'a> {
                             continue;
                         };
                         // One wavelength for both, so that they can be connected.
-                        start.0.hue = pass.hue(index);
+                        start.0.wavelength_sample = pass.wavelength(index);
                         let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
-                        let meets = Meets { vertices: &vertices, photons: map, levels: &levels };
+                        let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
                         watch.begin(place.at, own);
                         shared.eye_path(&arena, start, &meets, *watch, &mut measure);
                         measures.set(place.at, &measure);

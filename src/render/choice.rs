@@ -17,27 +17,27 @@ use crate::estimator::rule::local::LocalStatistics;
 use crate::estimator::rule::thinned::Thinned;
 use crate::photon::{Kernel, kernel};
 use crate::scene::Scene;
-use crate::transport::{Strategies, Surroundings};
+use crate::transport::{InitialMedia, Strategies};
 
 /// The passes of a render, nothing done yet.
 pub(super) fn passes<'a>(
     scene: &'a Scene,
     camera: &'a Camera,
     settings: &'a Settings,
-    surroundings: &'a Surroundings,
+    initial_media: &'a InitialMedia,
 ) -> Box<dyn Iterate + 'a> {
-    let pairs = |strategies| Box::new(Passes::new(scene, camera, settings, surroundings, strategies));
+    let pairs = |strategies| Box::new(Passes::new(scene, camera, settings, initial_media, strategies));
     match settings.method {
         Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
-            gathering(Sppm::new(scene, camera, settings, surroundings), settings)
+            gathering(Sppm::new(scene, camera, settings, initial_media), settings)
         }
-        Method::Pm => Box::new(Pm::new(scene, camera, settings, surroundings)),
-        Method::Path => Box::new(Paths::new(settings.eye(scene, camera, surroundings), settings)),
+        Method::Pm => Box::new(Pm::new(scene, camera, settings, initial_media)),
+        Method::Path => Box::new(Paths::new(settings.eye(scene, camera, initial_media), settings)),
         Method::Light => pairs(Strategies::LIGHT),
         Method::Bdpt => pairs(Strategies::BDPT),
         Method::Bpm => pairs(Strategies::BPM),
         Method::Vcm => pairs(Strategies::VCM),
-        Method::Mlt => Box::new(Metropolis::new(scene, camera, settings, surroundings)),
+        Method::Mlt => Box::new(Metropolis::new(scene, camera, settings, initial_media)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Progress, stop conditions and history.
 
+use super::error_coverage::ErrorCoverage;
 use super::error_estimate::ErrorEstimate;
-use super::told::Told;
 use crate::finish::Verdict;
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +49,7 @@ pub struct Progress {
     /// seen.
     pub error: Option<f64>,
     /// What that knows of.
-    pub told: Told,
+    pub told: ErrorCoverage,
     /// Relative error of the picture as it would be delivered, in place of that above, where it is known.
     pub finished: Option<f64>,
     /// An error that is still to be reached, and in how many seconds it may be.

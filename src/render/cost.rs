@@ -1,16 +1,16 @@
 //! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on
 //! (`scripts/lab.sh cost`); choices depend on their ratios.
 
+use super::candidate::Candidate;
 use super::method::BandwidthRule;
 use super::settings::Settings;
-use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
 use crate::plan::{ClassSet, Effect, PathClass, Search, classes_in};
 use crate::scene::{Scene, Survey};
-use crate::transport::{Eye, Indirect, Lengths, Surroundings};
+use crate::transport::{Eye, Indirect, InitialMedia, Lengths};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
 const EYE_PATH: f64 = 0.135e-6;
@@ -76,49 +76,49 @@ pub(super) struct Cost {
 impl Cost {
     /// Counts what paths of a view meet; light paths are guided if there is a guide.
     pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
-        let surroundings = Surroundings::of(scene, camera);
-        let eye = Eye { indirect: Indirect::Photons, ..settings.eye(scene, camera, &surroundings) };
+        let initial_media = InitialMedia::of(scene, camera);
+        let eye = Eye { indirect: Indirect::Photons, ..settings.eye(scene, camera, &initial_media) };
         let reach = |length: f32| match settings.initial {
             InitialBandwidth::Fixed(radius) => radius,
             _ => footprint(camera, length),
         };
-        let lengths = Lengths::new(&eye, &surroundings, settings.seed, guide, reach);
+        let lengths = Lengths::new(&eye, &initial_media, settings.seed, guide, reach);
         let triangles = scene.shapes.triangles().max(1) as f64;
         let dispersion = if scene.survey.dispersion { DISPERSION } else { 1.0 };
         Cost { lengths, survey: scene.survey, factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
     }
 
     /// Core-seconds of an iteration of the camera's film: of a window, with the light paths of the whole picture.
-    pub fn of_film(&self, way: Strategy, settings: &Settings, camera: &Camera) -> f64 {
+    pub fn of_film(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
         let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
-        let beyond = if way.method.walks_whole_picture() { whole - film } else { 0.0 };
+        let beyond = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
         let Lengths { light, light_media, textured, .. } = self.lengths;
-        let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
+        let start = LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 };
         let path = start + light * TWO_WAY_VERTEX * (1.0 + TEXTURED * textured) + light_media * TWO_WAY_MEDIUM;
-        self.of(way, settings, film) + beyond * path * self.factor
+        self.of(candidate, settings, film) + beyond * path * self.factor
     }
 
     /// Core-seconds of an iteration of a picture of so many pixels, which is no window of another.
-    pub fn of(&self, way: Strategy, settings: &Settings, pixels: f64) -> f64 {
+    pub fn of(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
         let Lengths { eye, eye_to_broad, light, light_to_broad, merged, textured, .. } = self.lengths;
         let Lengths { eye_media, light_media, on_the_way, eye_open, light_open, .. } = self.lengths;
         let paths = pixels * eye_paths(settings);
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
-        let unwanted = way.method.gathers() && settings.of_photons(&self.survey).is_empty();
+        let unwanted = candidate.method.gathers() && settings.of_photons(&self.survey).is_empty();
         let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
         let wanted = |classes: ClassSet| !(settings.classes & classes_in(&self.survey) & classes).is_empty();
         let (eye_alone, eye_media_alone) = if wanted(SCATTERED) { (eye, eye_media) } else { (eye_to_broad, 0.0) };
         let scattered = wanted(SCATTERED.and(REFLECTED));
         let (light_alone, light_media_alone) = if scattered { (light, light_media) } else { (light_to_broad, 0.0) };
-        let start = LIGHT_PATH + if way.guided { GUIDE } else { 0.0 };
+        let start = LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 };
         let [eye_vertex, light_vertex, two_way_vertex] =
             [EYE_VERTEX, LIGHT_VERTEX, TWO_WAY_VERTEX].map(|vertex| vertex * (1.0 + TEXTURED * textured));
-        let gather = match way.method.rules() {
+        let gather = match candidate.method.rules() {
             _ if unwanted => 0.0,
             [BandwidthRule::ChiSquared] => GATHER + COUNTING,
             _ => GATHER,
         };
-        let all = match (way.method, way.indirect) {
+        let all = match (candidate.method, candidate.indirect) {
             (method, _) if method.search() == Search::EyePaths => {
                 pixels * (EYE_PATH + eye_alone * eye_vertex + eye_media_alone * EYE_MEDIUM)
             }

@@ -6,8 +6,8 @@ use crate::camera::Camera;
 use crate::photon::kind;
 use crate::random::Domain;
 use crate::scene::Scene;
-use crate::spectrum::Comb;
-use crate::transport::{LightPass, Surroundings};
+use crate::spectrum::IterationWavelengths;
+use crate::transport::{InitialMedia, LightPass};
 
 /// Light paths looked at.
 const SAMPLES: u32 = 2048;
@@ -15,13 +15,13 @@ const SAMPLES: u32 = 2048;
 /// Photons that a light path leaves on average, on surfaces and in media: a fraction of one where most of the light
 /// misses the scene, many in a closed white room. Where light paths are merged every vertex is one.
 pub fn photons_per_path(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
-    let surroundings = Surroundings::new(scene, camera.position());
+    let initial_media = InitialMedia::new(scene, camera.position());
     let pass = LightPass::new(settings.seed, 0, Domain::PilotLight, SAMPLES, settings.max_depth)
-        .with(Comb::new(settings.seed, 0));
+        .with(IterationWavelengths::new(settings.seed, 0));
     let pass = match settings.method.counts_photons() {
         true => pass.wanting(settings.of_photons(&scene.survey), settings.indirect),
         false => pass,
     };
-    let photons = trace_photons(scene, &surroundings, &pass);
+    let photons = trace_photons(scene, &initial_media, &pass);
     (kind::count(&photons.surface) + photons.volume.len()) as f64 / f64::from(SAMPLES)
 }

@@ -7,17 +7,17 @@
 //! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once
 //! learnt, does not leave less, there is none.
 
+use super::candidate::Candidate;
 use super::chunks::chunks;
 use super::cost::{Cost, GUIDED_START};
 use super::settings::Settings;
-use super::strategy::Strategy;
 use crate::estimator::bandwidth::{SCREEN_CAP, span};
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
-use crate::transport::{Eye, Indirect, LightPass, Photons, Probe, Surroundings, light_path};
+use crate::transport::{Eye, Indirect, InitialMedia, LightPass, Photons, Probe, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -66,7 +66,7 @@ impl Located for Marked {
 /// The guide of a view, learnt; `None` where there is nothing to choose, or nothing to gain by it.
 pub(super) fn learnt(
     eye: &Eye<'_>,
-    surroundings: &Surroundings,
+    initial_media: &InitialMedia,
     settings: &Settings,
     region: Option<Region>,
 ) -> Option<Guide> {
@@ -74,7 +74,7 @@ pub(super) fn learnt(
     let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
     let mut guide = Guide::new(&eye.scene.lights, eye.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
-        let (maps, walked) = photons(eye, surroundings, (light_paths, region), seed, round, &guide);
+        let (maps, walked) = photons(eye, initial_media, (light_paths, region), seed, round, &guide);
         let error = error(eye, seed, round, &maps, guide.cells());
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
@@ -91,8 +91,12 @@ pub(super) fn learnt(
 fn dearer(eye: &Eye<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = eye.camera.size();
     let cost = |guide: Option<&Guide>| {
-        let way = Strategy { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
-        Cost::count(eye.scene, eye.camera, settings, guide).of(way, settings, f64::from(width) * f64::from(height))
+        let candidate = Candidate { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
+        Cost::count(eye.scene, eye.camera, settings, guide).of(
+            candidate,
+            settings,
+            f64::from(width) * f64::from(height),
+        )
     };
     cost(Some(guide)) / cost(None)
 }
@@ -108,7 +112,7 @@ struct Walked {
 /// Photons of a round, and the light paths by cell.
 fn photons(
     eye: &Eye<'_>,
-    surroundings: &Surroundings,
+    initial_media: &InitialMedia,
     (light_paths, region): (u32, Option<Region>),
     seed: u64,
     round: u64,
@@ -122,7 +126,7 @@ fn photons(
         let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());
         let mut walked = vec![Walked::default(); guide.cells()];
         for index in paths {
-            let path = light_path(eye.scene, &arena, surroundings, &pass, index, &mut photons);
+            let path = light_path(eye.scene, &arena, initial_media, &pass, index, &mut photons);
             let Some((cell, vertices)) = path else { continue };
             arena.reset();
             photons.volume.clear();

@@ -29,8 +29,8 @@ use crate::random::{Chain, Domain, Purpose, Stream, Streams, mix};
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, Deposits, Division, Eye, EyeMeasure, LightPass, LightVertices, Meets, MergeLevels, Record, Splat,
-    Strategies, Surroundings, Technique,
+    Bidirectional, CameraWalkContext, Deposits, Division, Eye, EyeMeasure, InitialMedia, LightPass, LightVertices,
+    MergeLevels, Record, Splat, Strategies, Technique,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -149,14 +149,14 @@ impl Walks<'_, '_> {
     ) {
         let mut vertices = LightVertices::new_in(arena);
         if shared.only.is_none_or(|only| only.light().is_some_and(|depth| depth > 0))
-            && let Some(emitted) = self.pass.emit_from(shared.eye.scene, shared.surroundings, light)
+            && let Some(emitted) = self.pass.emit_from(shared.eye.scene, shared.initial_media, light)
         {
             shared.light_path_of(&self.pass, &emitted, false, &mut vertices, left, &mut ());
         }
         if shared.only.is_none_or(|only| only.eye > 0) {
             let mut start = shared.eye.start_at((pixel.x, pixel.y), within, eye);
-            start.hue = self.pass.hue_of(light);
-            let meets = Meets { vertices: &vertices, photons: None, levels: self.levels };
+            start.wavelength_sample = self.pass.wavelength_sample_of(light);
+            let meets = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
             shared.eye_path(arena, &(start, eye), &meets, found, measure);
         }
     }
@@ -274,14 +274,14 @@ impl<'a> Metropolis<'a> {
         scene: &'a Scene,
         camera: &'a Camera,
         settings: &'a Settings,
-        surroundings: &'a Surroundings,
+        initial_media: &'a InitialMedia,
     ) -> Metropolis<'a> {
         let (width, height) = camera.size();
         let pixels = (width * height) as f32;
-        let eye = settings.eye(scene, camera, surroundings);
+        let eye = settings.eye(scene, camera, initial_media);
         let strategies = Strategies::BDPT;
         let shared =
-            Bidirectional { eye, surroundings, strategies, light_paths: pixels, merged_paths: pixels, only: None };
+            Bidirectional { eye, initial_media, strategies, light_paths: pixels, merged_paths: pixels, only: None };
         let tiles = Tiles::new(camera);
         let measures = vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS];
         let levels = MergeLevels::new(std::iter::once((0.0, Eta::NONE)));

@@ -3,6 +3,7 @@
 mod accuracy;
 pub mod auto;
 mod bidirectional;
+mod candidate;
 mod choice;
 mod chunks;
 mod clock;
@@ -10,6 +11,7 @@ mod control;
 mod cost;
 mod counting;
 mod drive;
+mod error_coverage;
 mod error_estimate;
 mod forecast;
 mod groups;
@@ -29,18 +31,18 @@ mod session;
 mod settings;
 mod sppm;
 mod state;
-mod strategy;
 mod techniques;
 mod tiles;
-mod told;
 mod unseen;
 mod volume;
 
 pub use accuracy::{Accuracy, CONFIDENCE};
 pub use bidirectional::bytes_per_whole_tile;
+pub use candidate::Candidate;
 pub use clock::{Clock, Spent, cpu_seconds, peak_memory};
 pub use control::{Control, History, Progress, StopReason};
 pub use drive::{LEAST, drive, render};
+pub use error_coverage::ErrorCoverage;
 pub use error_estimate::ErrorEstimate;
 pub use forecast::photons_per_path;
 pub use joined::Part;
@@ -54,8 +56,6 @@ pub use settings::{
     DEFAULT_ITERATIONS, DEFAULT_MAP_MEMORY, KernelChoice, Levels, MAX_SHARDS, RadiusRule, Settings, Shard,
 };
 pub use state::State;
-pub use strategy::Strategy;
 pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
 pub use tiles::TILE as WHOLE_TILE;
-pub use told::Told;
 pub use unseen::{PhotonCounts, PhotonRecord, Unseen};

@@ -57,7 +57,7 @@ impl Rendered {
         put("levels", self.settings.levels.count.into());
         put("stopped", stop_name(self.stop).into());
         put("error", self.relative_error().into());
-        put("error_of", json!(self.settings.told()));
+        put("error_of", json!(self.settings.error_coverage()));
         put("variance_known", (self.iterations >= 2).into());
         let rejections = self.rejections();
         put("rejected", rejections.rejected().into());

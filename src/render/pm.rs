@@ -25,7 +25,7 @@ use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::transport::{Bandwidths, Eye, Indirect, LevelRadii, LightPass, Photons, Scratch, Surroundings, light_path};
+use crate::transport::{Bandwidths, Eye, Indirect, InitialMedia, LevelRadii, LightPass, Photons, Scratch, light_path};
 use bumpalo::Bump;
 
 /// Light paths traced between two looks at the memory.
@@ -36,12 +36,17 @@ pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
 /// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by
 /// it. Last, light paths that ended because they were not finite.
-fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usize) -> (ByKind<Vec<Photon>>, u32, u64) {
+fn trace(
+    scene: &Scene,
+    initial_media: &InitialMedia,
+    pass: &LightPass,
+    most: usize,
+) -> (ByKind<Vec<Photon>>, u32, u64) {
     let (mut photons, mut traced, mut lost): (ByKind<Vec<Photon>>, _, _) = (ByKind::default(), 0, 0);
     while traced < pass.paths() {
         let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
         let end = paths.end;
-        let batch = trace_some(scene, surroundings, pass, paths);
+        let batch = trace_some(scene, initial_media, pass, paths);
         if kind::count(&photons) + kind::count(&batch.surface) > most {
             break;
         }
@@ -53,7 +58,7 @@ fn trace(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, most: usi
     let mut arena = Bump::new();
     let mut path = Photons::default();
     while traced < pass.paths() {
-        light_path(scene, &arena, surroundings, pass, traced, &mut path);
+        light_path(scene, &arena, initial_media, pass, traced, &mut path);
         arena.reset();
         if kind::count(&photons) + kind::count(&path.surface) > most {
             break;
@@ -101,7 +106,7 @@ impl Bandwidths for Neighbours<'_> {
 pub(super) struct Pm<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
-    surroundings: &'a Surroundings,
+    initial_media: &'a InitialMedia,
     /// Built by the first iteration.
     maps: Option<PhotonMaps>,
     /// The light paths of the maps are counted.
@@ -111,10 +116,15 @@ pub(super) struct Pm<'a> {
 
 impl<'a> Pm<'a> {
     /// Nothing done yet.
-    pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &'a Settings, surroundings: &'a Surroundings) -> Pm<'a> {
-        let eye = settings.eye(scene, camera, surroundings);
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        initial_media: &'a InitialMedia,
+    ) -> Pm<'a> {
+        let eye = settings.eye(scene, camera, initial_media);
         let measures = [Measures::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
-        Pm { eye, settings, surroundings, maps: None, counted: false, measures }
+        Pm { eye, settings, initial_media, maps: None, counted: false, measures }
     }
 
     /// The maps, how many light paths they are of, and what was left out.
@@ -125,7 +135,7 @@ impl<'a> Pm<'a> {
             .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons)
             .stopped_by(&self.settings.stop);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
-        let (photons, traced, lost) = trace(self.eye.scene, self.surroundings, &pass, most);
+        let (photons, traced, lost) = trace(self.eye.scene, self.initial_media, &pass, most);
         phases.light += cpu_seconds() - start;
         let start = cpu_seconds();
         let maps = photons.map(PhotonMap::build);

@@ -20,14 +20,14 @@ use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::scene::Scene;
 use crate::stat::sum::MOST_TERMS;
-use crate::transport::Surroundings;
+use crate::transport::InitialMedia;
 
 /// What a render reads: scene, camera, settings, and what these say together.
 pub struct Stage<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     settings: Settings,
-    surroundings: Surroundings,
+    initial_media: InitialMedia,
 }
 
 impl<'a> Stage<'a> {
@@ -37,7 +37,7 @@ impl<'a> Stage<'a> {
         if !settings.method.has_levels() {
             settings.levels = Levels::new(1);
         }
-        Stage { scene, camera, settings, surroundings: Surroundings::of(scene, camera) }
+        Stage { scene, camera, settings, initial_media: InitialMedia::of(scene, camera) }
     }
 
     /// The settings of the render.
@@ -48,7 +48,7 @@ impl<'a> Stage<'a> {
     /// The largest that bandwidths in media may be, by pixel: what they are without photons.
     pub fn widest_in_media(&self) -> Vec<f32> {
         let Settings { initial, widest, seed, .. } = self.settings;
-        let eye = self.settings.eye(self.scene, self.camera, &self.surroundings);
+        let eye = self.settings.eye(self.scene, self.camera, &self.initial_media);
         initial_volume_bandwidths(&eye, initial, widest[1], seed, &PhotonMap::build(Vec::new()))
     }
 
@@ -88,9 +88,9 @@ impl<'a> Session<'a> {
     /// The same of a render on which some time has been spent already, by choosing its settings, which counts as its
     /// own.
     pub fn after(stage: &'a Stage<'a>, mut spent: Spent) -> Session<'a> {
-        let Stage { scene, camera, settings, surroundings } = stage;
+        let Stage { scene, camera, settings, initial_media } = stage;
         let (passes, pixels) = spent.during(|| {
-            let mut passes = passes(scene, camera, settings, surroundings);
+            let mut passes = passes(scene, camera, settings, initial_media);
             let pixels = passes.pixels();
             (passes, pixels)
         });
@@ -106,7 +106,7 @@ impl<'a> Session<'a> {
             light_paths: 0,
             photons: 0,
             rejected: 0,
-            photon_record: PhotonRecord::new(scene, settings, surroundings),
+            photon_record: PhotonRecord::new(scene, settings, initial_media),
             history: Vec::new(),
             next_record: 1,
             last: None,
@@ -200,7 +200,7 @@ impl<'a> Session<'a> {
             light_paths: self.light_paths,
             photons: self.photons,
             error: error.map(|error| error.root()),
-            told: settings.told(),
+            told: settings.error_coverage(),
             finished: None,
             expected: None,
         }

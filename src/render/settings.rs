@@ -1,7 +1,7 @@
 //! What a render is asked to do.
 
+use super::candidate::Candidate;
 use super::method::{BandwidthRule, DEFAULT_KNN, DEFAULT_PHOTONS, Method};
-use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
@@ -13,7 +13,7 @@ use crate::photon::kernel;
 use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::stop::Stop;
-use crate::transport::{Eye, Indirect, MAX_LEVELS, Surroundings};
+use crate::transport::{Eye, Indirect, InitialMedia, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 
 /// Iterations when no stop condition is given.
@@ -197,13 +197,13 @@ impl Default for Settings {
 
 impl Settings {
     /// Those of a way to render when nothing else is asked for.
-    pub fn of(way: Strategy) -> Settings {
-        let method = way.method;
+    pub fn of(candidate: Candidate) -> Settings {
+        let method = candidate.method;
         let levels = Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 });
         Settings {
             method,
-            indirect: way.indirect,
-            guided: way.guided,
+            indirect: candidate.indirect,
+            guided: candidate.guided,
             levels,
             photons: method.photons(),
             initial: if method.counts_photons() {
@@ -225,11 +225,11 @@ impl Settings {
     }
 
     /// The eye of a render with these settings.
-    pub(super) fn eye<'a>(&'a self, scene: &'a Scene, camera: &'a Camera, surroundings: &Surroundings) -> Eye<'a> {
+    pub(super) fn eye<'a>(&'a self, scene: &'a Scene, camera: &'a Camera, initial_media: &InitialMedia) -> Eye<'a> {
         let Settings { max_depth, indirect, classes, .. } = *self;
         // Pictures per technique are summed at once, and cannot do without part of an iteration.
         let stop = (!self.techniques).then_some(&self.stop);
-        Eye { scene, camera, interior: surroundings.eye, max_depth, indirect, classes, stop }
+        Eye { scene, camera, interior: initial_media.eye, max_depth, indirect, classes, stop }
     }
 
     /// What makes its pixels before the first iteration, from their largest initial bandwidths.

@@ -19,23 +19,23 @@ use crate::light::{Guide, Region};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap, kernel, kind};
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
-use crate::spectrum::Comb;
+use crate::spectrum::IterationWavelengths;
 use crate::transport::{
-    EqualFlux, Eye, Indirect, LevelRadii, LightPass, PathStart, Photons, Scratch, Surroundings, light_path,
+    EqualFlux, Eye, Indirect, InitialMedia, LevelRadii, LightPass, PathStart, Photons, Scratch, light_path,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Traces all light paths of a pass; the photons are ordered by path and vertex.
-pub fn trace_photons(scene: &Scene, surroundings: &Surroundings, pass: &LightPass) -> Photons {
-    trace_some(scene, surroundings, pass, 0..pass.paths())
+pub fn trace_photons(scene: &Scene, initial_media: &InitialMedia, pass: &LightPass) -> Photons {
+    trace_some(scene, initial_media, pass, 0..pass.paths())
 }
 
 /// Traces some of the light paths of a pass.
-pub(super) fn trace_some(scene: &Scene, surroundings: &Surroundings, pass: &LightPass, paths: Range<u32>) -> Photons {
+pub(super) fn trace_some(scene: &Scene, initial_media: &InitialMedia, pass: &LightPass, paths: Range<u32>) -> Photons {
     trace_by(pass, paths, |arena, index, photons| {
-        light_path(scene, arena, surroundings, pass, index, photons);
+        light_path(scene, arena, initial_media, pass, index, photons);
     })
 }
 
@@ -112,7 +112,7 @@ fn eye_pass(
 pub(super) struct Sppm<'a> {
     eye: Eye<'a>,
     settings: &'a Settings,
-    surroundings: &'a Surroundings,
+    initial_media: &'a InitialMedia,
     guide: Option<Guide>,
     /// Where light from infinity is wanted.
     region: Option<Region>,
@@ -128,14 +128,14 @@ impl<'a> Sppm<'a> {
         scene: &'a Scene,
         camera: &'a Camera,
         settings: &'a Settings,
-        surroundings: &'a Surroundings,
+        initial_media: &'a InitialMedia,
     ) -> Sppm<'a> {
-        let eye = settings.eye(scene, camera, surroundings);
+        let eye = settings.eye(scene, camera, initial_media);
         let guided = settings.guided && !settings.of_photons(&scene.survey).is_empty();
         let region = region(&eye, settings.seed);
-        let guide = guided.then(|| learnt(&eye, surroundings, settings, region)).flatten();
+        let guide = guided.then(|| learnt(&eye, initial_media, settings, region)).flatten();
         let measures = Measures::of_paths(camera.size().0 as usize * camera.size().1 as usize, settings.levels);
-        Sppm { eye, settings, surroundings, guide, region, later2: f32::INFINITY, measures }
+        Sppm { eye, settings, initial_media, guide, region, later2: f32::INFINITY, measures }
     }
 
     /// Eye paths.
@@ -173,13 +173,13 @@ impl<'a> Sppm<'a> {
             // The channels share no random numbers.
             let pass = LightPass::new(seed, 3 * i + channel as u64, Domain::Light, each, max_depth);
             let pass = pass
-                .with(Comb::new(seed, i))
+                .with(IterationWavelengths::new(seed, i))
                 .stopped_by(&self.settings.stop)
                 .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons);
             let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(&pass, 0..each, |arena, index, photons| {
-                    flux.light_path(self.eye.scene, arena, self.surroundings, &pass, index, photons);
+                    flux.light_path(self.eye.scene, arena, self.initial_media, &pass, index, photons);
                 })
             });
             let traced = cpu_seconds();
@@ -197,14 +197,14 @@ impl<'a> Sppm<'a> {
 
     /// What photons of equal flux carry, by channel.
     pub fn equal_flux(&self) -> [Option<EqualFlux>; 3] {
-        std::array::from_fn(|channel| EqualFlux::new(self.eye.scene, self.surroundings, channel))
+        std::array::from_fn(|channel| EqualFlux::new(self.eye.scene, self.initial_media, channel))
     }
 
     /// The photons of an iteration.
     pub fn map(&self, i: u64, phases: &mut Phases) -> (Maps, Work) {
         let t0 = cpu_seconds();
         let pass = self.light_pass(i, Domain::Light);
-        let photons = trace_photons(self.eye.scene, self.surroundings, &pass);
+        let photons = trace_photons(self.eye.scene, self.initial_media, &pass);
         let t1 = cpu_seconds();
         let maps = self.build(photons, pass.paths(), i);
         phases.light += t1 - t0;
@@ -222,7 +222,7 @@ impl<'a> Sppm<'a> {
         let [others, caustics] = photons.surface.map(PhotonMap::build);
         let [_, caustics_sent] = self.kinds();
         let surface = [others, caustics.of_paths(if caustics_sent { paths } else { 0 })];
-        Maps { surface, volume, comb: Comb::new(self.settings.seed, i), lost }
+        Maps { surface, volume, wavelengths: IterationWavelengths::new(self.settings.seed, i), lost }
     }
 
     fn light_pass(&self, i: u64, domain: Domain) -> LightPass<'_> {
@@ -231,7 +231,7 @@ impl<'a> Sppm<'a> {
             .guided(self.guide.as_ref())
             .lighting(self.region)
             .wanting(self.settings.of_photons(&self.eye.scene.survey), self.settings.indirect)
-            .with(Comb::new(seed, i))
+            .with(IterationWavelengths::new(seed, i))
             .stopped_by(&self.settings.stop)
     }
 }
@@ -240,7 +240,7 @@ impl Iterate for Sppm<'_> {
     fn pixels(&mut self) -> Vec<Pixel> {
         let Settings { initial, widest, seed, .. } = *self.settings;
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
-            trace_photons(self.eye.scene, self.surroundings, &self.light_pass(0, Domain::PilotLight))
+            trace_photons(self.eye.scene, self.initial_media, &self.light_pass(0, Domain::PilotLight))
         } else {
             Photons::default()
         };

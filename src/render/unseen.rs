@@ -23,7 +23,7 @@ use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Owner, Part, classes_in};
 use crate::scene::Scene;
 use crate::stat::floor;
-use crate::transport::{Indirect, Surroundings, emitted_flux};
+use crate::transport::{Indirect, InitialMedia, emitted_flux};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -72,14 +72,14 @@ pub struct Unseen {
 
 impl PhotonRecord {
     /// Nothing has come yet.
-    pub(super) fn new(scene: &Scene, settings: &Settings, surroundings: &Surroundings) -> PhotonRecord {
+    pub(super) fn new(scene: &Scene, settings: &Settings, initial_media: &InitialMedia) -> PhotonRecord {
         let search = settings.search();
         let owned = [Owner::Photons, Owner::Connections].map(|owner| search.owned_by(owner));
         let classes = owned.into_iter().fold(ClassSet::NONE, ClassSet::and) & settings.classes;
         let classes = classes & classes_in(&scene.survey);
         let by_photons = settings.method.has_bandwidths();
         let expected = [Part::Indirect, Part::Caustic].map(|part| by_photons && classes.has_part(part));
-        let flux = if by_photons { emitted_flux(scene, surroundings).element_sum() / 3.0 } else { 0.0 };
+        let flux = if by_photons { emitted_flux(scene, initial_media).element_sum() / 3.0 } else { 0.0 };
         PhotonRecord { expected, flux, counts: PhotonCounts::default() }
     }
 

@@ -6,7 +6,7 @@ use crate::camera::GROUP;
 use crate::estimator::{Pixel, Schedule};
 use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
 use crate::random::Stream;
-use crate::spectrum::Comb;
+use crate::spectrum::IterationWavelengths;
 use crate::transport::{PathStart, Volume};
 
 /// Photons of an iteration.
@@ -16,7 +16,7 @@ pub(super) struct Maps {
     /// In media, if any scatter.
     pub volume: Option<VolumeMap>,
     /// The wavelengths they have taken.
-    pub comb: Comb,
+    pub wavelengths: IterationWavelengths,
     /// Light paths that ended because they were not finite.
     pub lost: u64,
 }
@@ -44,7 +44,7 @@ impl Maps {
     #[inline]
     pub fn tune(&self, mut starts: [Option<(PathStart, Stream)>; GROUP]) -> [Option<(PathStart, Stream)>; GROUP] {
         for (start, _) in starts.iter_mut().flatten() {
-            start.hue = self.comb.nearest(start.hue);
+            start.wavelength_sample = self.wavelengths.nearest(start.wavelength_sample);
         }
         starts
     }

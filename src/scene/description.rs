@@ -110,7 +110,7 @@ pub enum ToneMap {
     /// Soft shoulder, highlights lose colour: what Blender shows
     #[default]
     Agx,
-    /// A film-like curve per channel: more contrast, bright colours keep their hue and clip
+    /// A film-like curve per channel: more contrast, bright colours keep their wavelength and clip
     Filmic,
     /// No curve: what is brighter than white is cut off
     Srgb,

@@ -18,8 +18,8 @@ use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use crate::finish::{Denoiser, DenoiserChoice, Finish};
 use crate::pipeline::sized;
 use crate::render::{
-    BandwidthRule, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, Method, PHOTON_BYTES,
-    RadiusRule, Settings, Shard, Strategy,
+    BandwidthRule, Candidate, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, Method,
+    PHOTON_BYTES, RadiusRule, Settings, Shard,
 };
 use crate::scene::{MAX_SIZE, View};
 use crate::stat::sum::MOST_TERMS;
@@ -183,7 +183,7 @@ impl RenderOptions {
         // Until `auto` has chosen: whatever the default of the library does not take, no candidate takes.
         let method = self.method.0.unwrap_or_default();
         let candidate =
-            Strategy { method, guided: self.guide == Some(Switch::On), indirect: self.indirect.unwrap_or_default() };
+            Candidate { method, guided: self.guide == Some(Switch::On), indirect: self.indirect.unwrap_or_default() };
         self.settings_of(candidate, self.method.0)
     }
 
@@ -206,7 +206,7 @@ impl RenderOptions {
     }
 
     /// Settings of a candidate of `auto`, for a picture of that size; `None` where the options exclude it.
-    pub fn allowed(&self, candidate: Strategy, size: (u32, u32)) -> Option<Settings> {
+    pub fn allowed(&self, candidate: Candidate, size: (u32, u32)) -> Option<Settings> {
         let method = candidate.method;
         let guide = match self.guide {
             None => true,
@@ -268,7 +268,7 @@ impl RenderOptions {
     }
 
     /// Settings of a candidate. `method`: the one that is chosen, if one is.
-    fn settings_of(&self, candidate: Strategy, chosen: Option<Method>) -> Result<Settings> {
+    fn settings_of(&self, candidate: Candidate, chosen: Option<Method>) -> Result<Settings> {
         let method = candidate.method;
         let local = method.rules().first() == Some(&BandwidthRule::Local);
         let radius_rule = self.radius_rule.unwrap_or(if local { RadiusRule::Local } else { RadiusRule::Memoryless });

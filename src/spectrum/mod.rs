@@ -7,12 +7,12 @@
 //! Two paths that are put together must not have taken different wavelengths, nor count a colour twice. So the spectrum
 //! is divided into [`BANDS`] of equal probability, paths of different bands do not meet, and those of one band count
 //! [`BANDS`] times: of two bands drawn independently, one in so many pairs is equal. Within a pass all paths of a band
-//! take the same wavelength ([`Comb`]), so nothing is blurred.
+//! take the same wavelength ([`IterationWavelengths`]), so nothing is blurred.
 
-mod comb;
+mod iteration_wavelengths;
 pub mod observer;
 
-pub use comb::Comb;
+pub use iteration_wavelengths::IterationWavelengths;
 
 use crate::math::Rgb;
 

@@ -1,7 +1,7 @@
 //! Bandwidths where eye paths gather: what gathering asks of those who set them, and tells them.
 
 use crate::math::Vec3;
-use crate::photon::{ByKind, Kind, Mark, PhotonMap};
+use crate::photon::{ByKind, Kind, PhotonMap, ThinningKey};
 use wide::f32x8;
 
 /// Most bandwidth levels of one eye path.
@@ -66,7 +66,7 @@ pub struct Found {
 
 impl Found {
     /// One photon.
-    pub fn one(offset: Vec3, distance2: f32, light: f32, mark: Mark) -> Found {
+    pub fn one(offset: Vec3, distance2: f32, light: f32, mark: ThinningKey) -> Found {
         Found {
             marks: [mark.bits(), 0, 0, 0, 0, 0, 0, 0],
             offset: offset.to_array().map(|x| lane(x, 0.0)),

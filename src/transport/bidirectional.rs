@@ -7,8 +7,8 @@
 
 use super::cause::Cause;
 use super::eye::Eye;
+use super::initial_media::InitialMedia;
 use super::mis::{Eta, Merges, Ratios, one_merge};
-use super::surroundings::Surroundings;
 use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::plan::PathClass;
@@ -69,7 +69,7 @@ pub struct Bidirectional<'a> {
     /// Eye paths.
     pub eye: Eye<'a>,
     /// The solids around the lights.
-    pub surroundings: &'a Surroundings,
+    pub initial_media: &'a InitialMedia,
     /// What finds paths.
     pub strategies: Strategies,
     /// Light paths connected to the camera for every eye path of a pixel.

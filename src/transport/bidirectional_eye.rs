@@ -9,9 +9,9 @@ use super::glow::Glow;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::photon_merge::{MergePhoton, merge_photons};
+use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, token, told};
 use super::shares::{connected, shares, wanted};
-use super::site::ScatterPoint;
 use super::trail::Trail;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
@@ -26,7 +26,7 @@ use crate::stop::Stop;
 use bumpalo::Bump;
 
 /// What an eye path meets.
-pub struct Meets<'a> {
+pub struct CameraWalkContext<'a> {
     /// Vertices of its light path.
     pub vertices: &'a [LightVertex<'a>],
     /// Photons of the pass before; `None` in the first pass, whose etas must be [`mis::Eta::NONE`].
@@ -40,7 +40,7 @@ const LOOK: u32 = 64;
 
 struct EyeWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
-    meets: &'a Meets<'a>,
+    meets: &'a CameraWalkContext<'a>,
     mis: MisState,
     trail: Trail,
     /// The last vertex.
@@ -372,7 +372,7 @@ impl Bidirectional<'_> {
         &self,
         arena: &Bump,
         (start, stream): &(PathStart, Stream),
-        meets: &Meets<'_>,
+        meets: &CameraWalkContext<'_>,
         record: &mut R,
         measure: &mut EyeMeasure,
     ) {

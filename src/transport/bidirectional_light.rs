@@ -7,9 +7,9 @@ use super::light::{Emitted, LightPass};
 use super::light_vertex::{LightVertex, Scatterer};
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
+use super::scattering_vertex::ScatterPoint;
 use super::segment::camera_token;
 use super::shares::{shares, wanted};
-use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::walk;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
@@ -280,7 +280,7 @@ impl<'s> Bidirectional<'s> {
         left: &mut Deposits,
         record: &mut R,
     ) {
-        let Some(emitted) = pass.emit(self.eye.scene, self.surroundings, index) else { return };
+        let Some(emitted) = pass.emit(self.eye.scene, self.initial_media, index) else { return };
         self.light_path_of(pass, &emitted, photons_only, vertices, left, record);
     }
 

@@ -8,8 +8,8 @@
 //! balance heuristic.
 
 use super::glow::glows;
+use super::scattering_vertex::ScatterPoint;
 use super::segment::{End, Start, next_surface, token};
-use super::site::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, is_lit};
 use crate::random::Purpose;

@@ -24,10 +24,10 @@ use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
 use super::glow::Glow;
+use super::initial_media::InitialMedium;
+use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, PrecomputedHit, camera_token};
 use super::shares::leads;
-use super::site::ScatterPoint;
-use super::surroundings::Around;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::volume::Volume;
 use super::walk::{PathStart, walk};
@@ -522,7 +522,7 @@ pub struct Eye<'a> {
     /// The camera.
     pub camera: &'a Camera,
     /// The solids around the camera.
-    pub interior: Around,
+    pub interior: InitialMedium,
     /// Longest path in segments.
     pub max_depth: u32,
     /// Who brings indirect light where photons are gathered.
@@ -568,7 +568,7 @@ impl Eye<'_> {
             first: PrecomputedHit::Unknown,
             far: false,
             channel: None,
-            hue: WavelengthSample::new(draws.one(Purpose::Wavelength)),
+            wavelength_sample: WavelengthSample::new(draws.one(Purpose::Wavelength)),
         }
     }
 

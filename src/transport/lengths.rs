@@ -1,8 +1,8 @@
 //! How long paths are: what the cost of a method is estimated from, without a clock.
 
 use super::eye::Eye;
+use super::initial_media::InitialMedia;
 use super::light::LightPass;
-use super::surroundings::Surroundings;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::walk;
 use crate::bsdf::{LobeSet, Transport};
@@ -138,7 +138,7 @@ impl Lengths {
     /// merges that is so long up to where it first may.
     pub fn new(
         eye: &Eye<'_>,
-        surroundings: &Surroundings,
+        initial_media: &InitialMedia,
         seed: u64,
         guide: Option<&Guide>,
         reach: impl Fn(f32) -> f32 + Sync,
@@ -148,7 +148,7 @@ impl Lengths {
         let lights = LightPass::new(seed, 0, Domain::GuideLight, PATHS, eye.max_depth).guided(guide);
         let from_light = |index: u32| {
             let mut count = Count::new(eye.scene);
-            if let Some(emitted) = lights.emit(eye.scene, surroundings, index) {
+            if let Some(emitted) = lights.emit(eye.scene, initial_media, index) {
                 let (start, stream) = (&emitted.start, emitted.stream);
                 walk(eye.scene, &Bump::new(), start, stream, Transport::Importance, eye.max_depth, &mut count);
             }

@@ -1,19 +1,19 @@
 //! Light paths that leave photons.
 
 use super::eye::Indirect;
+use super::initial_media::InitialMedia;
 use super::segment::{PrecomputedHit, token};
-use super::surroundings::Surroundings;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{EmissionDensity, Guide, Region, guide};
 use crate::math::{DVec2, DVec3, Rgb, Vec2};
-use crate::photon::{ByKind, Kind, Mark, Photon, PhotonFlags, VolumePhoton};
+use crate::photon::{ByKind, Kind, Photon, PhotonFlags, ThinningKey, VolumePhoton};
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
 use crate::scene::contact::Place;
-use crate::spectrum::{Band, Comb, WavelengthSample};
+use crate::spectrum::{Band, IterationWavelengths, WavelengthSample};
 use crate::stop::Stop;
 use bumpalo::Bump;
 
@@ -29,7 +29,7 @@ pub struct LightPass<'a> {
     guide: Option<&'a Guide>,
     region: Option<Region>,
     kinds: ByKind<bool>,
-    comb: Option<Comb>,
+    wavelengths: Option<IterationWavelengths>,
     stop: Option<&'a Stop>,
 }
 
@@ -75,7 +75,7 @@ impl<'a> LightPass<'a> {
             guide: None,
             region: None,
             kinds: [true; 2],
-            comb: None,
+            wavelengths: None,
             stop: None,
         }
     }
@@ -106,8 +106,8 @@ impl<'a> LightPass<'a> {
 
     /// Whose paths take no other wavelengths than these.
     #[must_use]
-    pub fn with(self, comb: Comb) -> LightPass<'a> {
-        LightPass { comb: Some(comb), ..self }
+    pub fn with(self, wavelengths: IterationWavelengths) -> LightPass<'a> {
+        LightPass { wavelengths: Some(wavelengths), ..self }
     }
 
     /// Which ends where its iteration is given up.
@@ -122,17 +122,17 @@ impl<'a> LightPass<'a> {
         index.is_multiple_of(LOOK) && self.stop.is_some_and(Stop::gives_up)
     }
 
-    /// The hue of path `index`.
+    /// The wavelength of path `index`.
     #[inline]
-    pub fn hue(&self, index: u32) -> WavelengthSample {
-        self.hue_of(self.stream(u64::from(index)))
+    pub fn wavelength(&self, index: u32) -> WavelengthSample {
+        self.wavelength_sample_of(self.stream(u64::from(index)))
     }
 
-    /// The hue of a path with these draws.
+    /// The wavelength of a path with these draws.
     #[inline]
-    pub fn hue_of(&self, stream: Stream) -> WavelengthSample {
-        let hue = WavelengthSample::new(stream.vertex(0).one(Purpose::Wavelength));
-        self.comb.map_or(hue, |comb| comb.nearest(hue))
+    pub fn wavelength_sample_of(&self, stream: Stream) -> WavelengthSample {
+        let wavelength = WavelengthSample::new(stream.vertex(0).one(Purpose::Wavelength));
+        self.wavelengths.map_or(wavelength, |wavelengths| wavelengths.nearest(wavelength))
     }
 
     /// Number of light paths.
@@ -147,25 +147,25 @@ impl<'a> LightPass<'a> {
 
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
-    pub fn emit(&self, scene: &Scene, surroundings: &Surroundings, index: u32) -> Option<Emitted> {
+    pub fn emit(&self, scene: &Scene, initial_media: &InitialMedia, index: u32) -> Option<Emitted> {
         let draws = (self.choice.fine(index), self.point.point(index), self.direction.point(index));
-        self.emit_by(scene, surroundings, self.stream(u64::from(index)), draws)
+        self.emit_by(scene, initial_media, self.stream(u64::from(index)), draws)
     }
 
     /// The beginning of a path all of whose draws are those of `stream`.
-    pub fn emit_from(&self, scene: &Scene, surroundings: &Surroundings, stream: Stream) -> Option<Emitted> {
+    pub fn emit_from(&self, scene: &Scene, initial_media: &InitialMedia, stream: Stream) -> Option<Emitted> {
         let draws = stream.vertex(0);
         let choice =
             DVec2::new(draws.one_fine(Purpose::EmitterChoice), f64::from(draws.nth(1).one(Purpose::EmitterChoice)));
         let (point, direction) = (draws.two(Purpose::EmitterPoint), draws.two(Purpose::EmitterDirection));
-        self.emit_by(scene, surroundings, stream, (choice, point, direction))
+        self.emit_by(scene, initial_media, stream, (choice, point, direction))
     }
 
     #[inline(always)]
     fn emit_by(
         &self,
         scene: &Scene,
-        surroundings: &Surroundings,
+        initial_media: &InitialMedia,
         stream: Stream,
         (choice, point, direction): (DVec2, Vec2, Vec2),
     ) -> Option<Emitted> {
@@ -191,7 +191,7 @@ impl<'a> LightPass<'a> {
             flux *= medium.transmittance(f32::INFINITY);
         }
         let (origin, direction) = (emission.origin, emission.direction);
-        let mut interior = surroundings.light(scene, emission.light, origin);
+        let mut interior = initial_media.light(scene, emission.light, origin);
         let leaving = Place::on_light(scene, emission.light, origin);
         if let Some(place) = &leaving {
             interior = interior.before(scene, place, direction, token(scene, stream.vertex(0), Purpose::Alpha));
@@ -206,7 +206,7 @@ impl<'a> LightPass<'a> {
                 first: PrecomputedHit::Unknown,
                 far: emission.infinite,
                 channel: None,
-                hue: self.hue_of(stream),
+                wavelength_sample: self.wavelength_sample_of(stream),
             },
             stream,
             delta: emission.delta,
@@ -323,7 +323,8 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
-            let mark = self.weight.map(|weight| Mark::new(weight * self.scale, vertex.draws.one(Purpose::Mark)));
+            let mark =
+                self.weight.map(|weight| ThinningKey::new(weight * self.scale, vertex.draws.one(Purpose::ThinningKey)));
             self.photons.surface[kind as usize].push(Photon {
                 p: vertex.surface.p,
                 wi: vertex.wo,
@@ -367,12 +368,12 @@ impl<'a> Visitor<'a> for Deposit<'_> {
 pub fn light_path(
     scene: &Scene,
     arena: &Bump,
-    surroundings: &Surroundings,
+    initial_media: &InitialMedia,
     pass: &LightPass,
     index: u32,
     photons: &mut Photons,
 ) -> Option<(usize, u32)> {
-    let emitted = pass.emit(scene, surroundings, index)?;
+    let emitted = pass.emit(scene, initial_media, index)?;
     let mut deposit = Deposit::new(scene, photons, pass, &emitted, emitted.unaimed);
     walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
     let vertices = deposit.vertices;
@@ -380,10 +381,10 @@ pub fn light_path(
 }
 
 /// Flux of all lights (W), from the beginnings of light paths.
-pub fn emitted_flux(scene: &Scene, surroundings: &Surroundings) -> DVec3 {
+pub fn emitted_flux(scene: &Scene, initial_media: &InitialMedia) -> DVec3 {
     const SAMPLES: u32 = 4096;
     let pass = LightPass::new(0, 0, Domain::PilotLight, SAMPLES, u32::MAX);
-    let emitted = (0..SAMPLES).filter_map(|index| pass.emit(scene, surroundings, index));
+    let emitted = (0..SAMPLES).filter_map(|index| pass.emit(scene, initial_media, index));
     // `emit` divides by the number of paths.
     emitted.map(|emitted| emitted.start.throughput.as_dvec3()).sum()
 }
@@ -402,8 +403,8 @@ impl EqualFlux {
     /// Of a channel (0 to 2): as much flux as a light path carries on average, so that paths are as many. A channel
     /// that the sample has not seen may be that of a rare light: it gets the mean of all three, for any flux above zero
     /// leaves every light what it is, in more paths or fewer. `None` where no light shines.
-    pub fn new(scene: &Scene, surroundings: &Surroundings, channel: usize) -> Option<EqualFlux> {
-        let flux = emitted_flux(scene, surroundings);
+    pub fn new(scene: &Scene, initial_media: &InitialMedia, channel: usize) -> Option<EqualFlux> {
+        let flux = emitted_flux(scene, initial_media);
         let flux = if flux[channel] > 0.0 { flux[channel] } else { flux.element_sum() / 3.0 };
         (flux > 0.0).then_some(EqualFlux { channel, flux: flux as f32 })
     }
@@ -414,12 +415,12 @@ impl EqualFlux {
         &self,
         scene: &Scene,
         arena: &mut Bump,
-        surroundings: &Surroundings,
+        initial_media: &InitialMedia,
         pass: &LightPass,
         index: u32,
         photons: &mut Photons,
     ) {
-        let Some(emitted) = pass.emit(scene, surroundings, index) else { return };
+        let Some(emitted) = pass.emit(scene, initial_media, index) else { return };
         let flux = self.flux / pass.paths as f32;
         let copies = emitted.start.throughput[self.channel] / flux;
         let copies = (copies + emitted.stream.vertex(0).one(Purpose::Loss)) as u64;

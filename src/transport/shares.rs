@@ -9,7 +9,7 @@
 //! exact.
 
 use super::light_vertex::LightVertex;
-use super::site::ScatterPoint;
+use super::scattering_vertex::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, PathClass};

@@ -5,10 +5,10 @@ use super::flight::{Fly, Split};
 use super::glow::{Glow, glows};
 use super::interior::Interior;
 use super::roulette::late_survival;
+use super::scattering_vertex::ScatterPoint;
 use super::segment::{
     Arrival, Attenuate, Clear, End, MediumArrival, PrecomputedHit, Start, camera_token, next_vertex, token,
 };
-use super::site::ScatterPoint;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
@@ -39,7 +39,7 @@ pub struct PathStart {
     /// The one channel of a path that keeps its weight: what it would lose is the probability that it ends.
     pub channel: Option<usize>,
     /// The wavelength it takes if it meets dispersive glass.
-    pub hue: WavelengthSample,
+    pub wavelength_sample: WavelengthSample,
 }
 
 /// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond
@@ -97,7 +97,8 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    let PathStart { origin, direction, throughput, interior, leaving, ref first, far, channel, hue } = *start;
+    let PathStart { origin, direction, throughput, interior, leaving, ref first, far, channel, wavelength_sample } =
+        *start;
     let survival_scale = 1.0 / (V::SPARED * throughput.max_element());
     if !(survival_scale.is_finite() && throughput.is_finite()) {
         end(throughput, visitor);
@@ -110,7 +111,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
         transport,
         max_depth,
         channel: channel.map(|channel| (channel, throughput[channel])),
-        hue,
+        wavelength_sample,
         far,
         depth: 1,
         origin,
@@ -162,7 +163,7 @@ struct Path<'a> {
     max_depth: u32,
     /// The one channel that keeps its weight, and that weight.
     channel: Option<(usize, f32)>,
-    hue: WavelengthSample,
+    wavelength_sample: WavelengthSample,
     far: bool,
     /// Number of the segment under way, from 1.
     depth: u32,
@@ -351,9 +352,9 @@ impl<'a> Path<'a> {
             return taken;
         }
         let taken = match self.channel {
-            None => self.hue.wavelength(),
+            None => self.wavelength_sample.wavelength(),
             Some((channel, _)) => {
-                self.hue.wavelength_of(channel, self.stream.vertex(self.depth).one(Purpose::Wavelength))
+                self.wavelength_sample.wavelength_of(channel, self.stream.vertex(self.depth).one(Purpose::Wavelength))
             }
         };
         self.throughput *= taken.weight;

@@ -3,7 +3,7 @@
 //! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the
 //! last line is JSON for `scripts/lab`.
 
-use caustique::render::Strategy;
+use caustique::render::Candidate;
 use caustique::render::auto::counted_cost;
 use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
@@ -18,14 +18,14 @@ fn main() {
     let number = |name: &str| arguments.iter().find_map(|a| a.strip_prefix(name)?.parse().ok());
     let width = number("width=").unwrap_or(320);
     let levels = number("levels=").map(|levels| Levels::new(levels as usize));
-    let plain = |method| Strategy { method, indirect: Indirect::Photons, guided: false };
-    let caustics = Strategy { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
+    let plain = |method| Candidate { method, indirect: Indirect::Photons, guided: false };
+    let caustics = Candidate { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
     let ways = [
         plain(Method::Path),
         plain(Method::Bdpt),
         plain(Method::Vcm),
         plain(Method::Sppm),
-        Strategy { guided: true, ..plain(Method::Sppm) },
+        Candidate { guided: true, ..plain(Method::Sppm) },
         caustics,
     ];
     let mut rows = Vec::new();

@@ -8,7 +8,7 @@ use caustique::camera::Camera;
 use caustique::estimator::rule::CountingRule;
 use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings, Tally};
 use caustique::math::{Frame, Vec2, Vec3};
-use caustique::photon::Mark;
+use caustique::photon::ThinningKey;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Levels, Method, Session, Settings, Stage};
 use caustique::scene::gltf::{ReadOptions, read};
@@ -51,7 +51,7 @@ fn uniform(frame: &Frame, stream: Stream) -> Found {
     let u: Vec2 = stream.vertex(0).two(Purpose::Pixel);
     let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();
     let r = u.x.sqrt();
-    Found::one(frame.t * (r * cos) + frame.b * (r * sin), u.x, 1.0, Mark::default())
+    Found::one(frame.t * (r * cos) + frame.b * (r * sin), u.x, 1.0, ThinningKey::default())
 }
 
 /// Share of uniform samples that are rejected, by their number.

@@ -5,7 +5,7 @@
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
 use caustique::math::{Rgb, Vec3};
-use caustique::photon::{Mark, Nearest, Photon, PhotonFlags, PhotonMap};
+use caustique::photon::{Nearest, Photon, PhotonFlags, PhotonMap, ThinningKey};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::spectrum::Band;
 use std::time::Instant;
@@ -175,7 +175,7 @@ fn main() {
             flags: PhotonFlags::default(),
             depth: 2,
             band: Band::WHITE,
-            mark: Mark::default(),
+            mark: ThinningKey::default(),
         };
         let t = Instant::now();
         let map = PhotonMap::build(points.iter().map(photon).collect());

@@ -7,7 +7,7 @@
 use caustique::film::{Layer, LayerSet};
 use caustique::image::exr;
 use caustique::math::{Rgb, Vec2, Vec3, warp};
-use caustique::photon::{Mark, Photon, PhotonFlags, PhotonMap};
+use caustique::photon::{Photon, PhotonFlags, PhotonMap, ThinningKey};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};
@@ -132,7 +132,7 @@ fn main() {
                 flags,
                 depth: 2,
                 band: Band::WHITE,
-                mark: Mark::default(),
+                mark: ThinningKey::default(),
             }
         })
         .collect();

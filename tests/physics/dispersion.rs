@@ -16,9 +16,9 @@ use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Control, Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::spectrum::{BANDS, Band, Comb, Wavelength, WavelengthSample, observer};
+use caustique::spectrum::{BANDS, Band, IterationWavelengths, Wavelength, WavelengthSample, observer};
 use caustique::transport::{
-    Interior, LightPass, Next, PathStart, Photons, Scattered, Surroundings, Vertex, Visitor, light_path, walk,
+    InitialMedia, Interior, LightPass, Next, PathStart, Photons, Scattered, Vertex, Visitor, light_path, walk,
 };
 use glam::DQuat;
 use support::channels::{self, SIZE, agree, disagreeing};
@@ -99,9 +99,9 @@ fn weights_are_white_on_average() {
 #[test]
 fn the_wavelengths_of_a_pass_are_nearly_white() {
     let of_pass = |pass| {
-        let comb = Comb::new(9, pass);
+        let wavelengths = IterationWavelengths::new(9, pass);
         let band = |band: u8| {
-            comb.nearest(WavelengthSample::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength().weight
+            wavelengths.nearest(WavelengthSample::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength().weight
         };
         (0..BANDS).map(band).sum::<Rgb>() / f32::from(BANDS)
     };
@@ -119,16 +119,17 @@ fn the_wavelengths_of_a_pass_are_nearly_white() {
 fn paths_of_one_channel_carry_the_same() {
     for channel in 0..3 {
         let offset = 0.37;
-        let hue = |band: u8| WavelengthSample::new((f32::from(band) + offset) / f32::from(BANDS));
-        let weights: Vec<f64> = (0..BANDS).map(|band| f64::from(hue(band).wavelength().weight[channel])).collect();
+        let wavelength = |band: u8| WavelengthSample::new((f32::from(band) + offset) / f32::from(BANDS));
+        let weights: Vec<f64> =
+            (0..BANDS).map(|band| f64::from(wavelength(band).wavelength().weight[channel])).collect();
         let total: f64 = weights.iter().sum();
         let n = 100_000;
         let mut counts = vec![0.0; usize::from(BANDS)];
         for i in 0..n {
             let draws = Stream::new(5, 0, Domain::Test, i).vertex(channel as u32);
             // Whatever band it starts from.
-            let taken = hue((i % 8) as u8).wavelength_of(channel, draws.one(Purpose::Wavelength));
-            let band = (0..BANDS).find(|&band| hue(band).wavelength().band == taken.band).expect("a band");
+            let taken = wavelength((i % 8) as u8).wavelength_of(channel, draws.one(Purpose::Wavelength));
+            let band = (0..BANDS).find(|&band| wavelength(band).wavelength().band == taken.band).expect("a band");
             counts[usize::from(band)] += 1.0;
             assert!((f64::from(taken.weight[channel]) - total / f64::from(BANDS)).abs() < 1e-5);
         }
@@ -149,9 +150,10 @@ fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wav
     let mut sum = [0.0; 3];
     let passes = 512;
     for pass in 1..=passes {
-        let comb = Comb::new(1, pass);
-        let taken =
-            |band: u8| comb.nearest(WavelengthSample::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength();
+        let wavelengths = IterationWavelengths::new(1, pass);
+        let taken = |band: u8| {
+            wavelengths.nearest(WavelengthSample::new((f32::from(band) + 0.5) / f32::from(BANDS))).wavelength()
+        };
         let all: Vec<Wavelength> = (0..BANDS).map(taken).filter(|wavelength| carried(wavelength.nm)).collect();
         for (eye, light) in all.iter().flat_map(|eye| all.iter().map(move |light| (eye, light))) {
             let value = eye.weight * light.weight * weight(eye, light);
@@ -254,8 +256,8 @@ impl<'a> Visitor<'a> for Straight {
     }
 }
 
-/// Angle at which a ray of some hue leaves the prism.
-fn deviated(scene: &Scene, hue: WavelengthSample, arriving: f64) -> f64 {
+/// Angle at which a ray of some wavelength leaves the prism.
+fn deviated(scene: &Scene, wavelength: WavelengthSample, arriving: f64) -> f64 {
     let direction = DVec3::new(arriving.cos(), arriving.sin(), 0.0).as_vec3();
     // Into the middle of the left face.
     let start = PathStart {
@@ -267,7 +269,7 @@ fn deviated(scene: &Scene, hue: WavelengthSample, arriving: f64) -> f64 {
         first: caustique::transport::PrecomputedHit::Unknown,
         far: false,
         channel: None,
-        hue,
+        wavelength_sample: wavelength,
     };
     for path in 0..100 {
         let mut straight = Straight::default();
@@ -288,19 +290,19 @@ fn a_prism_bends_each_wavelength_by_its_index() {
     let plain = prism_scene(glass(IOR));
     let mut wrong: f64 = 0.0;
     for k in 0..40 {
-        let hue = WavelengthSample::new((f32::from(k as u8) + 0.5) / 40.0);
-        let nm = f64::from(hue.wavelength().nm);
+        let wavelength = WavelengthSample::new((f32::from(k as u8) + 0.5) / 40.0);
+        let nm = f64::from(wavelength.wavelength().nm);
         let index = cauchy(f64::from(IOR), f64::from(ABBE), nm);
         // Symmetric: inside it flies along the base.
         let arriving = (index * 0.5).asin() - 30f64.to_radians();
-        let deviation = arriving - deviated(&scene, hue, arriving);
+        let deviation = arriving - deviated(&scene, wavelength, arriving);
         let found = (0.5 * (60f64.to_radians() + deviation)).sin() / 0.5;
         assert!((found - index).abs() < 3e-5, "{nm} nm: {found} for {index}");
         let fixed = 24f64.to_radians();
         let expected = through_prism(index, fixed).expect("no total reflection");
-        let angle = deviated(&scene, hue, fixed);
+        let angle = deviated(&scene, wavelength, fixed);
         assert!((angle - expected).abs() < 1e-4, "{nm} nm: {angle} for {expected}");
-        wrong = wrong.max((deviated(&plain, hue, fixed) - expected).abs());
+        wrong = wrong.max((deviated(&plain, wavelength, fixed) - expected).abs());
     }
     assert!(wrong > 0.02, "glass that does not disperse goes unnoticed: {wrong}");
 }
@@ -331,13 +333,13 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
         });
         let scene = build(description);
         assert_eq!(scene.survey.dispersion, abbe < 1e6);
-        let surroundings = Surroundings::new(&scene, Vec3::new(0.0, 5.0, 0.0));
+        let initial_media = InitialMedia::new(&scene, Vec3::new(0.0, 5.0, 0.0));
         let mut means: [Vec<f64>; 3] = Default::default();
         for seed in 0..seeds {
             let pass = LightPass::new(seed, 0, Domain::Light, 40_000, 3);
             let mut photons = Photons::default();
             for index in 0..pass.paths() {
-                light_path(&scene, &Bump::new(), &surroundings, &pass, index, &mut photons);
+                light_path(&scene, &Bump::new(), &initial_media, &pass, index, &mut photons);
             }
             let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);
             for photon in photons.surface.iter().flatten().filter(|photon| photon.depth == 3) {

@@ -14,7 +14,7 @@ use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
 use caustique::plan::{ClassSet, Effect, PathClass, switch};
 use caustique::random::Domain;
-use caustique::render::Strategy;
+use caustique::render::Candidate;
 use caustique::render::auto::{Choice, Weight, choose};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::Survey;
@@ -22,7 +22,7 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, P
 use caustique::scene::{Description, Scene};
 use caustique::stat::floor;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
-use caustique::transport::{Indirect, LightPass, Surroundings};
+use caustique::transport::{Indirect, InitialMedia, LightPass};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -82,11 +82,11 @@ fn lit() -> Vec<(&'static str, Scene)> {
 
 /// Flux that light paths send through the regions, pass by pass; `honest`: as they carry it.
 fn flux(scene: &Scene, guide: Option<&Guide>, region: Option<Region>, first: u64, honest: bool) -> Vec<[f64; 4]> {
-    let surroundings = Surroundings::new(scene, Vec3::new(0.0, 1.5, 4.0));
+    let initial_media = InitialMedia::new(scene, Vec3::new(0.0, 1.5, 4.0));
     let pass = |pass| {
         let pass = LightPass::new(3, first + pass, Domain::Test, PATHS, u32::MAX).guided(guide).lighting(region);
         let mut sums = [0.0; 4];
-        for emitted in (0..PATHS).filter_map(|index| pass.emit(scene, &surroundings, index)) {
+        for emitted in (0..PATHS).filter_map(|index| pass.emit(scene, &initial_media, index)) {
             let (origin, d) = (emitted.start.origin, emitted.start.direction);
             let weight = if honest { 1.0 } else { 1.0 / emitted.ratio };
             for (sum, (center, radius)) in sums.iter_mut().zip(REGIONS) {
@@ -149,9 +149,9 @@ fn cells_follow_the_error_they_leave() {
     assert_eq!(guide.cells(), 3);
     let share = |guide: &Guide, seed| {
         let pass = LightPass::new(seed, 0, Domain::Test, 20_000, u32::MAX).guided(Some(guide));
-        let surroundings = Surroundings::new(scene, Vec3::new(0.0, 1.5, 4.0));
+        let initial_media = InitialMedia::new(scene, Vec3::new(0.0, 1.5, 4.0));
         let mut counts = [0.0f64; 3];
-        for emitted in (0..20_000).filter_map(|index| pass.emit(scene, &surroundings, index)) {
+        for emitted in (0..20_000).filter_map(|index| pass.emit(scene, &initial_media, index)) {
             counts[emitted.cell] += 1.0 / 20_000.0;
         }
         counts
@@ -307,10 +307,10 @@ fn weight(weights: &[Weight], effect: Effect) -> Option<Weight> {
 }
 
 /// What is chosen among the ways that are allowed.
-fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Strategy) -> bool + Sync) -> Choice {
+fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Candidate) -> bool + Sync) -> Choice {
     let camera = scene.camera(&square(24)).expect("a camera");
-    let settings = |way| Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(way) };
-    let make = |way| allowed(way).then(|| settings(way));
+    let settings = |candidate| Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(candidate) };
+    let make = |candidate| allowed(candidate).then(|| settings(candidate));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let mut finish = Finish::new(Denoiser::Own, None);
     pool.install(|| choose((scene, &camera), &mut finish, make, || false)).expect("a choice")
@@ -322,14 +322,14 @@ fn the_choice_does_not_depend_on_threads() {
     let scene = matte_room();
     let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
     assert_eq!(one.trials.len(), 3, "{:?}", one.because);
-    assert_eq!(one.way, three.way);
+    assert_eq!(one.candidate, three.candidate);
     for (a, b) in one.trials.iter().zip(&three.trials) {
-        println!("{}: {:.5}", a.way.name(), a.error());
-        assert_eq!(a.squared_error.to_bits(), b.squared_error.to_bits(), "{}", a.way.name());
+        println!("{}: {:.5}", a.candidate.name(), a.error());
+        assert_eq!(a.squared_error.to_bits(), b.squared_error.to_bits(), "{}", a.candidate.name());
     }
     let chosen = one.trial().expect("a trial");
     let best = one.trials.iter().all(|trial| trial.squared_error >= chosen.squared_error);
-    assert!(best || chosen.way == Strategy::USUAL, "{}", chosen.way.name());
+    assert!(best || chosen.candidate == Candidate::USUAL, "{}", chosen.candidate.name());
     let bits = |choice: &Choice| -> Vec<_> {
         choice.weights.iter().map(|w| (w.effect, w.energy.map(f64::to_bits), w.saved.map(f64::to_bits))).collect()
     };
@@ -378,11 +378,11 @@ fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
     };
     let chosen = |scene: &Scene| {
         let camera = scene.camera(&square(16)).expect("a camera");
-        let make = |way| Some(Settings { iterations: Some(4), ..Settings::of(way) });
-        choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").way
+        let make = |candidate| Some(Settings { iterations: Some(4), ..Settings::of(candidate) });
+        choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").candidate
     };
-    assert_eq!(chosen(&cloudy(false, 1.2)), Strategy::FOCUSED_GATHERING);
-    assert_eq!(chosen(&cloudy(true, 1.2)), Strategy::FOCUSED);
+    assert_eq!(chosen(&cloudy(false, 1.2)), Candidate::FOCUSED_GATHERING);
+    assert_eq!(chosen(&cloudy(true, 1.2)), Candidate::FOCUSED);
     let finds = |scene: &Scene, method: Method| method.search().finds(Effect::Sds, &scene.survey);
     let methods = [Method::Vcm, Method::Sppm];
     assert_eq!(methods.map(|method| finds(&cloudy(false, 1.2), method)), [false, true]);
@@ -396,9 +396,9 @@ fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
 fn what_is_left_out_is_weighed_too() {
     let weights = |scene: &Scene, off: ClassSet| {
         let camera = scene.camera(&square(24)).expect("a camera");
-        let make = |way| {
-            let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) };
-            (way == Strategy::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
+        let make = |candidate| {
+            let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(candidate) };
+            (candidate == Candidate::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
         };
         choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").weights
     };
@@ -478,7 +478,7 @@ fn a_pilot_can_be_stopped() {
     let camera = scene.camera(&square(24)).expect("a camera");
     let asked = |answer: bool| {
         let times = std::cell::Cell::new(0);
-        let make = |way| Some(Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(way) });
+        let make = |candidate| Some(Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(candidate) });
         let stop = || {
             times.set(times.get() + 1);
             answer
@@ -509,18 +509,18 @@ fn caustics_are_left_to_guided_light_paths() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.5), DVec3::new(0.0, 0.05, 0.0), 50.0));
     let scene = build(description);
     let choice = auto(&scene, 2, 20_000);
-    assert!(choice.trials.is_empty() && choice.way == Strategy::FOCUSED, "{}", choice.way.name());
+    assert!(choice.trials.is_empty() && choice.candidate == Candidate::FOCUSED, "{}", choice.candidate.name());
     let camera = scene.camera(&square(24)).expect("a camera");
-    let light = |way| {
-        let settings = Settings { iterations: Some(16), ..Settings::of(way) };
+    let light = |candidate| {
+        let settings = Settings { iterations: Some(16), ..Settings::of(candidate) };
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         rendered.pixels.iter().map(|pixel| pixel.parts().caustic.element_sum()).sum::<f64>()
     };
-    let (guided, unguided) = (light(Strategy::FOCUSED), light(Strategy::USUAL));
+    let (guided, unguided) = (light(Candidate::FOCUSED), light(Candidate::USUAL));
     println!("{guided:.3e} of caustics by guided light paths, {unguided:.3e} by others");
     assert!(guided > 0.0 && unguided < 0.2 * guided);
-    let unguided = auto_among(&scene, 2, 20_000, |way| !way.guided);
-    assert_eq!(unguided.way, Strategy::USUAL);
+    let unguided = auto_among(&scene, 2, 20_000, |candidate| !candidate.guided);
+    assert_eq!(unguided.candidate, Candidate::USUAL);
 }
 
 /// What a scene does not call for is not tried, and a short render tries nothing.
@@ -528,19 +528,19 @@ fn caustics_are_left_to_guided_light_paths() {
 fn only_what_is_called_for_is_tried() {
     let scene = matte_room();
     let matte_only = auto(&scene, 2, 20_000);
-    let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.way.method).collect();
+    let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.candidate.method).collect();
     assert_eq!(tried, [Method::Vcm, Method::Path, Method::Bdpt]);
-    assert!(matte_only.trials.iter().all(|trial| !trial.way.guided));
+    assert!(matte_only.trials.iter().all(|trial| !trial.candidate.guided));
     // Where nothing has narrow lobes no photons of caustics are sent.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
     let photons = |narrow_lobes| of_caustics.of_photons(&Survey { narrow_lobes, ..Survey::default() });
     assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
     // Nothing but indirect light asks for photons; direct light costs its connections.
-    let choice = auto_among(&scene, 2, 20_000, |way| way.method != Method::Bdpt);
+    let choice = auto_among(&scene, 2, 20_000, |candidate| candidate.method != Method::Bdpt);
     let saved = |effect: Effect| weight(&choice.weights, effect).and_then(|w| w.saved);
     let whole = choice.trial().map(|trial| trial.seconds_per_iteration);
     assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);
     assert!(saved(Effect::Direct) > Some(0.0) && saved(Effect::Direct) < whole, "{:?}", choice.weights);
     let short = auto(&glass_room(), 2, 2);
-    assert!(short.trials.is_empty() && short.way == Strategy::FOCUSED);
+    assert!(short.trials.is_empty() && short.candidate == Candidate::FOCUSED);
 }

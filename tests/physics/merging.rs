@@ -12,7 +12,7 @@ use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{Lengths, Surroundings};
+use caustique::transport::{InitialMedia, Lengths};
 use std::f64::consts::PI;
 use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -142,11 +142,11 @@ fn as_many_are_merged_as_are_there() {
     let scene = build(description);
     for size in [32u32, 256] {
         let camera = scene.camera(&square(size)).expect("a camera");
-        let surroundings = Surroundings::new(&scene, camera.position());
+        let initial_media = InitialMedia::new(&scene, camera.position());
         let radius = 0.04 * 64.0 / f64::from(size);
         let ratio = |seed: u64| {
             let Lengths { eye_open, light_open, merged, .. } =
-                Lengths::new(&eye(&scene, &camera), &surroundings, seed, None, |_| radius as f32);
+                Lengths::new(&eye(&scene, &camera), &initial_media, seed, None, |_| radius as f32);
             merged / (eye_open * light_open * f64::from(size).powi(2) * PI * radius * radius / 24.0)
         };
         let mean = (1..=SEEDS).map(ratio).sum::<f64>() / SEEDS as f64;

@@ -24,8 +24,9 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
-    Bidirectional, Deposits, Eye, EyeMeasure, Indirect, LightPass, LightVertices, MediumVertex, Meets, MergeLevels,
-    Next, PathStart, Record, Scattered, Strategies, Surroundings, Technique, Vertex, Visitor, lit_side, walk,
+    Bidirectional, CameraWalkContext, Deposits, Eye, EyeMeasure, Indirect, InitialMedia, LightPass, LightVertices,
+    MediumVertex, MergeLevels, Next, PathStart, Record, Scattered, Strategies, Technique, Vertex, Visitor, lit_side,
+    walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -163,7 +164,7 @@ struct Whole<'s> {
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
-enum Strategy {
+enum Candidate {
     Hit,
     NextEvent,
     /// After this many nodes from the light.
@@ -213,12 +214,12 @@ impl<'s> Whole<'s> {
         Flight { forward: self.flies(j, self.in_medium(j)) as f32, reverse: self.flies(j, starts) as f32 }
     }
 
-    fn strategies(&self) -> Vec<Strategy> {
+    fn strategies(&self) -> Vec<Candidate> {
         let k = self.nodes.len();
-        let mut all = vec![Strategy::Hit, Strategy::NextEvent];
-        all.extend((1..k).map(Strategy::Connect));
-        all.push(Strategy::Camera);
-        all.extend((0..k).map(Strategy::Merge));
+        let mut all = vec![Candidate::Hit, Candidate::NextEvent];
+        all.extend((1..k).map(Candidate::Connect));
+        all.push(Candidate::Camera);
+        all.extend((0..k).map(Candidate::Merge));
         all
     }
 
@@ -265,21 +266,21 @@ impl<'s> Whole<'s> {
     }
 
     /// Number of samples times density of the path by a strategy, of merges what they are worth.
-    fn density(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
+    fn density(&self, strategy: Candidate, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
         let k = self.nodes.len();
         let smooth = |j: usize| !self.nodes[j].delta;
         let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.start);
         let eye = |n: usize| (n..k).map(|j| self.eye_pdf_a(j)).product::<f64>();
         match strategy {
-            Strategy::Hit if self.light.delta => 0.0,
-            Strategy::Hit => {
+            Candidate::Hit if self.light.delta => 0.0,
+            Candidate::Hit => {
                 let measure = if self.light.infinite { 1.0 } else { f64::from(self.light.cos) / self.distance2[0] };
                 self.scatters(0, true) * measure * self.flies(0, false) * eye(0)
             }
-            Strategy::NextEvent if smooth(0) => f64::from(self.light.direct) * eye(0),
-            Strategy::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
-            Strategy::Camera if smooth(k - 1) => light_paths * light(k),
-            Strategy::Merge(m) => {
+            Candidate::NextEvent if smooth(0) => f64::from(self.light.direct) * eye(0),
+            Candidate::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
+            Candidate::Camera if smooth(k - 1) => light_paths * light(k),
+            Candidate::Merge(m) => {
                 let (from_light, from_eye) = (m as u32 + 1, (k - m) as u32);
                 if !smooth(m) || self.in_medium(m) || !which.light_merges(from_light) || !which.eye_merges(from_eye) {
                     return 0.0;
@@ -291,7 +292,7 @@ impl<'s> Whole<'s> {
         }
     }
 
-    fn weight(&self, strategy: Strategy, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
+    fn weight(&self, strategy: Candidate, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
         let sum: f64 = self.strategies().into_iter().map(|s| self.density(s, which, light_paths, eta)).sum();
         self.density(strategy, which, light_paths, eta) / sum
     }
@@ -340,14 +341,14 @@ impl<'s> Whole<'s> {
             mis = go(mis, j, true, by_eye(j));
             before_light = mis;
         }
-        let possible = |s: Strategy| self.density(s, which, light_paths, oracle) > 0.0;
-        let weight = |s: Strategy| -> f64 {
+        let possible = |s: Candidate| self.density(s, which, light_paths, oracle) > 0.0;
+        let weight = |s: Candidate| -> f64 {
             if !possible(s) {
                 return 0.0;
             }
             let reverse = |j: usize, to_light: bool| self.scatters(j, to_light) as f32;
             f64::from(match s {
-                Strategy::Hit => {
+                Candidate::Hit => {
                     let at = if self.light.infinite {
                         before_light
                     } else {
@@ -355,7 +356,7 @@ impl<'s> Whole<'s> {
                     };
                     mis::hit(&at.fly(flight(0, true)), &self.light).weight(eta)
                 }
-                Strategy::NextEvent => {
+                Candidate::NextEvent => {
                     let d2 = self.distance2[0] as f32;
                     let solid = if self.light.infinite || self.light.delta { 1.0 } else { d2 / self.light.cos };
                     let reach = if self.light.infinite { 1.0 } else { 1.0 / d2 };
@@ -365,7 +366,7 @@ impl<'s> Whole<'s> {
                     let pdfs = (reverse(0, true) * back, reverse(0, false));
                     mis::next_event(&eyes[0], pdfs, (self.light.direct * solid, arrival), self.light.delta).weight(eta)
                 }
-                Strategy::Connect(s) => {
+                Candidate::Connect(s) => {
                     let light = mis::End {
                         mis: &lights[s - 1],
                         reverse_pdf_w: reverse(s - 1, true),
@@ -380,11 +381,11 @@ impl<'s> Whole<'s> {
                     };
                     mis::connect(&light, &eye).weight(eta)
                 }
-                Strategy::Camera => {
+                Candidate::Camera => {
                     let (pdf_a, back) = (self.eye_pdf_a(k - 1) as f32, reverse(k - 1, true));
                     mis::camera(&lights[k - 1], pdf_a, light_paths as f32, back).weight(eta)
                 }
-                Strategy::Merge(m) => {
+                Candidate::Merge(m) => {
                     mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false), by_eye(m)).merge_weight(eta)
                 }
             })
@@ -454,7 +455,7 @@ struct Tally {
 struct Lab<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
-    surroundings: &'a Surroundings,
+    initial_media: &'a InitialMedia,
     shared: Bidirectional<'a>,
     levels: MergeLevels,
     eta: Eta,
@@ -463,11 +464,11 @@ struct Lab<'a> {
 }
 
 impl<'a> Lab<'a> {
-    fn new(scene: &'a Scene, camera: &'a Camera, surroundings: &'a Surroundings, radius: f32) -> Lab<'a> {
+    fn new(scene: &'a Scene, camera: &'a Camera, initial_media: &'a InitialMedia, radius: f32) -> Lab<'a> {
         let eye = Eye {
             scene,
             camera,
-            interior: surroundings.eye,
+            interior: initial_media.eye,
             max_depth: 12,
             indirect: Indirect::Photons,
             classes: ClassSet::ALL,
@@ -477,7 +478,7 @@ impl<'a> Lab<'a> {
         let strategies = Strategies::VCM;
         let shared = Bidirectional {
             eye,
-            surroundings,
+            initial_media,
             strategies,
             light_paths: pixels,
             merged_paths: 2.0 * pixels,
@@ -487,7 +488,7 @@ impl<'a> Lab<'a> {
         let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
         // Wider than eta says, so that enough is merged: weights know nothing of distances.
         let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
-        Lab { scene, camera, surroundings, shared, levels, eta, oracle }
+        Lab { scene, camera, initial_media, shared, levels, eta, oracle }
     }
 
     /// Sum of the weights of all strategies of a path by the recursion.
@@ -497,8 +498,8 @@ impl<'a> Lab<'a> {
     }
 
     /// All whole paths that a random pair of paths is put together to.
-    fn paths(&self, path: u32, mut each: impl FnMut(Technique, Strategy, &Whole<'_>, Ratios)) {
-        let Lab { scene, camera, surroundings, shared, ref levels, .. } = *self;
+    fn paths(&self, path: u32, mut each: impl FnMut(Technique, Candidate, &Whole<'_>, Ratios)) {
+        let Lab { scene, camera, initial_media, shared, ref levels, .. } = *self;
         let (eye, pixels) = (shared.eye, shared.light_paths);
         let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
         let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
@@ -509,13 +510,13 @@ impl<'a> Lab<'a> {
         let (mut left, mut by_light, mut by_eye) = (Deposits::default(), Said::default(), Said::default());
         shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
-        let meets = Meets { vertices: &vertices, photons: Some(&map), levels };
+        let meets = CameraWalkContext { vertices: &vertices, photons: Some(&map), levels };
         let mut measure = EyeMeasure::default();
         shared.eye_path(&arena, &(shared.eye.start(pixel, stream), stream), &meets, &mut by_eye, &mut measure);
 
         let start = eye.start(pixel, stream);
         let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);
-        let emitted = lights.emit(scene, surroundings, index);
+        let emitted = lights.emit(scene, initial_media, index);
         let light_notes = emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, Transport::Importance));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);
         let from_eye = &eye_notes.met[..];
@@ -549,14 +550,14 @@ impl<'a> Lab<'a> {
                     });
                     whole.segment(1.0, None);
                     whole.append(from_eye[..from_eye.len()].iter().rev(), true);
-                    Strategy::Hit
+                    Candidate::Hit
                 }
                 Technique::Hit { eye: t } => {
                     let t = t as usize;
                     whole.light = from_eye[t - 1].emitted.expect("a lamp");
                     whole.segment(square(from_eye[t - 1].distance), from_eye[t - 1].medium);
                     whole.append(from_eye[..t - 1].iter().rev(), true);
-                    Strategy::Hit
+                    Candidate::Hit
                 }
                 Technique::NextEvent { eye: t } => {
                     let met = &from_eye[t as usize - 1];
@@ -608,7 +609,7 @@ impl<'a> Lab<'a> {
                     whole.segment(distance2, scene.medium);
                     whole.append(from_eye[..t as usize].iter().rev(), true);
                     whole.nodes[0] = node(met, met, sample.wi, met.wo);
-                    Strategy::NextEvent
+                    Candidate::NextEvent
                 }
                 Technique::Connect { light: s, eye: t } => {
                     let (s, t) = (s as usize, t as usize);
@@ -619,7 +620,7 @@ impl<'a> Lab<'a> {
                     whole.segment(f64::from(b.p.distance_squared(a.p)), scene.medium);
                     whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s] = node(b, b, -d, b.wo);
-                    Strategy::Connect(s)
+                    Candidate::Connect(s)
                 }
                 Technique::Camera { light: s } => {
                     let s = s as usize;
@@ -629,7 +630,7 @@ impl<'a> Lab<'a> {
                     whole.nodes[s - 1] = node(met, met, met.wo, d);
                     whole.segment(f64::from(from.distance_squared(met.p)), scene.medium);
                     whole.camera_pdf_w = f64::from(camera.pdf_w(-d) * pixels);
-                    Strategy::Camera
+                    Candidate::Camera
                 }
                 Technique::Merge { light: s, eye: t } => {
                     let (s, t) = (s as usize, t as usize);
@@ -640,7 +641,7 @@ impl<'a> Lab<'a> {
                     let merged = node(a, b, a.wo, b.wo);
                     whole.append(from_eye[..t].iter().rev(), true);
                     whole.nodes[s - 1] = merged;
-                    Strategy::Merge(s - 1)
+                    Candidate::Merge(s - 1)
                 }
             };
             each(technique, strategy, &whole, ratios);
@@ -649,28 +650,28 @@ impl<'a> Lab<'a> {
 }
 
 /// The kind of a strategy.
-fn name(strategy: Strategy) -> &'static str {
+fn name(strategy: Candidate) -> &'static str {
     match strategy {
-        Strategy::Hit => "hit",
-        Strategy::NextEvent => "next event",
-        Strategy::Connect(_) => "connect",
-        Strategy::Camera => "camera",
-        Strategy::Merge(_) => "merge",
+        Candidate::Hit => "hit",
+        Candidate::NextEvent => "next event",
+        Candidate::Connect(_) => "connect",
+        Candidate::Camera => "camera",
+        Candidate::Merge(_) => "merge",
     }
 }
 
 /// Compares all that happens on `paths` random pairs of paths.
 fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
-    let surroundings = Surroundings::new(scene, camera.position());
-    let lab = Lab::new(scene, &camera, &surroundings, radius);
+    let initial_media = InitialMedia::new(scene, camera.position());
+    let lab = Lab::new(scene, &camera, &initial_media, radius);
     let Bidirectional { strategies, light_paths, .. } = lab.shared;
     let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; BUGS.len()], in_media: 0 };
     for path in 0..paths {
         lab.paths(path, |technique, strategy, whole, ratios| {
             let expected = whole.weight(strategy, &strategies, f64::from(light_paths), lab.oracle);
             let found = match strategy {
-                Strategy::Merge(_) => ratios.merge_weight(lab.eta),
+                Candidate::Merge(_) => ratios.merge_weight(lab.eta),
                 _ => ratios.weight(lab.eta),
             };
             let found = f64::from(found);
@@ -681,7 +682,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
             tally.weights += 1;
             tally.in_media += usize::from(whole.nodes.iter().any(|node| node.scatters.in_medium()));
             *tally.techniques.entry(name(strategy)).or_default() += 1;
-            if strategy != Strategy::Hit || whole.strategies().len() > 2 {
+            if strategy != Candidate::Hit || whole.strategies().len() > 2 {
                 let error = (lab.sum(whole, None) - 1.0).abs();
                 assert!(error <= TOLERANCE, "{what}, path {path}, {technique:?}: the weights sum to 1 + {error}");
                 tally.sums += 1;

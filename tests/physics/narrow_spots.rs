@@ -7,7 +7,7 @@ use caustique::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{LightPass, Surroundings};
+use caustique::transport::{InitialMedia, LightPass};
 use glam::Vec3Swizzles;
 use support::scenes::{add, build, look_at, matte, quad};
 use support::stats::chi_squared_p;
@@ -48,10 +48,10 @@ fn narrow_spots_send_what_they_should() {
             let inner = share * outer;
             let scene = scene(inner, outer, edge, 0.0);
             let expected = flux(f64::from(inner), f64::from(outer), mean);
-            let surroundings = Surroundings::new(&scene, Vec3::ZERO);
+            let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
             let paths = 4096;
             let pass = LightPass::new(0, 1, Domain::Light, paths, 1);
-            let starts: Vec<_> = (0..paths).filter_map(|index| pass.emit(&scene, &surroundings, index)).collect();
+            let starts: Vec<_> = (0..paths).filter_map(|index| pass.emit(&scene, &initial_media, index)).collect();
             let sent: f64 = starts.iter().map(|start| f64::from(start.start.throughput.x)).sum();
             assert!((sent / expected - 1.0).abs() < 1e-3, "{degrees} {share}: sends {sent} of {expected}");
             // Rounding moves a direction by 1e-7 or so.
@@ -91,12 +91,12 @@ fn edges_are_sampled_as_they_shine() {
         (SpotEdge::Smooth, |t: f64| 2.0 * t.powi(3) - t.powi(4)),
     ] {
         let scene = scene(0.0, 0.5, edge, 0.0);
-        let surroundings = Surroundings::new(&scene, Vec3::ZERO);
+        let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
         let paths = 50_000;
         let pass = LightPass::new(0, 1, Domain::Light, paths, 1);
         let mut counts = [0.0; 10];
         for index in 0..paths {
-            let start = pass.emit(&scene, &surroundings, index).expect("a path");
+            let start = pass.emit(&scene, &initial_media, index).expect("a path");
             let ramp = (f64::from(-start.start.direction.y) - 0.5f64.cos()) / (1.0 - 0.5f64.cos());
             counts[((10.0 * ramp) as usize).min(9)] += 1.0;
         }
@@ -127,11 +127,11 @@ fn spots_shine_from_a_disc() {
         arrives += f64::from(light.radiance.x * light.wi.y / light.pdf_w) / n as f64;
     }
     assert!((arrives / expected - 1.0).abs() < 5e-3, "{arrives} of {expected}");
-    let surroundings = Surroundings::new(&scene, Vec3::ZERO);
+    let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
     let (paths, within) = (400_000, 0.2f32);
     let pass = LightPass::new(0, 1, Domain::Light, paths, 1);
     let mut flux = 0.0;
-    for start in (0..paths).filter_map(|index| pass.emit(&scene, &surroundings, index)) {
+    for start in (0..paths).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
         let start = start.start;
         let on_floor = start.origin + start.direction * ((-1.0 - start.origin.y) / start.direction.y);
         if on_floor.xz().length() < within {

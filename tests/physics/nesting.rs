@@ -11,7 +11,7 @@ use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, Projection};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{Eye, Indirect, Interior, LightPass, Surroundings};
+use caustique::transport::{Eye, Indirect, InitialMedia, Interior, LightPass};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -149,10 +149,10 @@ fn light_starts_where_its_lamp_is() {
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 4.0), DVec3::ZERO, 40.0));
     let scene = build(description);
     let camera = scene.camera(&square(8)).expect("a camera");
-    let surroundings = Surroundings::of(&scene, &camera);
+    let initial_media = InitialMedia::of(&scene, &camera);
     let pass = LightPass::new(0, 1, Domain::Light, 4096, 8);
     let (mut wet, mut inside, mut outside) = (0, 0, 0);
-    for emitted in (0..pass.paths()).filter_map(|index| pass.emit(&scene, &surroundings, index)) {
+    for emitted in (0..pass.paths()).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
         let (p, d) = (emitted.start.origin, emitted.start.direction);
         let within_ball = (p - Vec3::new(0.9, 1.0, 0.0)).dot(d) < 0.0;
         let expected = match () {
@@ -183,7 +183,7 @@ fn rays_start_where_the_film_is() {
     description.cameras.push(described);
     let scene = build(description);
     let camera = scene.camera(&square(16)).expect("a camera");
-    let (interior, classes) = (Surroundings::of(&scene, &camera).eye, ClassSet::ALL);
+    let (interior, classes) = (InitialMedia::of(&scene, &camera).eye, ClassSet::ALL);
     let eye = Eye {
         scene: &scene,
         camera: &camera,

@@ -9,7 +9,7 @@ use caustique::film::Naming;
 use caustique::image::exr;
 use caustique::pipeline::merge::{Order, Shards};
 use caustique::pipeline::{checkpoint, records, shard};
-use caustique::render::{Control, Method, Session, Settings, Stage, StopReason, Strategy, render};
+use caustique::render::{Candidate, Control, Method, Session, Settings, Stage, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
 use caustique::scene::{Scene, View, environment_file, usd};
@@ -64,7 +64,7 @@ fn scene(bytes: &[u8], _: &Path) {
     let Ok(camera) = scene.camera(&small()) else { return };
     for method in METHODS {
         let settings =
-            Settings { iterations: Some(1), photons: 64, max_depth: 16, ..Settings::of(Strategy::plain(method)) };
+            Settings { iterations: Some(1), photons: 64, max_depth: 16, ..Settings::of(Candidate::plain(method)) };
         let pixels = render(&scene, &camera, &settings, |_, _| Control::Continue).pixels.len();
         assert_eq!(pixels, 4);
     }
@@ -92,7 +92,7 @@ static STAGES: LazyLock<Vec<Stage<'static>>> = LazyLock::new(|| {
     let description = gltf::read_bytes(&bytes, Path::new("fuzz.glb"), &ReadOptions::default()).expect("it is a scene");
     let scene: &Scene = Box::leak(Box::new(Scene::build(description, 1).expect("it can be built")));
     let camera = Box::leak(Box::new(scene.camera(&small()).expect("there is one")));
-    METHODS.map(|method| Stage::new(scene, camera, &Settings::of(Strategy::plain(method)))).into()
+    METHODS.map(|method| Stage::new(scene, camera, &Settings::of(Candidate::plain(method)))).into()
 });
 
 /// A scene in JSON and, behind a zero, what lies beside it as `a.bin`, `a.png`, `a.jpg`, `a.hdr` and `a.exr`.

@@ -7,7 +7,7 @@ use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec3};
 use caustique::plan::ClassSet;
 use caustique::scene::description::{CameraDescription, Description, Placed, Projection, PunctualKind, PunctualLight};
 use caustique::scene::{Scene, View};
-use caustique::transport::{Eye, Indirect, Surroundings};
+use caustique::transport::{Eye, Indirect, InitialMedia};
 
 /// A diffuse material of some reflectance that gives some radiance, without any Fresnel layer.
 pub fn matte(reflectance: f32, emission: f32) -> Material {
@@ -135,7 +135,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
 
 /// What paths are traced from: all classes of light, of any length.
 pub fn eye<'a>(scene: &'a Scene, camera: &'a Camera) -> Eye<'a> {
-    let interior = Surroundings::of(scene, camera).eye;
+    let interior = InitialMedia::of(scene, camera).eye;
     let (indirect, classes) = (Indirect::Photons, ClassSet::ALL);
     Eye { scene, camera, interior, max_depth: u32::MAX, indirect, classes, stop: None }
 }

@@ -101,7 +101,7 @@ pub fn converge<'py>(
     let reference = given.map(|given| reference(&given, camera.size())).transpose()?;
     let settled = comparison.settle()?;
     let done = work(py, threads, |caller| {
-        let told = Told { caller, progress };
+        let told = ErrorCoverage { caller, progress };
         comparison.run((scene, &camera), settled, reference, &told)
     })?;
     to_python(py, &done.whole()?)
@@ -151,12 +151,12 @@ fn reference(given: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Reference> 
 }
 
 /// Who is told how it goes.
-struct Told<'a> {
+struct ErrorCoverage<'a> {
     caller: &'a Caller,
     progress: Option<Arc<Py<PyAny>>>,
 }
 
-impl Told<'_> {
+impl ErrorCoverage<'_> {
     /// Tells, and whether to go on.
     fn tell(&self, state: Value) -> Control {
         if let Some(callback) = self.progress.clone() {
@@ -191,7 +191,7 @@ impl Comparison {
         (scene, camera): (&Compared<'_>, &Camera),
         (settings, own): (Vec<Settings>, Settings),
         reference: Option<Reference>,
-        told: &Told<'_>,
+        told: &ErrorCoverage<'_>,
     ) -> Result<Value> {
         let built = &scene.loaded.scene;
         for of in &settings {
@@ -248,7 +248,7 @@ impl Comparison {
         &self,
         (scene, camera): (&Compared<'_>, &Camera),
         settings: Vec<Settings>,
-        told: &Told<'_>,
+        told: &ErrorCoverage<'_>,
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
         let built = &scene.loaded.scene;
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
@@ -283,7 +283,7 @@ impl Comparison {
     }
 
     /// Makes a reference: two halves.
-    fn make(&self, settings: Settings, (scene, camera): (&Built, &Camera), told: &Told<'_>) -> Reference {
+    fn make(&self, settings: Settings, (scene, camera): (&Built, &Camera), told: &ErrorCoverage<'_>) -> Reference {
         let seen_through_glass = Presence::of(scene, camera).has(Effect::Sds);
         let plain = self.own.method.is_none() && !seen_through_glass;
         let method = if plain { Method::Bdpt } else { settings.method };

@@ -149,7 +149,7 @@ fn choose_all(
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
         run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, camera.size());
-        let make = |way| run.args.allowed(way, camera.size()).map(limits);
+        let make = |candidate| run.args.allowed(candidate, camera.size()).map(limits);
         if run.args.method.0.is_some() {
             return Ok(None);
         }

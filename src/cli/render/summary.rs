@@ -7,7 +7,7 @@ use crate::cli::say;
 use caustique::error::{Error, Kind, Result};
 use caustique::film::LayerSet;
 use caustique::pipeline::{Delivery, Place, Reached};
-use caustique::render::{Rejections, Rendered, StopReason, Told, peak_memory};
+use caustique::render::{ErrorCoverage, Rejections, Rendered, StopReason, peak_memory};
 use std::path::Path;
 
 /// The numbers of a render.
@@ -18,7 +18,7 @@ pub struct Summary {
     phases: String,
     error: Option<f64>,
     /// What the error before the finish tells of.
-    told: Told,
+    told: ErrorCoverage,
     /// Photons are merged or gathered within bandwidths, of one level.
     has_one_bandwidth: bool,
     rejections: Rejections,
@@ -41,7 +41,7 @@ impl Summary {
                 p.pilot, p.light, p.map, p.eye
             ),
             error: rendered.relative_error(),
-            told: rendered.settings.told(),
+            told: rendered.settings.error_coverage(),
             has_one_bandwidth: rendered.settings.method.has_bandwidths() && rendered.settings.levels.count < 2,
             rejections: rendered.rejections(),
             pixel: (rendered.bytes_per_pixel(), rendered.settings.levels.count),
@@ -73,8 +73,8 @@ impl Summary {
 
     /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, which levels
     /// tell.
-    pub fn told_of_finished(&self) -> Told {
-        if self.has_one_bandwidth { Told::Noise } else { self.told }
+    pub fn told_of_finished(&self) -> ErrorCoverage {
+        if self.has_one_bandwidth { ErrorCoverage::Noise } else { self.told }
     }
 
     /// The files that are written.
@@ -139,7 +139,7 @@ const RARE: f64 = 0.5;
 
 /// What has finished a picture, and in how many seconds; the error of that, which knows of `told`, what half of it
 /// takes, and where it is.
-pub fn tell_finish(name: &str, delivery: &Delivery, told: Told) {
+pub fn tell_finish(name: &str, delivery: &Delivery, told: ErrorCoverage) {
     let reached = delivery.reached.as_ref();
     let error = reached.map(|reached| {
         let [low, high] = reached.interval().map(percent);

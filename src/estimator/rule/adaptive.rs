@@ -143,7 +143,7 @@ fn optimum2<K: Kernel>(shot: f64, squared: f64, n: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::photon::Mark;
+    use crate::photon::ThinningKey;
     use crate::photon::kernel::{Box, Epanechnikov};
     use crate::random::{Domain, Purpose, Stream};
 
@@ -182,7 +182,7 @@ mod tests {
                     let u = Stream::new(5, i, Domain::Test, k).vertex(0);
                     let p = (u.two(Purpose::Pixel) - 0.5) * 1.0;
                     let keep = (1.0 + d / 4.0 * f64::from(p.length_squared())) / 1.8;
-                    let photon = Found::one(Vec3::ZERO, p.length_squared(), 1.0, Mark::default());
+                    let photon = Found::one(Vec3::ZERO, p.length_squared(), 1.0, ThinningKey::default());
                     if p.length_squared() < 0.04 && f64::from(u.one(Purpose::Lobe)) < keep {
                         let bandwidths = std::slice::from_ref(&bandwidth);
                         rule.count(bandwidths, &mut [], &mut tally, &Frame::from_normal(Vec3::Z), &photon);

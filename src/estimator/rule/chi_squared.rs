@@ -356,7 +356,7 @@ impl CountingRule for ChiSquared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::Mark;
+    use crate::photon::ThinningKey;
     use crate::random::{Domain, Purpose, Stream};
 
     fn rule() -> ChiSquared {
@@ -375,7 +375,13 @@ mod tests {
         let offset = frame.t * x + frame.b * y;
         let bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
         let mut tally = Tally::default();
-        rule.count(&[bandwidth], counts, &mut tally, &frame, &Found::one(offset, x * x + y * y, 1.0, Mark::default()));
+        rule.count(
+            &[bandwidth],
+            counts,
+            &mut tally,
+            &frame,
+            &Found::one(offset, x * x + y * y, 1.0, ThinningKey::default()),
+        );
         tally.unpack(0, counts);
     }
 
@@ -405,7 +411,8 @@ mod tests {
             let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
             let frame = Frame::from_normal(Vec3::new(0.0, 1.0, 0.0));
             let sector = |offset: Vec3| {
-                rule.sectors(&frame, &Found::one(offset, 0.0, 1.0, Mark::default()).offset).to_array()[0] as usize
+                rule.sectors(&frame, &Found::one(offset, 0.0, 1.0, ThinningKey::default()).offset).to_array()[0]
+                    as usize
             };
             for i in 0..2000 {
                 let (x, y) = uniform(0, i);

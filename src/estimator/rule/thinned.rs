@@ -2,7 +2,7 @@
 //!
 //! Guided light paths are dense where the guide sends them, and carry little there. The test counts photons, so it
 //! would take the border between what is guided more and what is guided less for an edge in the light. Within a disc
-//! each photon therefore counts with a probability in proportion to its weight ([`Mark`](crate::photon::Mark)): what is
+//! each photon therefore counts with a probability in proportion to its weight ([`ThinningKey`](crate::photon::ThinningKey)): what is
 //! counted is as dense as the light, whatever the guide does, and is still a Poisson process, so that the test means
 //! what it says. Where all weigh the same, one in 250 is lost (weights are told by their leading bits). Where they do
 //! not, the heaviest photon that a disc has seen decides how many of the others count, and the test takes longer; when
@@ -11,7 +11,7 @@
 use super::CountingRule;
 use super::chi_squared::{self, Bandwidth, ChiSquared, ChiSquaredSettings};
 use crate::math::Frame;
-use crate::photon::mark;
+use crate::photon::thinning_key;
 use crate::random::{GOLDEN, mix};
 use crate::transport::{Found, MAX_LEVELS};
 use wide::f32x8;
@@ -76,16 +76,16 @@ impl CountingRule for Thinned {
         for ((bandwidth, counts), tally) in levels {
             let Some((heaviest, counts)) = counts.split_last_mut() else { continue };
             let within = |k: usize| distance2[k] < bandwidth.radius2;
-            let weight = |k: usize| if within(k) { mark::weight(photons.marks[k]) } else { 0 };
+            let weight = |k: usize| if within(k) { thinning_key::weight(photons.marks[k]) } else { 0 };
             let found = (0..8).map(weight).fold(0, u32::max);
             if found > *heaviest {
                 tally.settle(counts);
                 let seed = u64::from(bandwidth.radius2.to_bits()) << 32 | u64::from(found);
-                thin(counts, f64::from(mark::bound(*heaviest) / mark::bound(found)), seed);
+                thin(counts, f64::from(thinning_key::bound(*heaviest) / thinning_key::bound(found)), seed);
                 *heaviest = found;
             }
             let counted =
-                |k: usize| if mark::above(photons.marks[k], *heaviest) { distance2[k] } else { f32::INFINITY };
+                |k: usize| if thinning_key::above(photons.marks[k], *heaviest) { distance2[k] } else { f32::INFINITY };
             let photons = Found { distance2: f32x8::from(std::array::from_fn(counted)), ..*photons };
             self.0.count(std::slice::from_ref(bandwidth), counts, tally, frame, &photons);
         }
@@ -110,7 +110,7 @@ impl CountingRule for Thinned {
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::photon::Mark;
+    use crate::photon::ThinningKey;
     use crate::random::{Domain, Purpose, Stream};
 
     /// Share of a thousand discs that are rejected after so many iterations, by the rule and by the one that takes all
@@ -140,7 +140,7 @@ mod tests {
                     continue;
                 }
                 let weight = if dense { 1.0 / denser } else { 1.0 };
-                let mark = Mark::new(weight, draws.one(Purpose::Loss));
+                let mark = ThinningKey::new(weight, draws.one(Purpose::Loss));
                 let found = Found::one(frame.t * x + frame.b * y, u.x, 1.0, mark);
                 thinned.count(&a, &mut counts_a, &mut tally_a, &frame, &found);
                 plain.count(&b, &mut counts_b, &mut tally_b, &frame, &found);
@@ -179,13 +179,13 @@ mod tests {
         let count = |heavy_first: bool| -> f64 {
             let mut bandwidths = [rule.begin(1.0, 10.0, 0)];
             let (mut counts, mut tally) = ([0u32; 13], <Thinned as CountingRule>::Tally::default());
-            let heavy = Found::one(Vec3::ZERO, 0.0, 1.0, Mark::new(4.0, 0.5));
+            let heavy = Found::one(Vec3::ZERO, 0.0, 1.0, ThinningKey::new(4.0, 0.5));
             if heavy_first {
                 rule.count(&bandwidths, &mut counts, &mut tally, &frame, &heavy);
             }
             for i in 0..40_000 {
                 let draws = Stream::new(22, 0, Domain::Test, i).vertex(0);
-                let found = Found::one(Vec3::X * 0.5, 0.25, 1.0, Mark::new(1.0, draws.one(Purpose::Lobe)));
+                let found = Found::one(Vec3::X * 0.5, 0.25, 1.0, ThinningKey::new(1.0, draws.one(Purpose::Lobe)));
                 rule.count(&bandwidths, &mut counts, &mut tally, &frame, &found);
             }
             if !heavy_first {

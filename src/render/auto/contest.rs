@@ -7,10 +7,10 @@
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
 use super::trial::WORST;
-use crate::finish::told::{self, Judged};
+use crate::finish::halves::{self, Judged};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
+use crate::render::candidate::Candidate;
 use crate::render::session::{Session, Stage};
-use crate::render::strategy::Strategy;
 use crate::stat::floor;
 use rayon::prelude::*;
 
@@ -28,7 +28,7 @@ const TOLD: f64 = 2.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
     /// The candidate.
-    pub way: Strategy,
+    pub candidate: Candidate,
     /// relMSE without the worst pixels that the finished picture is expected to have; infinite where nothing was seen.
     pub squared_error: f64,
     /// Counted core-seconds of an iteration of the whole picture.
@@ -38,8 +38,8 @@ pub struct Trial {
 }
 
 /// A candidate being tried.
-pub(super) struct Candidate<'a> {
-    way: Strategy,
+pub(super) struct CandidateRun<'a> {
+    candidate: Candidate,
     session: Session<'a>,
     /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what
     /// comes before iterations.
@@ -66,11 +66,11 @@ impl Trial {
     }
 }
 
-impl<'a> Candidate<'a> {
+impl<'a> CandidateRun<'a> {
     /// Nothing done yet but what comes before iterations, of which one costs so much in the small picture and the whole
     /// one.
-    pub fn new(stage: &'a Stage<'a>, way: Strategy, [once, whole]: [f64; 2]) -> Candidate<'a> {
-        Candidate { way, session: Session::new(stage), once, whole, spent: 0.0 }
+    pub fn new(stage: &'a Stage<'a>, candidate: Candidate, [once, whole]: [f64; 2]) -> CandidateRun<'a> {
+        CandidateRun { candidate, session: Session::new(stage), once, whole, spent: 0.0 }
     }
 
     /// Goes on until so many core-seconds are spent; no further than the least number of iterations once `stop` holds.
@@ -205,7 +205,7 @@ impl Expected {
 /// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's
 /// `budget`. What is clear after the first share costs no more. Those are all there are once `stop` holds.
 pub(super) fn hold(
-    candidates: &mut [Candidate<'_>],
+    candidates: &mut [CandidateRun<'_>],
     finish: &mut Finish,
     (allowed, budget): (f64, f64),
     stop: &dyn Fn() -> bool,
@@ -222,7 +222,7 @@ pub(super) fn hold(
     let open: Vec<bool> = left.iter().map(|one| one.is_open(&left[best])).collect();
     let count = open.iter().filter(|open| **open).count();
     if count > 1 {
-        let spent = |(candidate, open): (&Candidate<'_>, &bool)| if *open { 0.0 } else { candidate.spent };
+        let spent = |(candidate, open): (&CandidateRun<'_>, &bool)| if *open { 0.0 } else { candidate.spent };
         let closed: f64 = candidates.iter().zip(&open).map(spent).sum();
         let share = (allowed - closed) / count as f64;
         let again = candidates.iter_mut().zip(&open).filter(|(_, open)| **open);
@@ -233,24 +233,24 @@ pub(super) fn hold(
         left = both.map(|((first, second), open)| if *open { second } else { first }).collect();
     }
     let best = least(&left, &open);
-    let usual = candidates.iter().position(|candidate| candidate.way == Strategy::USUAL);
+    let usual = candidates.iter().position(|candidate| candidate.candidate == Candidate::USUAL);
     let usual = usual.filter(|&usual| open[usual] && !left[usual].is_clearly_worse(&left[best]));
     let chosen = usual.unwrap_or(best);
-    let trial = |(index, (candidate, left)): (usize, (&Candidate<'_>, &Expected))| {
-        let Candidate { way, whole, .. } = *candidate;
+    let trial = |(index, (candidate, left)): (usize, (&CandidateRun<'_>, &Expected))| {
+        let CandidateRun { candidate, whole, .. } = *candidate;
         let squared_error = left.squared_error();
-        Trial { way, squared_error, seconds_per_iteration: whole, chosen: index == chosen }
+        Trial { candidate, squared_error, seconds_per_iteration: whole, chosen: index == chosen }
     };
     candidates.iter().zip(&left).enumerate().map(trial).collect()
 }
 
 /// What all are expected to leave after `budget` core-seconds.
-fn compare(candidates: &mut [Candidate<'_>], finish: &mut Finish, budget: f64) -> Vec<Expected> {
+fn compare(candidates: &mut [CandidateRun<'_>], finish: &mut Finish, budget: f64) -> Vec<Expected> {
     let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
     let judged = judges(&shown);
-    let left = |candidate: &Candidate<'_>, shown: &Option<Shown>| -> Option<Expected> {
+    let left = |candidate: &CandidateRun<'_>, shown: &Option<Shown>| -> Option<Expected> {
         let (shown, ([a, b], worth)) = (shown.as_ref()?, judged.as_ref()?);
-        let of = |picture: &[[f32; 3]]| told::judge(picture, [a, b], &worth.finished);
+        let of = |picture: &[[f32; 3]]| halves::judge(picture, [a, b], &worth.finished);
         let earlier = shown.earlier.each_ref().map(|picture| of(picture));
         // In the render's iterations over those of the half; the least number of iterations may have cost more than the
         // share.

@@ -18,10 +18,10 @@ pub use contest::Trial;
 pub use trial::settings as small;
 pub use weights::Weight;
 
+use super::candidate::Candidate;
 use super::cost::Cost;
 use super::session::{Session, Stage};
 use super::settings::Settings;
-use super::strategy::Strategy;
 use crate::camera::Camera;
 use crate::finish::Finish;
 use crate::scene::Scene;
@@ -33,7 +33,7 @@ pub struct Choice {
     /// Settings of the render.
     pub settings: Settings,
     /// The way.
-    pub way: Strategy,
+    pub candidate: Candidate,
     /// All that were tried; none where the render is too short.
     pub trials: Vec<Trial>,
     /// What effects of light mean to the picture; none where the render is too short.
@@ -58,33 +58,33 @@ impl Choice {
 pub fn choose(
     (scene, camera): (&Scene, &Camera),
     finish: &mut Finish,
-    make: impl Fn(Strategy) -> Option<Settings>,
+    make: impl Fn(Candidate) -> Option<Settings>,
     stop: impl Fn() -> bool,
 ) -> Option<Choice> {
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let gathering = make(Strategy::GATHERING)?;
+    let gathering = make(Candidate::GATHERING)?;
     let pilot = Pilot::new(scene, camera, &gathering);
     let (weighed, weighing) = pilot.weigh();
     let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
     let chosen = trials.iter().find(|trial| trial.chosen);
     let untried = || {
-        let ways = pilot::focused(scene).iter().chain(&[Strategy::USUAL]);
-        ways.copied().find(|way| make(*way).is_some()).unwrap_or(Strategy::GATHERING)
+        let candidates = pilot::focused(scene).iter().chain(&[Candidate::USUAL]);
+        candidates.copied().find(|candidate| make(*candidate).is_some()).unwrap_or(Candidate::GATHERING)
     };
-    let way = chosen.map_or_else(untried, |chosen| chosen.way);
-    let settings = make(way)?;
-    let saving = |weighed: Weighed| weighed.saving(&pilot.cost, way, &settings, pilot.pixels);
+    let candidate = chosen.map_or_else(untried, |chosen| chosen.candidate);
+    let settings = make(candidate)?;
+    let saving = |weighed: Weighed| weighed.saving(&pilot.cost, candidate, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
-    let seconds_per_iteration = pilot.cost.of_film(way, &settings, camera);
+    let seconds_per_iteration = pilot.cost.of_film(candidate, &settings, camera);
     let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
-    Some(Choice { settings, way, trials, weights, because, seconds_per_iteration, spent })
+    Some(Choice { settings, candidate, trials, weights, because, seconds_per_iteration, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.
-pub fn counted_cost(scene: &Scene, camera: &Camera, way: Strategy, settings: &Settings) -> f64 {
+pub fn counted_cost(scene: &Scene, camera: &Camera, candidate: Candidate, settings: &Settings) -> f64 {
     let stage = Stage::new(scene, camera, settings);
     let session = Session::new(&stage);
-    Cost::count(scene, camera, settings, session.guide()).of_film(way, settings, camera)
+    Cost::count(scene, camera, settings, session.guide()).of_film(candidate, settings, camera)
 }
 
 /// What an iteration of a film costs, by counted work, over what it would cost if the film were the whole picture.
@@ -93,7 +93,7 @@ pub fn window_factor(scene: &Scene, camera: &Camera, settings: &Settings) -> f64
     if film == whole || !settings.method.walks_whole_picture() {
         return 1.0;
     }
-    let way = Strategy::plain(settings.method);
+    let candidate = Candidate::plain(settings.method);
     let cost = Cost::count(scene, camera, settings, None);
-    cost.of_film(way, settings, camera) / cost.of(way, settings, f64::from(film.0) * f64::from(film.1))
+    cost.of_film(candidate, settings, camera) / cost.of(candidate, settings, f64::from(film.0) * f64::from(film.1))
 }

@@ -1,16 +1,16 @@
 //! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
 
-use super::contest::{self, Candidate, Trial};
+use super::contest::{self, CandidateRun, Trial};
 use super::trial;
 use super::weights::{self, Weighed};
 use crate::camera::Camera;
 use crate::finish::Finish;
 use crate::plan::{Effect, Presence};
+use crate::render::candidate::Candidate;
 use crate::render::cost::Cost;
 use crate::render::method::Method;
 use crate::render::session::Stage;
 use crate::render::settings::Settings;
-use crate::render::strategy::Strategy;
 use crate::scene::Scene;
 
 /// Share of the render's cost that the pilot may take.
@@ -33,26 +33,26 @@ const CORES: f64 = 2.0;
 const UNLIMITED: f64 = 1000.0;
 
 /// The ways to take where glass or mirrors focus light, the best one first; none elsewhere.
-pub(super) fn focused(scene: &Scene) -> &'static [Strategy] {
+pub(super) fn focused(scene: &Scene) -> &'static [Candidate] {
     if scene.lights.targets().spheres().is_empty() {
         &[]
     } else if Method::Vcm.search().finds(Effect::Sds, &scene.survey) {
-        &[Strategy::FOCUSED, Strategy::USUAL]
+        &[Candidate::FOCUSED, Candidate::USUAL]
     } else {
-        &[Strategy::FOCUSED_GATHERING, Strategy::GATHERING, Strategy::FOCUSED, Strategy::USUAL]
+        &[Candidate::FOCUSED_GATHERING, Candidate::GATHERING, Candidate::FOCUSED, Candidate::USUAL]
     }
 }
 
 /// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors
 /// focus light it is one: what connections and photons leave out there a pilot is too short to miss, and would praise
 /// them for it.
-fn ways(scene: &Scene, make: &impl Fn(Strategy) -> Option<Settings>) -> Vec<(Strategy, Settings)> {
-    let with_settings = |way: &Strategy| make(*way).map(|settings| (*way, settings));
+fn candidates(scene: &Scene, make: &impl Fn(Candidate) -> Option<Settings>) -> Vec<(Candidate, Settings)> {
+    let with_settings = |candidate: &Candidate| make(*candidate).map(|settings| (*candidate, settings));
     let focused = focused(scene);
     if !focused.is_empty() {
         return focused.iter().find_map(with_settings).into_iter().collect();
     }
-    [Strategy::USUAL, Strategy::plain(Method::Path), Strategy::plain(Method::Bdpt)]
+    [Candidate::USUAL, Candidate::plain(Method::Path), Candidate::plain(Method::Bdpt)]
         .iter()
         .filter_map(with_settings)
         .collect()
@@ -62,7 +62,7 @@ fn ways(scene: &Scene, make: &impl Fn(Strategy) -> Option<Settings>) -> Vec<(Str
 pub(super) struct Pilot<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
-    /// Settings of [`Strategy::GATHERING`].
+    /// Settings of [`Candidate::GATHERING`].
     gathering: &'a Settings,
     pub cost: Cost,
     /// Pixels of the whole picture.
@@ -78,7 +78,7 @@ impl<'a> Pilot<'a> {
         let cost = Cost::count(scene, camera, gathering, None);
         let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let work = n as f64 * cost.of(Strategy::GATHERING, gathering, pixels);
+                let work = n as f64 * cost.of(Candidate::GATHERING, gathering, pixels);
                 time.map_or(work, |seconds| work.min(seconds * CORES))
             }
             (None, Some(seconds)) => seconds * CORES,
@@ -96,7 +96,7 @@ impl<'a> Pilot<'a> {
     /// too short, only those of light are weighed, or none.
     pub fn weigh(&self) -> (Vec<Weighed>, f64) {
         let settings = weights::settings(self.gathering, trial::PHOTONS);
-        let once = self.cost.of(Strategy::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
+        let once = self.cost.of(Candidate::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
         let most = WEIGHING * SHARE * self.budget;
         let mut taken = weights::PICTURES as f64 * once;
         if taken > most {
@@ -121,40 +121,40 @@ impl<'a> Pilot<'a> {
         &self,
         weighing: f64,
         finish: &mut Finish,
-        make: &impl Fn(Strategy) -> Option<Settings>,
+        make: &impl Fn(Candidate) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
     ) -> (Vec<Trial>, Option<&'static str>) {
         let Pilot { scene, camera, cost, pixels, budget, .. } = *self;
-        let (ways, focuses) = (ways(scene, make), !focused(scene).is_empty());
-        if ways.len() < 2 {
-            let why = match ways.first() {
-                Some((Strategy { method: Method::Vcm, .. }, _)) if focuses => {
+        let (candidates, focuses) = (candidates(scene, make), !focused(scene).is_empty());
+        if candidates.len() < 2 {
+            let why = match candidates.first() {
+                Some((Candidate { method: Method::Vcm, .. }, _)) if focuses => {
                     "light is focused here, which it finds by all techniques"
                 }
-                Some((Strategy { method: Method::Sppm, .. }, _)) if focuses => {
+                Some((Candidate { method: Method::Sppm, .. }, _)) if focuses => {
                     "a lamp without size shines into cloudy glass, where vcm does not find all light"
                 }
-                _ => "the one way that these options leave",
+                _ => "the one candidate that these options leave",
             };
             return (Vec::new(), Some(why));
         }
         let allowed = SHARE * budget - weighing;
-        let Some((small, allowed)) = self.size(&ways, allowed, LEAST_SHARE * budget - weighing) else {
+        let Some((small, allowed)) = self.size(&candidates, allowed, LEAST_SHARE * budget - weighing) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
         let (width, height) = small.size();
         let few = f64::from(width) * f64::from(height);
         // As many light paths for a pixel as in the render.
-        let stages: Vec<Stage<'_>> = ways
+        let stages: Vec<Stage<'_>> = candidates
             .iter()
             .map(|(_, settings)| Stage::new(scene, &small, &trial::settings(settings, few / pixels)))
             .collect();
-        let mut candidates: Vec<Candidate<'_>> = stages
+        let mut candidates: Vec<CandidateRun<'_>> = stages
             .iter()
-            .zip(&ways)
-            .map(|(stage, (way, settings))| {
-                let costs = [cost.of(*way, stage.settings(), few), cost.of_film(*way, settings, camera)];
-                Candidate::new(stage, *way, costs)
+            .zip(&candidates)
+            .map(|(stage, (candidate, settings))| {
+                let costs = [cost.of(*candidate, stage.settings(), few), cost.of_film(*candidate, settings, camera)];
+                CandidateRun::new(stage, *candidate, costs)
             })
             .collect();
         (contest::hold(&mut candidates, finish, (allowed, budget), stop), None)
@@ -162,12 +162,14 @@ impl<'a> Pilot<'a> {
 
     /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too
     /// little for the smallest picture; `None` where even that takes more than `most`.
-    fn size(&self, ways: &[(Strategy, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
-        let once = |way: &Strategy, settings: &Settings, pixels: f64| {
-            self.cost.of(*way, &trial::settings(settings, pixels / self.pixels), pixels)
+    fn size(&self, candidates: &[(Candidate, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
+        let once = |candidate: &Candidate, settings: &Settings, pixels: f64| {
+            self.cost.of(*candidate, &trial::settings(settings, pixels / self.pixels), pixels)
         };
-        let dearest = |pixels: f64| ways.iter().map(|(way, settings)| once(way, settings, pixels)).fold(0.0, f64::max);
-        let count = ways.len() as f64;
+        let dearest = |pixels: f64| {
+            candidates.iter().map(|(candidate, settings)| once(candidate, settings, pixels)).fold(0.0, f64::max)
+        };
+        let count = candidates.len() as f64;
         // Work per pixel is the same as in the render, so iterations and pixels share what there is.
         let wanted = self.pixels * allowed / (count * ITERATIONS * self.budget);
         let least = PIXELS.0.min(self.pixels);

@@ -11,10 +11,10 @@ use crate::camera::Camera;
 use crate::estimator::Pixel;
 use crate::math::DVec3;
 use crate::plan::{ClassSet, Effect, Presence, switch};
+use crate::render::candidate::Candidate;
 use crate::render::cost::Cost;
 use crate::render::session::{Session, Stage};
 use crate::render::settings::Settings;
-use crate::render::strategy::Strategy;
 use crate::scene::Scene;
 use crate::stat::floor;
 
@@ -208,25 +208,25 @@ pub(super) fn weigh(
 impl Weighed {
     /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is
     /// counted without a guide.
-    pub fn saving(self, cost: &Cost, way: Strategy, settings: &Settings, pixels: f64) -> Weight {
+    pub fn saving(self, cost: &Cost, candidate: Candidate, settings: &Settings, pixels: f64) -> Weight {
         let saved = match self.without {
             // Of unguided paths it tells the share.
             Some(without) => {
-                let unguided = Strategy { guided: false, ..way };
+                let unguided = Candidate { guided: false, ..candidate };
                 let [with, without] = [cost, &without].map(|cost| cost.of(unguided, settings, pixels));
-                (1.0 - without / with).max(0.0) * cost.of(way, settings, pixels)
+                (1.0 - without / with).max(0.0) * cost.of(candidate, settings, pixels)
             }
-            None => saved(cost, (way, settings), self.weight.effect, pixels),
+            None => saved(cost, (candidate, settings), self.weight.effect, pixels),
         };
         Weight { saved: Some(saved), ..self.weight }
     }
 }
 
 /// Core-seconds of an iteration that leaving an effect of light out would save.
-fn saved(cost: &Cost, (way, settings): (Strategy, &Settings), effect: Effect, pixels: f64) -> f64 {
+fn saved(cost: &Cost, (candidate, settings): (Candidate, &Settings), effect: Effect, pixels: f64) -> f64 {
     // Of an effect that is left out: what it would cost.
     let of = ClassSet::of(effect);
     let [with, without] = [settings.classes.and(of), settings.classes & of.complement()]
-        .map(|classes| cost.of(way, &Settings { classes, ..settings.clone() }, pixels));
+        .map(|classes| cost.of(candidate, &Settings { classes, ..settings.clone() }, pixels));
     (with - without).max(0.0)
 }

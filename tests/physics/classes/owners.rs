@@ -6,7 +6,7 @@ use caustique::plan::{Event, EyeSuffix, LightPrefix, Owner, PathClass, Search};
 use caustique::random::{Domain, Stream};
 use caustique::scene::{Scene, gltf};
 use caustique::transport::{
-    Eye, Indirect, LightPass, MediumVertex, Next, Scattered, Surroundings, Vertex, Visitor, walk,
+    Eye, Indirect, InitialMedia, LightPass, MediumVertex, Next, Scattered, Vertex, Visitor, walk,
 };
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -85,9 +85,9 @@ impl<'a> Visitor<'a> for Scribe<'_> {
 /// Paths of random walks through a scene from its camera and its lights.
 fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
     let camera = scene.camera(&crate::support::scenes::square(64)).expect("a camera");
-    let surroundings = Surroundings::new(scene, camera.position());
+    let initial_media = InitialMedia::new(scene, camera.position());
     let classes = caustique::plan::ClassSet::ALL;
-    let (interior, indirect) = (surroundings.eye, Indirect::Photons);
+    let (interior, indirect) = (initial_media.eye, Indirect::Photons);
     let eye = Eye { scene, camera: &camera, interior, max_depth: 7, indirect, classes, stop: None };
     let pass = LightPass::new(5, 0, Domain::Test, walks, 7);
     for index in 0..walks {
@@ -96,7 +96,7 @@ fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
         let start = eye.start((index % 64, index / 64 % 64), stream);
         let mut scribe = Scribe { scene, sofar: String::new(), last: None, from_light: None, found };
         walk(scene, &arena, &start, stream, Transport::Radiance, 7, &mut scribe);
-        if let Some(emitted) = pass.emit(scene, &surroundings, index) {
+        if let Some(emitted) = pass.emit(scene, &initial_media, index) {
             let mut scribe = Scribe { scene, sofar: String::new(), last: None, from_light: Some(emitted.delta), found };
             walk(scene, &arena, &emitted.start, emitted.stream, Transport::Importance, 7, &mut scribe);
         }

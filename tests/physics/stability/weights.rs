@@ -7,7 +7,7 @@ use caustique::math::{DVec3, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::Description;
 use caustique::transport::mis::{self, End, Eta, Merges, MisState, one_merge};
-use caustique::transport::{LightPass, Strategies, Surroundings};
+use caustique::transport::{InitialMedia, LightPass, Strategies};
 
 const PATHS: u64 = 100_000;
 const LIGHT_PATHS: f32 = 1e6;
@@ -128,13 +128,13 @@ fn guided_starts_share_out_all_light() {
     description.cameras.push(look_at(DVec3::new(2.0, 1.0, 3.8), DVec3::new(2.0, 0.8, 0.0), 50.0));
     let scene = build(description);
     let camera: Camera = scene.camera(&square(8)).expect("a camera");
-    let surroundings = Surroundings::of(&scene, &camera);
+    let initial_media = InitialMedia::of(&scene, &camera);
     for all in [true, false] {
         let guide = Guide::new(&scene.lights, all).expect("there is something to guide to");
         const STARTS: u32 = 1_000_000;
         let pass = LightPass::new(5, 1, Domain::Light, STARTS, 8).guided(Some(&guide));
         let (mut sum, mut squares) = (0.0, 0.0);
-        for emitted in (0..STARTS).filter_map(|index| pass.emit(&scene, &surroundings, index)) {
+        for emitted in (0..STARTS).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
             assert!(emitted.ratio > 0.0 && emitted.weight > 0.0 && (0.0..=1.0 + 1e-5).contains(&emitted.unaimed));
             sum += f64::from(emitted.ratio);
             squares += f64::from(emitted.ratio).powi(2);

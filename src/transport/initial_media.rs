@@ -9,50 +9,50 @@ use std::collections::HashMap;
 
 /// The solids around the points where paths of one kind start.
 #[derive(Clone, Copy, Debug)]
-pub enum Around {
+pub enum InitialMedium {
     /// The same around all of them.
     Same(Interior),
     /// The surface of a solid lies between them: each is looked at.
     Differs,
 }
 
-impl Around {
-    /// Around one of the points.
+impl InitialMedium {
+    /// InitialMedium one of the points.
     #[inline]
     pub fn at(&self, scene: &Scene, p: Vec3) -> Interior {
         match self {
-            Around::Same(interior) => *interior,
-            Around::Differs => Interior::at(scene, p),
+            InitialMedium::Same(interior) => *interior,
+            InitialMedium::Differs => Interior::at(scene, p),
         }
     }
 }
 
 /// The solids around the camera and around each light.
-pub struct Surroundings {
-    /// Around the camera.
-    pub eye: Around,
-    /// Around the lights, by index; empty when the scene has no solids.
-    lights: Vec<Around>,
+pub struct InitialMedia {
+    /// InitialMedium the camera.
+    pub eye: InitialMedium,
+    /// InitialMedium the lights, by index; empty when the scene has no solids.
+    lights: Vec<InitialMedium>,
 }
 
-impl Surroundings {
+impl InitialMedia {
     /// Looks around the points where a camera's rays start, and those of every light.
-    pub fn of(scene: &Scene, camera: &Camera) -> Surroundings {
-        let mut surroundings = Surroundings::new(scene, camera.position());
+    pub fn of(scene: &Scene, camera: &Camera) -> InitialMedia {
+        let mut initial_media = InitialMedia::new(scene, camera.position());
         let starts = Extent::of(camera.origins());
         if scene.survey.solids && Solid::all(scene).iter().any(|solid| solid.meets(scene, &starts)) {
-            surroundings.eye = Around::Differs;
+            initial_media.eye = InitialMedium::Differs;
         }
-        surroundings
+        initial_media
     }
 
     /// The same of a camera whose rays start in one point.
-    pub fn new(scene: &Scene, eye: Vec3) -> Surroundings {
+    pub fn new(scene: &Scene, eye: Vec3) -> InitialMedia {
         let lights = if scene.survey.solids { around_lights(scene) } else { Vec::new() };
-        Surroundings { eye: Around::Same(Interior::at(scene, eye)), lights }
+        InitialMedia { eye: InitialMedium::Same(Interior::at(scene, eye)), lights }
     }
 
-    /// Around a point just off light `index`.
+    /// InitialMedium a point just off light `index`.
     #[inline]
     pub fn light(&self, scene: &Scene, index: u32, p: Vec3) -> Interior {
         self.lights.get(index as usize).map_or(Interior::default(), |around| around.at(scene, p))
@@ -107,7 +107,7 @@ fn extent(scene: &Scene, instance: u32) -> Extent {
 
 /// By emitter. A lamp's triangle is looked at as a whole where the lamp is clear of the surfaces of all solids, or the
 /// triangle of the solids that they bound.
-fn around_lights(scene: &Scene) -> Vec<Around> {
+fn around_lights(scene: &Scene) -> Vec<InitialMedium> {
     let solids = Solid::all(scene);
     let mut crossed: HashMap<u32, Vec<&Solid>> = HashMap::new();
     let mut around = |emitter: &Emitter| {
@@ -120,10 +120,10 @@ fn around_lights(scene: &Scene) -> Vec<Around> {
             });
             let own = Extent::of([*a, *a + *b, *a + *c]);
             if crossed.iter().any(|solid| solid.extent.meets(&own)) {
-                return Around::Differs;
+                return InitialMedium::Differs;
             }
         }
-        Around::Same(emitter.anywhere(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
+        InitialMedium::Same(emitter.anywhere(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
     };
     scene.lights.emitters().iter().map(&mut around).collect()
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// A way to render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Strategy {
+pub struct Candidate {
     /// How light is found.
     pub method: Method,
     /// What photons bring, where they are gathered.
@@ -15,21 +15,21 @@ pub struct Strategy {
     pub guided: bool,
 }
 
-impl Strategy {
+impl Candidate {
     /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is
     /// left to a technique that finds it badly.
-    pub const USUAL: Strategy = Strategy::plain(Method::Vcm);
+    pub const USUAL: Candidate = Candidate::plain(Method::Vcm);
     /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where
     /// others would have found the glass, and without which it is hardly found where it is small.
-    pub const FOCUSED: Strategy = Strategy { guided: true, ..Strategy::USUAL };
+    pub const FOCUSED: Candidate = Candidate { guided: true, ..Candidate::USUAL };
     /// What is taken where the usual does not find all light that is focused.
-    pub const FOCUSED_GATHERING: Strategy = Strategy { guided: true, ..Strategy::GATHERING };
+    pub const FOCUSED_GATHERING: Candidate = Candidate { guided: true, ..Candidate::GATHERING };
     /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
-    pub const GATHERING: Strategy = Strategy::plain(Method::Sppm);
+    pub const GATHERING: Candidate = Candidate::plain(Method::Sppm);
 
     /// A method with light paths as they come.
-    pub const fn plain(method: Method) -> Strategy {
-        Strategy { method, indirect: Indirect::Photons, guided: false }
+    pub const fn plain(method: Method) -> Candidate {
+        Candidate { method, indirect: Indirect::Photons, guided: false }
     }
 
     /// A way in words.

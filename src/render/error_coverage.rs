@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// What the estimate of a render's error is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub enum Told {
+pub enum ErrorCoverage {
     /// All of the error: of noise, and of bias where the method has any.
     #[serde(rename = "noise and bias")]
     All,
@@ -22,35 +22,35 @@ pub enum Told {
     PhotonNoise,
 }
 
-impl Told {
+impl ErrorCoverage {
     /// In words.
     pub fn name(self) -> &'static str {
         match self {
-            Told::All => "noise and bias",
-            Told::Noise => "noise",
-            Told::PhotonNoise => "noise of photons",
+            ErrorCoverage::All => "noise and bias",
+            ErrorCoverage::Noise => "noise",
+            ErrorCoverage::PhotonNoise => "noise of photons",
         }
     }
 
     /// What is lacking, to be printed behind the number: ` (noise only)`; nothing where nothing is.
     pub fn note(self) -> &'static str {
         match self {
-            Told::All => "",
-            Told::Noise => " (noise only)",
-            Told::PhotonNoise => " (noise of photons only)",
+            ErrorCoverage::All => "",
+            ErrorCoverage::Noise => " (noise only)",
+            ErrorCoverage::PhotonNoise => " (noise of photons only)",
         }
     }
 }
 
 impl Settings {
     /// What the estimated error of such a render knows of.
-    pub fn told(&self) -> Told {
+    pub fn error_coverage(&self) -> ErrorCoverage {
         let compared = self.levels.own() + 1 < self.compared_levels();
         match self.method {
-            method if method.has_fixed_points() => Told::PhotonNoise,
-            method if method.has_one_map() => Told::Noise,
-            method if method.has_bandwidths() && !compared => Told::Noise,
-            _ => Told::All,
+            method if method.has_fixed_points() => ErrorCoverage::PhotonNoise,
+            method if method.has_one_map() => ErrorCoverage::Noise,
+            method if method.has_bandwidths() && !compared => ErrorCoverage::Noise,
+            _ => ErrorCoverage::All,
         }
     }
 }
@@ -63,16 +63,16 @@ mod tests {
     #[test]
     fn bias_is_told_by_a_larger_level() {
         let of = |method: Method, levels: usize, radius_rule: RadiusRule| {
-            Settings { method, levels: Levels::new(levels), radius_rule, ..Settings::default() }.told()
+            Settings { method, levels: Levels::new(levels), radius_rule, ..Settings::default() }.error_coverage()
         };
         let memoryless = RadiusRule::Memoryless;
-        assert_eq!(of(Method::Sppm, 5, memoryless), Told::All);
-        assert_eq!(of(Method::Sppm, 1, memoryless), Told::Noise);
-        assert_eq!(of(Method::Sppm, 5, RadiusRule::Local), Told::Noise);
-        assert_eq!(of(Method::Cppm, 5, memoryless), Told::Noise);
-        assert_eq!(of(Method::Vcm, 1, memoryless), Told::Noise);
-        assert_eq!(of(Method::Path, 1, memoryless), Told::All);
-        assert_eq!(of(Method::Pm, 1, memoryless), Told::Noise);
-        assert_eq!(of(Method::Ppm, 1, RadiusRule::Local), Told::PhotonNoise);
+        assert_eq!(of(Method::Sppm, 5, memoryless), ErrorCoverage::All);
+        assert_eq!(of(Method::Sppm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(of(Method::Sppm, 5, RadiusRule::Local), ErrorCoverage::Noise);
+        assert_eq!(of(Method::Cppm, 5, memoryless), ErrorCoverage::Noise);
+        assert_eq!(of(Method::Vcm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(of(Method::Path, 1, memoryless), ErrorCoverage::All);
+        assert_eq!(of(Method::Pm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(of(Method::Ppm, 1, RadiusRule::Local), ErrorCoverage::PhotonNoise);
     }
 }

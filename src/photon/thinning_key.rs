@@ -8,17 +8,17 @@
 /// process, thinned \[Lewis and Shedler 1979\]. With W no less than any weight, they are as dense as photons that all
 /// weigh W and bring the same light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Mark(u32);
+pub struct ThinningKey(u32);
 
 /// The leading bits of a number that is not negative, in the order of numbers.
 fn leading(x: f32) -> u32 {
     x.to_bits() >> 15
 }
 
-impl Mark {
+impl ThinningKey {
     /// Of a weight above 0; `u` is uniform on `[0, 1)`.
-    pub fn new(weight: f32, u: f32) -> Mark {
-        Mark(leading(weight) << 16 | leading(weight / u))
+    pub fn new(weight: f32, u: f32) -> ThinningKey {
+        ThinningKey(leading(weight) << 16 | leading(weight / u))
     }
 
     /// The weight, to one in 250.
@@ -34,7 +34,7 @@ impl Mark {
     }
 }
 
-/// Weights of [`Mark::bits`], in their order.
+/// Weights of [`ThinningKey::bits`], in their order.
 #[inline]
 pub fn weight(bits: u32) -> u32 {
     bits >> 16
