@@ -10,7 +10,7 @@ fn a_render_leaves_all_layers_and_its_account() {
     let outcome = folder.render("-o out.exr --png out.png --iterations 6 --seed 7");
     assert_eq!(folder.files(), ["out.exr", "out.png"]);
     for part in [
-        "method: auto: sppm, for the one way that these options leave\n",
+        "method: auto: sppm, for the only candidate that these options leave\n",
         "\niteration 6 of 6, ",
         "\npeak memory ",
         "\nout.exr: 64 x 48, 110 channels\n",

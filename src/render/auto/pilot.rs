@@ -134,7 +134,7 @@ impl<'a> Pilot<'a> {
                 Some((Candidate { method: Method::Sppm, .. }, _)) if focuses => {
                     "a lamp without size shines into cloudy glass, where vcm does not find all light"
                 }
-                _ => "the one candidate that these options leave",
+                _ => "the only candidate that these options leave",
             };
             return (Vec::new(), Some(why));
         }
