@@ -31,7 +31,7 @@ fn methods(world: &World, turn: usize) -> Option<(Method, Method)> {
     let camera = world.cameras()[0].to_owned();
     let all: Vec<Method> = [Method::Path, Method::Bdpt, Method::Vcm, Method::Light, Method::Sppm]
         .into_iter()
-        .filter(|method| finds_all(&scene, &Shot::new(*method, &camera)))
+        .filter(|method| finds_all(world, &scene, &Shot::new(*method, &camera)))
         .collect();
     let first = *all.get(turn % all.len().max(1))?;
     let second = all[(turn + 1 + turn / 7 % all.len().max(2).saturating_sub(1)) % all.len()];

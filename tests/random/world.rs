@@ -298,6 +298,24 @@ impl World {
         0.5 * (high - low).length()
     }
 
+    /// Share of a hemisphere's projected solid angle that the smallest light fills, seen from as far away as the scene is
+    /// large; 1 without lights.
+    pub fn smallest_light(&self) -> f64 {
+        let share = |index: usize| {
+            let thing = &self.things[index];
+            match thing.kind {
+                ThingKind::Light(Light { kind: LightKind::Sun { angle }, .. }) => {
+                    (0.5 * angle).to_radians().sin().powi(2)
+                }
+                ThingKind::Light(Light {
+                    kind: LightKind::Point { radius } | LightKind::Spot { radius, .. }, ..
+                }) => (radius / self.size).powi(2),
+                _ => (self.radius(thing) / self.size).powi(2),
+            }
+        };
+        self.lights().into_iter().map(share).fold(1.0, f64::min)
+    }
+
     /// Things that give light.
     pub fn lights(&self) -> Vec<usize> {
         let shines = |thing: &Thing| match thing.kind {
