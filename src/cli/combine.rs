@@ -8,7 +8,7 @@ use caustique::film::{Naming, take_plain_names};
 use caustique::image::exr;
 use caustique::pipeline::tell_stored;
 use caustique::render::Clock;
-use caustique::scene::description::Picture;
+use caustique::scene::description::PictureDefaults;
 use caustique::settings::FinishOptions;
 use caustique::settings::number::threads;
 use serde_json::json;
@@ -61,7 +61,7 @@ pub fn run(args: &CombineArgs) -> Result<()> {
         }
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
-        args.picture.write_png(&set, &Picture::default())?;
+        args.picture.write_png(&set, &PictureDefaults::default())?;
         say(&format!("finished with {} in {}", ready.name(), duration(clock.seconds())));
         Ok(())
     })

@@ -12,7 +12,7 @@ use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::merge::{self, Shards, Step, is_shard};
 use caustique::pipeline::seeds::Seeds;
 use caustique::pipeline::{finish, tell_stored};
-use caustique::scene::description::Picture;
+use caustique::scene::description::PictureDefaults;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -90,7 +90,7 @@ impl MergeArgs {
     }
 
     /// Writes the picture.
-    fn write(&self, set: &LayerSet, attributes: &Attributes, naming: Naming, made_for: &Picture) -> Result<()> {
+    fn write(&self, set: &LayerSet, attributes: &Attributes, naming: Naming, made_for: &PictureDefaults) -> Result<()> {
         exr::write(&self.output, set, attributes, self.picture.exr_options(naming))?;
         self.picture.write_png(set, made_for)?;
         tell_picture(&self.output, set);
@@ -162,5 +162,5 @@ fn average(args: &MergeArgs) -> Result<()> {
         set = Selection::parse(layers)?.apply(set)?;
     }
     attributes.insert(exr::ATTRIBUTE, &header)?;
-    args.write(&set, &attributes, naming, &Picture::default())
+    args.write(&set, &attributes, naming, &PictureDefaults::default())
 }

@@ -5,7 +5,7 @@ use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, Compression};
 use caustique::image::tonemap::ToneMap;
 use caustique::image::{atomic, png};
-use caustique::scene::description::Picture;
+use caustique::scene::description::PictureDefaults;
 use caustique::settings::number::Ranged;
 use serde::Serialize;
 use std::io::IsTerminal;
@@ -46,13 +46,13 @@ impl PictureArgs {
     }
 
     /// Exposure in stops and tone curve: the user's, else those of the picture that a scene was made for.
-    pub fn look(&self, made_for: &Picture) -> (f32, ToneMap) {
+    pub fn look(&self, made_for: &PictureDefaults) -> (f32, ToneMap) {
         let exposure = self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or(0.0);
         (exposure, self.tonemap.or(made_for.tonemap).unwrap_or_default())
     }
 
     /// Writes the PNG if one is asked for.
-    pub fn write_png(&self, set: &LayerSet, made_for: &Picture) -> Result<()> {
+    pub fn write_png(&self, set: &LayerSet, made_for: &PictureDefaults) -> Result<()> {
         let Some(path) = &self.png else { return Ok(()) };
         let (exposure, tonemap) = self.look(made_for);
         png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, tonemap)

@@ -5,7 +5,7 @@
 //! spheres; each carries the flux that its density in the mixture asks for, so the estimate is the same and no path is
 //! lost.
 
-use super::{Cdf, EmissionSample, Entry, Region, Sky};
+use super::{Cdf, EmissionSample, EntryDisc, Region, Sky};
 use crate::geometry::Shapes;
 use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
@@ -28,7 +28,7 @@ fn from_line(center: Vec3, p: Vec3, d: Vec3) -> f32 {
 }
 
 /// Bounding spheres of what can make caustics.
-pub struct Targets {
+pub struct CausticTargets {
     spheres: Vec<(Vec3, f32)>,
     /// Choice in proportion to the discs' areas.
     choice: Option<Cdf>,
@@ -114,9 +114,9 @@ fn gathered(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     spheres
 }
 
-impl Targets {
+impl CausticTargets {
     /// The targets of a scene.
-    pub fn new(shapes: &Shapes, materials: &Materials) -> Targets {
+    pub fn new(shapes: &Shapes, materials: &Materials) -> CausticTargets {
         let spheres: Vec<(Vec3, f32)> = shapes
             .instances
             .iter()
@@ -129,7 +129,7 @@ impl Targets {
         let spheres = gathered(halved(spheres, MAX_SPHERES), MAX_TARGETS);
         let areas = spheres.iter().map(|s| PI * s.1 * s.1);
         let area = areas.clone().sum();
-        Targets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
+        CausticTargets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
     }
 
     /// Turns the start of a path from infinity, drawn uniformly over the scene's disc, into one drawn from the mixture.
@@ -145,12 +145,12 @@ impl Targets {
     }
 
     /// The same, and part of the paths through the disc of a region. Flux and density are those without the region:
-    /// [`Targets::lit`] has the mixture's.
-    pub fn aim_or_light(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
+    /// [`CausticTargets::lit`] has the mixture's.
+    pub fn aim_with_region(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
         let lit = self.share_lit();
         if u < lit {
             let radius = region.sample(u / lit);
-            emission.entry = Entry::Region(radius);
+            emission.entry = EntryDisc::Region(radius);
             emission.origin = Self::point(sky, emission.direction, (region.center, radius), point);
             self.weigh(sky, emission);
         } else {
@@ -167,14 +167,14 @@ impl Targets {
     pub fn lit(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
         let lit = self.share_lit();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
-        let drawn = if let Entry::Region(radius) = emission.entry { radius } else { 0.0 };
+        let drawn = if let EntryDisc::Region(radius) = emission.entry { radius } else { 0.0 };
         let through = lit * region.density(from_line(region.center, p, d), drawn);
         ((1.0 - lit) * aimed + through, (1.0 - lit) * aimed * self.unaimed(sky, emission) + through)
     }
 
     /// The same, drawn through the disc of one target.
     pub fn through(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
-        emission.entry = Entry::Target(target);
+        emission.entry = EntryDisc::Target(target);
         emission.origin = Self::point(sky, emission.direction, self.spheres[target], point);
         self.weigh(sky, emission);
     }
@@ -205,21 +205,21 @@ impl Targets {
     }
 
     /// The same of a line that was drawn through a disc, which it is within.
-    fn density_drawn(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<Entry>) -> f32 {
+    fn density_drawn(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
         if self.choice.is_none() {
             return 1.0 / (PI * sky.radius * sky.radius);
         }
         let within = |&(target, &(center, radius)): &(usize, &(Vec3, f32))| {
-            drawn == Some(Entry::Target(target)) || from_line(center, p, d) < radius * radius
+            drawn == Some(EntryDisc::Target(target)) || from_line(center, p, d) < radius * radius
         };
         let discs = self.spheres.iter().enumerate().filter(within).count();
         self.uniform(sky, p, d, drawn) + AIMED * discs as f32 / self.area
     }
 
     /// The part of that density that paths of all light have.
-    fn uniform(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<Entry>) -> f32 {
+    fn uniform(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
         // A target's disc may reach over the rim of the scene's.
-        let inside = drawn == Some(Entry::Whole) || from_line(sky.center, p, d) <= sky.radius * sky.radius;
+        let inside = drawn == Some(EntryDisc::Whole) || from_line(sky.center, p, d) <= sky.radius * sky.radius;
         if inside { (1.0 - AIMED) / (PI * sky.radius * sky.radius) } else { 0.0 }
     }
 
@@ -252,7 +252,7 @@ mod tests {
             light: 0,
             delta: true,
             infinite: true,
-            entry: Entry::Whole,
+            entry: EntryDisc::Whole,
             density: EmissionDensity { direct: 1.0, start: 1.0, onward, cos: 1.0, infinite: true, delta: true },
         }
     }
@@ -265,7 +265,7 @@ mod tests {
         let spheres = vec![(Vec3::new(0.3, 0.0, 0.1), 0.2), (Vec3::new(0.2, 0.1, -0.4), 0.25), (Vec3::X, 0.1)];
         let areas: Vec<f32> = spheres.iter().map(|s: &(Vec3, f32)| PI * s.1 * s.1).collect();
         let choice = Cdf::new(areas.iter().map(|&a| f64::from(a)));
-        let targets = Targets { spheres, choice, area: areas.iter().sum() };
+        let targets = CausticTargets { spheres, choice, area: areas.iter().sum() };
         let sky = Sky { center: Vec3::ZERO, radius: 1.05, environment: None, hidden_from_camera: false };
         let d = Vec3::NEG_Y;
         let whole = PI * sky.radius * sky.radius;
@@ -285,7 +285,7 @@ mod tests {
                 let (u, point) = (draws.one(Purpose::Lobe), draws.two(Purpose::Lens));
                 let unaimed = match region {
                     Some(region) => {
-                        targets.aim_or_light(&sky, &mut emission, region, u, point);
+                        targets.aim_with_region(&sky, &mut emission, region, u, point);
                         let (mixed, unaimed) = targets.lit(&sky, &emission, region);
                         emission.flux *= emission.density.onward / mixed;
                         unaimed / mixed
@@ -324,7 +324,7 @@ mod tests {
         for ratio in [10.0f32, 700.0, 7_000.0, 100_000.0] {
             let area = PI;
             let spheres = vec![(Vec3::new(0.3, -0.2, 0.5) * ratio, 1.0)];
-            let targets = Targets { spheres, choice: Cdf::new(std::iter::once(f64::from(area))), area };
+            let targets = CausticTargets { spheres, choice: Cdf::new(std::iter::once(f64::from(area))), area };
             let sky = Sky { center: Vec3::ZERO, radius: ratio, environment: None, hidden_from_camera: false };
             let whole = PI * ratio * ratio;
             let region = Region::new(Vec3::new(-0.4, 0.2, 0.1) * ratio, 1.0, ratio);
@@ -339,7 +339,7 @@ mod tests {
                 mean += f64::from(emission.flux.x) / n as f64;
                 // Through the region's own disc, where the density is a third of a half of one over its area at least.
                 let mut lit = lit;
-                targets.aim_or_light(&sky, &mut lit, region, 0.0, point);
+                targets.aim_with_region(&sky, &mut lit, region, 0.0, point);
                 greatest = greatest.max(1.0 / targets.lit(&sky, &lit, region).0);
             }
             // 1 / (AIMED (1 / area + 1 / whole)).

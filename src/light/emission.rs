@@ -47,7 +47,7 @@ impl EmissionDensity {
     /// Density of the ray that leaves the light, per area that faces it and per solid angle: the same all along the
     /// ray, and behind mirrors and clear glass in the same medium.
     #[inline]
-    pub fn of_rays(&self) -> f32 {
+    pub fn ray_density(&self) -> f32 {
         self.start * self.onward / self.cos
     }
 }
@@ -56,7 +56,7 @@ impl EmissionDensity {
 /// the start: on a scene's scale the rim of a small disc is not sharp, and a start that were taken for one from outside
 /// would carry as much more as the scene's disc is larger.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Entry {
+pub enum EntryDisc {
     /// The scene's.
     Whole,
     /// A target's.
@@ -81,7 +81,7 @@ pub struct EmissionSample {
     /// The light is at infinity.
     pub infinite: bool,
     /// Where it enters the scene, if it is at infinity.
-    pub entry: Entry,
+    pub entry: EntryDisc,
     /// Densities of the start.
     pub density: EmissionDensity,
 }
@@ -90,7 +90,7 @@ impl EmissionSample {
     /// The same start, drawn with the density `mixed` onward instead of its own, and its flux over that before; `None`
     /// where nothing is left of it.
     #[inline]
-    pub fn drawn_with(self, mixed: f32) -> Option<(EmissionSample, f32)> {
+    pub fn reweighted(self, mixed: f32) -> Option<(EmissionSample, f32)> {
         let ratio = self.density.onward / mixed;
         (ratio > 0.0).then(|| (EmissionSample { flux: self.flux * ratio, ..self }, ratio))
     }

@@ -11,7 +11,7 @@
 //!
 //! How probable cells are is learnt from the error that their photons leave in the picture ([`Guide::learn`]).
 
-use super::emission::{EmissionSample, Entry};
+use super::emission::{EmissionSample, EntryDisc};
 use super::emitter::position_error;
 use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
@@ -62,7 +62,7 @@ pub struct Guide {
 }
 
 /// A guided start.
-pub struct Guided {
+pub struct GuidedEmission {
     /// The start; its densities are those of unguided emission, by which strategies are weighed against each other.
     pub emission: EmissionSample,
     /// The component that made it.
@@ -196,7 +196,7 @@ impl Guide {
         materials: &Materials,
         region: Option<Region>,
         (choice, point, direction): (DVec2, Vec2, Vec2),
-    ) -> Option<Guided> {
+    ) -> Option<GuidedEmission> {
         let (cell, _, rest) = self.choice.sample(choice.y);
         let (lamp, target) = self.cells[cell];
         let u = match self.lamps.get(lamp) {
@@ -207,7 +207,7 @@ impl Guide {
         let mut emission = lights.sample_emission(shapes, materials, u, point, direction)?;
         match target {
             Some(target) => emission = self.turn(lights, emission, target, point, direction)?,
-            None => lights.aim_or_light(&mut emission, region, rest, point),
+            None => lights.aim_with_region(&mut emission, region, rest, point),
         }
         let lamp = self.lamps.get(self.lamp_of[emission.light as usize] as usize);
         let (anywhere, unaimed) = lights.lit(&emission, region);
@@ -220,12 +220,12 @@ impl Guide {
                     lights,
                     &emission,
                     other,
-                    target == Some(other) || emission.entry == Entry::Target(other),
+                    target == Some(other) || emission.entry == EntryDisc::Target(other),
                 );
         }
         let plain = lights.plain(&emission);
-        let (emission, ratio) = emission.drawn_with(mixed)?;
-        Some(Guided { emission, cell, ratio, weight: plain / mixed, unaimed: untargeted * unaimed / mixed })
+        let (emission, ratio) = emission.reweighted(mixed)?;
+        Some(GuidedEmission { emission, cell, ratio, weight: plain / mixed, unaimed: untargeted * unaimed / mixed })
     }
 
     /// Turns a native start of the lamp toward a target, its flux and densities those that native emission would give

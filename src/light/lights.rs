@@ -1,10 +1,10 @@
 //! All lights of a scene: choosing one, sampling it from a point, sampling emission, and the densities for MIS.
 
 use super::Region;
-use super::aim::Targets;
+use super::aim::CausticTargets;
 use super::cdf::Cdf;
 use super::cone::Cone;
-use super::emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
+use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
 use super::emitter::{Emitter, Sky, position_error, spot_falloff, spot_point, spot_solid_angle};
 use super::group::{Group, Groups};
 use super::receiver::Receiver;
@@ -34,7 +34,7 @@ pub struct Lights {
     suns: Vec<u32>,
     environment: Option<u32>,
     sky: Sky,
-    targets: Targets,
+    targets: CausticTargets,
     groups: Groups,
 }
 
@@ -123,7 +123,7 @@ impl Lights {
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
         let choice = LightSampler::new(&emitters, &sky, floored);
-        let (targets, groups) = (Targets::new(shapes, materials), Groups::default());
+        let (targets, groups) = (CausticTargets::new(shapes, materials), Groups::default());
         Lights { emitters, choice, first, relative, suns, environment, sky, targets, groups }
     }
 
@@ -162,7 +162,7 @@ impl Lights {
 
     /// The group of a surface that glows.
     #[inline]
-    pub fn group_of(&self, surface: &Surface) -> Group {
+    pub fn surface_group(&self, surface: &Surface) -> Group {
         self.groups.instances.get(surface.instance as usize).copied().unwrap_or_default()
     }
 
@@ -172,7 +172,7 @@ impl Lights {
     }
 
     /// The power of two of all light together; 0 if there is none.
-    pub fn exponent(&self) -> i32 {
+    pub fn power_exponent(&self) -> i32 {
         let power: f64 = self.emitters.iter().map(|emitter| emitter.power(&self.sky)).sum();
         if power.is_normal() { ((power.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
     }
@@ -188,7 +188,7 @@ impl Lights {
     }
 
     /// What can make caustics.
-    pub fn targets(&self) -> &Targets {
+    pub fn targets(&self) -> &CausticTargets {
         &self.targets
     }
 
@@ -199,7 +199,7 @@ impl Lights {
 
     /// Probability of choosing a light for a receiver over that of choosing it for emission.
     #[inline]
-    pub fn chosen_for(&self, receiver: &Receiver, light: u32) -> f32 {
+    pub fn choice_ratio(&self, receiver: &Receiver, light: u32) -> f32 {
         let Some(choice) = &self.choice else { return 1.0 };
         choice.pdf(receiver, light as usize) / choice.power().pdf(light as usize)
     }
@@ -364,7 +364,7 @@ impl Lights {
     /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers, and
     /// the cone that the light stays in. `None` for light from infinity.
     #[inline]
-    pub fn point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
+    pub fn sample_point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
         match &self.emitters[index] {
             Emitter::Triangle { corners, .. } => {
@@ -384,7 +384,13 @@ impl Lights {
     /// [`Lights::sample_direct`] would have found that point from the ray's origin. A light that touches the surface that
     /// the ray has left is at no distance.
     #[inline]
-    pub fn hit(&self, materials: &Materials, from: &Receiver, surface: &Surface, wo: Vec3) -> Option<(Rgb, f32)> {
+    pub fn hit_radiance(
+        &self,
+        materials: &Materials,
+        from: &Receiver,
+        surface: &Surface,
+        wo: Vec3,
+    ) -> Option<(Rgb, f32)> {
         let (radiance, density) = self.emitted(materials, from, surface, wo)?;
         Some((radiance, density.direct * surface.p.distance_squared(from.p) / density.cos))
     }
@@ -438,7 +444,13 @@ impl Lights {
     /// along `d` meets, with the densities of [`EmissionDensity`]; a camera's own ray does not meet those that are
     /// hidden from cameras.
     #[inline]
-    pub fn escape(&self, from: &Receiver, d: Vec3, camera: bool, mut each: impl FnMut(Rgb, f32, f32, Group)) {
+    pub fn for_each_infinite(
+        &self,
+        from: &Receiver,
+        d: Vec3,
+        camera: bool,
+        mut each: impl FnMut(Rgb, f32, f32, Group),
+    ) {
         let Some(choice) = &self.choice else { return };
         let mut met = |radiance: Rgb, index: u32, pdf: f32| {
             let [direct, start] = [choice.pdf(from, index as usize), choice.power().pdf(index as usize)];
@@ -546,12 +558,12 @@ impl Lights {
             light: index as u32,
             delta,
             infinite,
-            entry: Entry::Whole,
+            entry: EntryDisc::Whole,
             density,
         })
     }
 
-    /// Aims the start of a path from infinity at what can make caustics (see [`Targets::aim`]); others stay as they
+    /// Aims the start of a path from infinity at what can make caustics (see [`CausticTargets::aim`]); others stay as they
     /// are.
     #[inline]
     pub fn aim(&self, emission: &mut EmissionSample, u: f32, point: Vec2) {
@@ -563,10 +575,10 @@ impl Lights {
     /// The same, and part of the paths from infinity through the disc of a region of interest, if there is one. Flux
     /// and density are those without the region.
     #[inline]
-    pub fn aim_or_light(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) {
+    pub fn aim_with_region(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) {
         match region {
             Some(region) if emission.infinite => {
-                self.targets.aim_or_light(&self.sky, emission, region, u, point);
+                self.targets.aim_with_region(&self.sky, emission, region, u, point);
             }
             _ => self.aim(emission, u, point),
         }
@@ -598,7 +610,7 @@ impl Lights {
     }
 
     /// Whether any triangle of the instance gives light.
-    pub fn shines(&self, instance: u32) -> bool {
+    pub fn emits(&self, instance: u32) -> bool {
         self.relative[instance as usize].iter().any(|&i| i != u32::MAX)
     }
 }

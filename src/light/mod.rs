@@ -15,10 +15,10 @@ mod sampler;
 mod spread;
 mod tree;
 
-pub use aim::Targets;
+pub use aim::CausticTargets;
 pub use cdf::Cdf;
 pub use cone::Cone;
-pub use emission::{DirectSample, EmissionDensity, EmissionSample, Entry};
+pub use emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
 pub use emitter::{Emitter, Sky, SpotEdge};
 pub use environment::{Environment, ImageEnvironment};
 pub use group::{Group, Groups, MAX_GROUP_NAME, MAX_GROUPS};

@@ -32,7 +32,7 @@ impl PhotonFlags {
     const BIAS: i32 = 64;
     const EXPONENTS: (i32, i32) = (-63, 63);
 
-    /// The light has a size and is emitted with this density ([`crate::light::EmissionDensity::of_rays`]).
+    /// The light has a size and is emitted with this density ([`crate::light::EmissionDensity::ray_density`]).
     #[inline]
     pub fn straight(density: f32) -> PhotonFlags {
         let exponent = (density.to_bits() >> 23 & 0xff) as i32 - 127;

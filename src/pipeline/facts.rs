@@ -6,7 +6,7 @@ use crate::image::exr;
 use crate::light::MAX_GROUPS;
 use crate::render::output::shape;
 use crate::render::{Part, Settings};
-use crate::scene::description::Picture;
+use crate::scene::description::PictureDefaults;
 use crate::scene::{MAX_SIZE, Scene, View};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ pub struct Facts {
     /// What reading the scene has warned of.
     pub warnings: Vec<String>,
     /// The picture that the scene was made for.
-    pub made_for: Picture,
+    pub made_for: PictureDefaults,
 }
 
 impl Facts {

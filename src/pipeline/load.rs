@@ -95,7 +95,7 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
         };
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
         description.environment_hidden_from_camera = false;
-        description.world_unsaid = false;
+        description.environment_unknown = false;
     }
     set_turn_and_strength(description, order)?;
     let Some(environment) = &description.environment else { return Ok(()) };

@@ -24,7 +24,7 @@ pub fn plan(asked: &Asked<'_>, method: Method, (scene, camera): (&Scene, &Camera
     let method = choice.map_or(method, |choice| choice.candidate.method);
     let because = choice.map_or("asked for".into(), why);
     let search = choice.map_or(method.search(), |choice| choice.settings.search());
-    let told = plan::Asked { method: method.name(), because: &because, search, max_depth, switches, removed };
+    let told = plan::PlanRequest { method: method.name(), because: &because, search, max_depth, switches, removed };
     let mut plan = Plan::new(scene, camera, &told);
     for weight in choice.iter().flat_map(|choice| &choice.weights) {
         let effect = &mut plan.effects[weight.effect as usize];

@@ -72,7 +72,7 @@ pub struct Plan {
 
 /// What a plan is made for.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct PlanRequest<'a> {
     /// The method's name.
     pub method: &'a str,
     /// Why it was chosen.
@@ -89,7 +89,7 @@ pub struct Asked<'a> {
 
 impl Plan {
     /// Plans a render of a scene seen by a camera.
-    pub fn new(scene: &Scene, camera: &Camera, asked: &Asked) -> Plan {
+    pub fn new(scene: &Scene, camera: &Camera, asked: &PlanRequest) -> Plan {
         let presence = Presence::of(scene, camera);
         let finds = |effect| asked.search.finds(effect, &scene.survey);
         let plan = |effect: Effect| {

@@ -62,7 +62,7 @@ pub fn without(scene: &Scene, effect: Effect) -> Result<Scene> {
     let textures = strip(effect, &mut list, shared).map_or_else(|| Arc::clone(shared), Arc::from);
     let medium = scene.medium.filter(|_| effect != Effect::Volume);
     let environment = scene.lights.sky().environment.clone().filter(|_| effect != Effect::Environment);
-    scene.dressed(Materials { list, textures }, medium, environment)
+    scene.with_materials(Materials { list, textures }, medium, environment)
 }
 
 /// Takes an effect out of materials; the textures that are left, where those change.

@@ -234,7 +234,7 @@ impl Settings {
 
     /// What makes its pixels before the first iteration, from their largest initial bandwidths.
     pub(super) fn pixel(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> Pixel + use<> {
-        let (levels, exponent) = (self.levels.count, scene.lights.exponent());
+        let (levels, exponent) = (self.levels.count, scene.lights.power_exponent());
         let groups = self.light_groups(scene);
         move |bandwidths| Pixel::new(levels, exponent, bandwidths).with_groups(groups)
     }

@@ -2,7 +2,7 @@
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
 use super::nesting::ranks;
-use super::{Contacts, Nestings, Scene, Survey, dense};
+use super::{Contacts, Scene, SolidStacks, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS, Sky};
@@ -43,7 +43,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let mut materials = Materials { list: description.materials, textures: description.textures.into() };
     dense::thin(&shapes, &mut materials, &mut description.medium, &mut warnings);
     let materials = Arc::new(materials);
-    let (tracer, bodiless) = tracers(&shapes, &materials, threads)?;
+    let (tracer, pass_through_lights) = tracers(&shapes, &materials, threads)?;
 
     let sky = Sky {
         center: (center - origin).as_vec3(),
@@ -79,11 +79,11 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         objects: description.objects,
         first_lamp,
         tracer,
-        bodiless,
+        pass_through_lights,
         lights,
         light_names,
         guessed_units: description.guessed_units,
-        world_unsaid: description.world_unsaid,
+        environment_unknown: description.environment_unknown,
         cameras: description.cameras,
         picture: description.picture,
         medium: description.medium,
@@ -91,7 +91,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         survey,
         contacts,
         ranks,
-        nestings: Nestings::default(),
+        solid_stacks: SolidStacks::default(),
         warnings,
     })
 }
@@ -109,7 +109,7 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
             Group::NONE
         })
     };
-    let glows = |placed: &&description::Placed| description.materials[placed.material as usize].emits();
+    let glows = |placed: &&description::PlacedMesh| description.materials[placed.material as usize].emits();
     let instances: Vec<Group> = description
         .instances
         .iter()
@@ -161,7 +161,7 @@ fn warn_of_lights(
     warnings: &mut Vec<String>,
 ) {
     for (i, instance) in shapes.instances.iter().enumerate() {
-        if materials.list[instance.material as usize].emits() && !lights.shines(i as u32) {
+        if materials.list[instance.material as usize].emits() && !lights.emits(i as u32) {
             warnings
                 .push(format!("object \"{}\": its emissive surface has no area, so it gives no light", instance.name));
         }
@@ -190,7 +190,7 @@ fn warn_of_lights(
 ///
 /// # Errors
 /// Embree is out of memory.
-pub(super) fn dress(
+pub(super) fn rebuild_with_materials(
     scene: &Scene,
     materials: Materials,
     medium: Option<MediumParameters>,
@@ -204,8 +204,8 @@ pub(super) fn dress(
         true => Arc::clone(&scene.contacts),
         false => Arc::new(Contacts::new(&shapes, &materials)),
     };
-    let (tracer, bodiless) = match cut(&materials) == cut(&scene.materials) {
-        true => (scene.tracer.clone(), scene.bodiless.clone()),
+    let (tracer, pass_through_lights) = match cut(&materials) == cut(&scene.materials) {
+        true => (scene.tracer.clone(), scene.pass_through_lights.clone()),
         false => tracers(&shapes, &materials, rayon::current_num_threads())?,
     };
     let lamps = scene.lights.emitters().iter();
@@ -219,10 +219,10 @@ pub(super) fn dress(
         objects: scene.objects.clone(),
         first_lamp: scene.first_lamp,
         tracer,
-        bodiless,
+        pass_through_lights,
         light_names: scene.light_names.clone(),
         guessed_units: scene.guessed_units.clone(),
-        world_unsaid: scene.world_unsaid,
+        environment_unknown: scene.environment_unknown,
         cameras: scene.cameras.clone(),
         picture: scene.picture,
         medium,
@@ -230,7 +230,7 @@ pub(super) fn dress(
         survey: Survey::new(&shapes, &materials, &lights, medium),
         contacts,
         ranks: Arc::clone(&scene.ranks),
-        nestings: Nestings::default(),
+        solid_stacks: SolidStacks::default(),
         warnings: Vec::new(),
         shapes,
         materials,
@@ -317,8 +317,8 @@ fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> 
     };
     let meets = meets_test(shapes, materials);
     let tracer = Tracer::build(shapes, &asked(false), &meets, threads)?;
-    let bodiless = shapes.instances.iter().any(|instance| of(instance).null_bsdf);
-    let glowing = bodiless.then(|| Tracer::build(shapes, &asked(true), &meets, threads)).transpose()?;
+    let pass_through_lights = shapes.instances.iter().any(|instance| of(instance).null_bsdf);
+    let glowing = pass_through_lights.then(|| Tracer::build(shapes, &asked(true), &meets, threads)).transpose()?;
     Ok((tracer, glowing))
 }
 
@@ -424,7 +424,7 @@ fn add_lamps(description: &mut Description) {
             emission,
             ..Material::default()
         };
-        description.instances.push(description::Placed {
+        description.instances.push(description::PlacedMesh {
             name: light.name.clone(),
             mesh: description.meshes.len() as u32,
             material: description.materials.len() as u32,

@@ -38,7 +38,7 @@ fn passes(scene: &Scene, surface: &Surface) -> bool {
 
 /// A point of a surface, by what tells it from others there.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct ContactPoint {
     p: Vec3,
     ng: Vec3,
     instance: u32,
@@ -47,27 +47,27 @@ pub struct Place {
     error: f32,
 }
 
-impl Place {
+impl ContactPoint {
     /// Where the surface is, if others lie on it there.
     #[inline(always)]
-    pub fn touching(surface: &Surface) -> Option<Place> {
-        surface.touching.then(|| Place::of(surface))
+    pub fn touching(surface: &Surface) -> Option<ContactPoint> {
+        surface.touching.then(|| ContactPoint::of(surface))
     }
 
     #[inline(always)]
-    fn of(surface: &Surface) -> Place {
+    fn of(surface: &Surface) -> ContactPoint {
         let Surface { p, ng, instance, primitive, material, error, .. } = *surface;
-        Place { p, ng, instance, primitive, material, error }
+        ContactPoint { p, ng, instance, primitive, material, error }
     }
 
     /// The place on the triangle of light `index` that is nearest to `near`, if others may lie on that triangle.
     #[inline]
-    pub fn on_light(scene: &Scene, index: u32, near: Vec3) -> Option<Place> {
-        if scene.contacts.is_empty() { None } else { Place::on_touched_light(scene, index, near) }
+    pub fn on_light(scene: &Scene, index: u32, near: Vec3) -> Option<ContactPoint> {
+        if scene.contacts.is_empty() { None } else { ContactPoint::on_touched_light(scene, index, near) }
     }
 
     #[inline(never)]
-    fn on_touched_light(scene: &Scene, index: u32, near: Vec3) -> Option<Place> {
+    fn on_touched_light(scene: &Scene, index: u32, near: Vec3) -> Option<ContactPoint> {
         let Emitter::Triangle { instance, primitive, plane, corners: [corner, a, b], .. } =
             scene.lights.emitters()[index as usize]
         else {
@@ -77,12 +77,12 @@ impl Place {
         let p = near - ng * (ng.dot(near) - plane.w);
         let error = scene.contacts.reach(instance, primitive, error([corner, corner + a, corner + b]))?;
         let material = scene.shapes.instances[instance as usize].material;
-        Some(Place { p, ng, instance, primitive, material, error })
+        Some(ContactPoint { p, ng, instance, primitive, material, error })
     }
 }
 
 /// Rank of a surface among those at one place, for a ray along `direction`; `film`: one of them is opaque.
-fn rank(scene: &Scene, place: &Place, direction: Vec3, film: bool) -> (u8, i64, i64) {
+fn rank(scene: &Scene, place: &ContactPoint, direction: Vec3, film: bool) -> (u8, i64, i64) {
     let front = direction.dot(place.ng) < 0.0;
     let material = &scene.materials.list[place.material as usize];
     let rank = match (material.transmits(), material.thin, front) {
@@ -101,10 +101,10 @@ fn rank(scene: &Scene, place: &Place, direction: Vec3, film: bool) -> (u8, i64, 
 }
 
 /// Surfaces at one place.
-type Stack = SmallVec<[(Place, Hit); 4]>;
+type Stack = SmallVec<[(ContactPoint, Hit); 4]>;
 
 /// The surfaces at a place besides `at`, in no order.
-fn others(scene: &Scene, at: &Place, token: u32) -> Stack {
+fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
     let reach = at.error;
     let (origin, direction) = (at.p - at.ng * reach, at.ng);
     let mut others = Stack::new();
@@ -113,9 +113,9 @@ fn others(scene: &Scene, at: &Place, token: u32) -> Stack {
             return;
         }
         let Some(other) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
-        let one = |place: &Place| place.instance == other.instance && !face_each_other(place.ng, other.ng);
+        let one = |place: &ContactPoint| place.instance == other.instance && !face_each_other(place.ng, other.ng);
         if !one(at) && !others.iter().any(|(place, _)| one(place)) {
-            others.push((Place { error: reach, ..Place::of(&other) }, hit));
+            others.push((ContactPoint { error: reach, ..ContactPoint::of(&other) }, hit));
         }
     };
     scene.tracer.each_hit(&Ray { origin, direction, tmax: 2.0 * reach, token }, &mut add);
@@ -124,8 +124,8 @@ fn others(scene: &Scene, at: &Place, token: u32) -> Stack {
 
 /// Leaves out what touches an opaque surface of `stack` without a film of air, and whether there is a film.
 fn without_wetted(scene: &Scene, stack: &mut Stack) -> bool {
-    let material = |place: &Place| &scene.materials.list[place.material as usize];
-    let opaque = |place: &Place| !material(place).transmits();
+    let material = |place: &ContactPoint| &scene.materials.list[place.material as usize];
+    let opaque = |place: &ContactPoint| !material(place).transmits();
     let film = stack.iter().any(|(place, _)| opaque(place));
     if film {
         let wets = stack.iter().any(|(place, _)| opaque(place) && material(place).optical_contact);
@@ -135,7 +135,7 @@ fn without_wetted(scene: &Scene, stack: &mut Stack) -> bool {
 }
 
 /// The surfaces at the place where a ray along `direction` has met `met`, in order.
-fn stack(scene: &Scene, met: Place, hit: Hit, direction: Vec3, token: u32) -> Stack {
+fn stack(scene: &Scene, met: ContactPoint, hit: Hit, direction: Vec3, token: u32) -> Stack {
     let mut stack = others(scene, &met, token);
     if !stack.is_empty() {
         stack.push((met, hit));
@@ -146,9 +146,9 @@ fn stack(scene: &Scene, met: Place, hit: Hit, direction: Vec3, token: u32) -> St
 }
 
 /// The surfaces at a place that come after the one there for a ray along `direction`, in order.
-fn following(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Stack {
+fn following(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Stack {
     let mut others = others(scene, place, token);
-    let passes = |place: &Place| scene.materials.list[place.material as usize].transmits();
+    let passes = |place: &ContactPoint| scene.materials.list[place.material as usize].transmits();
     // A ray that leaves an opaque surface does not meet another one that coincides with it.
     others.retain(|(other, _)| passes(place) || passes(other));
     let own = (*place, Hit { t: 0.0, instance: place.instance, primitive: place.primitive, barycentric: [0.0; 2] });
@@ -167,21 +167,21 @@ fn surfaces<'a>(scene: &'a Scene, stack: &'a Stack) -> impl Iterator<Item = Surf
 
 #[cold]
 #[inline(never)]
-fn next(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Option<Hit> {
+fn next(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Option<Hit> {
     following(scene, place, direction, token).first().map(|(_, hit)| *hit)
 }
 
 /// Surfaces at a place that a ray along `direction` meets after the one there, in order.
 #[cold]
 #[inline(never)]
-pub fn after(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
+pub fn surfaces_after(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
     surfaces(scene, &following(scene, place, direction, token)).collect()
 }
 
 /// Surfaces at a place that a ray along `direction` has to pass before it reaches the one there, in order.
-pub fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
+pub fn surfaces_before(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
     // They come after it for light on its way back.
-    let mut back = after(scene, place, -direction, token);
+    let mut back = surfaces_after(scene, place, -direction, token);
     back.reverse();
     back
 }
@@ -189,24 +189,24 @@ pub fn before(scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Smal
 /// A surface that lies on one which a camera looks through along `direction`, and which it sees.
 #[cold]
 #[inline(never)]
-pub fn on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token: u32) -> Option<Surface> {
-    let others = others(scene, &Place::of(culled), token);
+pub fn visible_on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token: u32) -> Option<Surface> {
+    let others = others(scene, &ContactPoint::of(culled), token);
     surfaces(scene, &others).find(|other| !scene.culls(other, direction))
 }
 
 /// The surfaces along a ray, one after the other.
 #[derive(Clone, Copy)]
-pub struct Along {
+pub struct RaySurfaces {
     ray: Ray,
     /// Where the ray is, if there may be more.
-    here: Option<Place>,
+    here: Option<ContactPoint>,
 }
 
-impl Along {
+impl RaySurfaces {
     /// Starts at the ray's origin; `leaving`: where on a surface that is, if others lie on it.
     #[inline(always)]
-    pub fn new(ray: Ray, leaving: Option<Place>) -> Along {
-        Along { ray, here: leaving }
+    pub fn new(ray: Ray, leaving: Option<ContactPoint>) -> RaySurfaces {
+        RaySurfaces { ray, here: leaving }
     }
 
     /// What is left of the ray.
@@ -226,12 +226,12 @@ impl Along {
             return Some((Surface { touching: true, error: place.error, ..surface }, 0.0));
         }
         let hit = scene.tracer.intersect(&self.ray)?;
-        self.met(scene, &hit, inside)
+        self.surface_at(scene, &hit, inside)
     }
 
     /// [`Along::next`] where it is known which triangle the ray hits.
     #[inline(always)]
-    pub fn met(&self, scene: &Scene, hit: &Hit, inside: bool) -> Option<(Surface, f32)> {
+    pub fn surface_at(&self, scene: &Scene, hit: &Hit, inside: bool) -> Option<(Surface, f32)> {
         let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
         // From outside of all solids nothing is left before an opaque surface, unless a sheet lies on it.
         let alone = !passes(scene, &surface) && !inside && !scene.contacts.sheets;
@@ -246,14 +246,14 @@ impl Along {
         let next = surface.spawn(self.ray.direction);
         self.ray.tmax -= (next - self.ray.origin).dot(self.ray.direction);
         self.ray.origin = next;
-        self.here = Place::touching(surface);
+        self.here = ContactPoint::touching(surface);
     }
 }
 
 /// The first of the surfaces at the place where a ray has met `met`; `None` where that is alone.
 #[inline(never)]
 fn first(scene: &Scene, met: &Surface, hit: Hit, ray: &Ray) -> Option<Surface> {
-    let stack = stack(scene, Place::of(met), hit, ray.direction, ray.token);
+    let stack = stack(scene, ContactPoint::of(met), hit, ray.direction, ray.token);
     let (_, first) = stack.first()?;
     let surface = scene.shapes.surface(first.instance, first.primitive, first.barycentric)?;
     Some(Surface { touching: stack.len() > 1, error: met.error, ..surface })

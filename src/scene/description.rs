@@ -18,7 +18,7 @@ pub struct Description {
     /// Meshes in local space, each once however often it stands in the scene.
     pub meshes: Vec<Mesh>,
     /// Where they stand.
-    pub instances: Vec<Placed>,
+    pub instances: Vec<PlacedMesh>,
     /// Names of objects (nodes that carry a mesh).
     pub objects: Vec<String>,
     /// Materials.
@@ -38,18 +38,18 @@ pub struct Description {
     /// Group of its light.
     pub environment_light_group: Option<String>,
     /// The file's writer leaves light from infinity out, and nothing in the file says that there is none.
-    pub world_unsaid: bool,
+    pub environment_unknown: bool,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
     /// The picture that the scene was made for.
-    pub picture: Picture,
+    pub picture: PictureDefaults,
     /// Whatever was ignored or approximated, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
 }
 
 /// A mesh placed in the scene.
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct PlacedMesh {
     /// Name of the node.
     pub name: String,
     /// Index into [`Description::meshes`].
@@ -85,7 +85,7 @@ pub struct CameraDescription {
 
 /// The picture that a scene was made for: what is taken where the user asks for nothing else.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Picture {
+pub struct PictureDefaults {
     /// Width and height in pixels.
     pub resolution: Option<[u32; 2]>,
     /// Exposure in stops when it is looked at.

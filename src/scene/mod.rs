@@ -15,7 +15,7 @@ mod view;
 
 pub use contacts::Contacts;
 pub use description::Description;
-pub use nesting::{Nestings, OPEN, Stack};
+pub use nesting::{EMPTY_STACK, SolidStack, SolidStacks};
 pub use survey::Survey;
 pub use view::{Crop, MAX_SIZE, View};
 
@@ -25,7 +25,7 @@ use crate::light::{Emitter, Environment, Lights};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
-use description::{CameraDescription, GuessedUnits, Picture};
+use description::{CameraDescription, GuessedUnits, PictureDefaults};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ pub struct Scene {
     /// Geometry in Embree: all that has a body.
     pub tracer: Tracer,
     /// What glows without a body ([`crate::material::Material::null_bsdf`]), if anything does.
-    pub bodiless: Option<Tracer>,
+    pub pass_through_lights: Option<Tracer>,
     /// Lights.
     pub lights: Lights,
     /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].
@@ -56,11 +56,11 @@ pub struct Scene {
     /// In what units the numbers of punctual lights were taken, where that is a guess.
     pub guessed_units: Option<GuessedUnits>,
     /// Light from infinity may be missing: the file's writer leaves it out, and nothing there says that there is none.
-    pub world_unsaid: bool,
+    pub environment_unknown: bool,
     /// Cameras as described, in the file's order.
     pub cameras: Vec<CameraDescription>,
     /// The picture that the scene was made for.
-    pub picture: Picture,
+    pub picture: PictureDefaults,
     /// The medium that fills the space.
     pub medium: Option<MediumParameters>,
     /// How the materials scatter.
@@ -72,7 +72,7 @@ pub struct Scene {
     /// Ranks of the instances' solids, where several of one priority overlap: the highest fills the space.
     pub ranks: Arc<[u32]>,
     /// Deep stacks of solids that paths have been in.
-    pub nestings: Nestings,
+    pub solid_stacks: SolidStacks,
     /// Whatever was ignored or approximated, from the reader and from building.
     pub warnings: Vec<String>,
 }
@@ -100,17 +100,17 @@ impl Scene {
     ///
     /// # Errors
     /// Embree is out of memory.
-    pub fn dressed(
+    pub fn with_materials(
         &self,
         materials: Materials,
         medium: Option<MediumParameters>,
         environment: Option<Environment>,
     ) -> Result<Scene> {
-        build::dress(self, materials, medium, environment)
+        build::rebuild_with_materials(self, materials, medium, environment)
     }
 
     /// Whether a ray that enters a solid finds it there, where the solid's alpha decides about that.
-    pub fn is_there(&self, surface: &Surface, token: u32) -> bool {
+    pub fn solid_is_present(&self, surface: &Surface, token: u32) -> bool {
         let material = &self.materials.list[surface.material as usize];
         let chance = material.coverage(surface, &self.materials.textures);
         chance >= build::random_cutoff(token, surface.instance, u32::MAX)

@@ -10,15 +10,15 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{PoisonError, RwLock};
 
 /// The empty stack.
-pub const OPEN: u32 = u32::MAX;
+pub const EMPTY_STACK: u32 = u32::MAX;
 
 /// More stacks are taken for those of open meshes, which are entered and never left.
 const MOST: usize = 1 << 20;
 
 /// A stack of solids, each told by the instance through whose surface it was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stack {
-    /// Those entered before the last: a stack, or [`OPEN`].
+pub struct SolidStack {
+    /// Those entered before the last: a stack, or [`EMPTY_STACK`].
     pub outer: u32,
     /// The last.
     pub last: u32,
@@ -56,28 +56,28 @@ fn volume(mesh: &Mesh) -> f64 {
 
 /// The stacks that have been met in a scene.
 #[derive(Default)]
-pub struct Nestings {
+pub struct SolidStacks {
     stacks: RwLock<Stacks>,
 }
 
 #[derive(Default)]
 struct Stacks {
-    list: Vec<Stack>,
+    list: Vec<SolidStack>,
     index: HashMap<(u32, u32), u32>,
 }
 
-impl Nestings {
-    /// A stack that is not [`OPEN`].
+impl SolidStacks {
+    /// A stack that is not [`EMPTY_STACK`].
     #[cold]
     #[inline(never)]
-    pub fn get(&self, stack: u32) -> Stack {
+    pub fn get(&self, stack: u32) -> SolidStack {
         self.stacks.read().unwrap_or_else(PoisonError::into_inner).list[stack as usize]
     }
 
     /// `stack.outer` with one more. `None` where there are too many.
     #[cold]
     #[inline(never)]
-    pub fn push(&self, stack: Stack) -> Option<u32> {
+    pub fn push(&self, stack: SolidStack) -> Option<u32> {
         let key = (stack.outer, stack.last);
         if let Some(&known) = self.stacks.read().unwrap_or_else(PoisonError::into_inner).index.get(&key) {
             return Some(known);

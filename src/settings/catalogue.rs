@@ -2,7 +2,7 @@
 //! settings of USD, the panel of Blender's add-on, and tables in the documentation.
 
 use super::check::takes;
-use super::number::Range;
+use super::number::ValueRange;
 use super::parse::command;
 use crate::render::Method;
 use clap::{Arg, Command, ValueEnum};
@@ -12,19 +12,19 @@ use std::path::PathBuf;
 
 /// An option.
 #[derive(Clone, Debug, Serialize)]
-pub struct Entry {
+pub struct OptionDescription {
     /// Name of its field, as `max_depth`.
     pub name: String,
     /// Its name on the command line, as `--max-depth`.
     pub option: String,
     /// What it takes.
-    pub kind: Kind,
+    pub kind: ValueKind,
     /// What its values are called in the help, and how many of these there may be.
     pub values: Vec<String>,
     /// Its default, where it is one value.
     pub default: Option<String>,
     /// Range of a number.
-    pub range: Option<Range>,
+    pub range: Option<ValueRange>,
     /// Names to choose from, each with its help.
     pub choices: Vec<(String, String)>,
     /// Heading of the help.
@@ -46,7 +46,7 @@ pub struct Entry {
 /// What an option takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum ValueKind {
     /// Nothing: it is given or not.
     Flag,
     /// A whole number.
@@ -103,21 +103,21 @@ const ALSO_OF_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compressio
 const NOT_OF_STAGES: [&str; 6] = ["env", "model", "allow_outside", "strict", "photon_memory", "light_units"];
 
 /// Describes the options of a command, in the order of its help.
-pub fn describe(command: &Command) -> Vec<Entry> {
+pub fn describe(command: &Command) -> Vec<OptionDescription> {
     command.get_arguments().filter(|arg| arg.get_long().is_some() && arg.get_id() != "help").map(entry).collect()
 }
 
 /// The options that are arguments of Python's `render`, each by its name there.
-pub fn of_python() -> Vec<Entry> {
+pub fn of_python() -> Vec<OptionDescription> {
     describe(&command()).into_iter().filter(|entry| entry.python.is_some() && !entry.of_scene).collect()
 }
 
 /// The options of a scene, which are arguments of Python's `Scene`.
-pub fn of_scene() -> Vec<Entry> {
+pub fn of_scene() -> Vec<OptionDescription> {
     describe(&command()).into_iter().filter(|entry| entry.of_scene).collect()
 }
 
-fn entry(arg: &Arg) -> Entry {
+fn entry(arg: &Arg) -> OptionDescription {
     let name = arg.get_id().to_string();
     let choices = arg.get_possible_values();
     let help = |value: &clap::builder::PossibleValue| value.get_help().map(ToString::to_string).unwrap_or_default();
@@ -131,12 +131,12 @@ fn entry(arg: &Arg) -> Entry {
     });
     let heading = arg.get_help_heading().unwrap_or_default();
     let defaults = arg.get_default_values().iter().filter(|_| arg.get_action().takes_values());
-    Entry {
+    OptionDescription {
         option: format!("--{}", arg.get_long().unwrap_or_default()),
         kind,
         values: arg.get_value_names().unwrap_or_default().iter().map(ToString::to_string).collect(),
         default: defaults.map(|value| value.to_string_lossy().into_owned()).find(|value| !value.is_empty()),
-        range: arg.get::<Range>().cloned(),
+        range: arg.get::<ValueRange>().cloned(),
         choices: choices.iter().map(|value| (value.get_name().to_string(), help(value))).collect(),
         heading: heading.into(),
         help: arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default(),
@@ -149,24 +149,24 @@ fn entry(arg: &Arg) -> Entry {
     }
 }
 
-fn kind(arg: &Arg) -> Kind {
+fn kind(arg: &Arg) -> ValueKind {
     let parsed = arg.get_value_parser().type_id();
     let is = |types: &[TypeId]| types.iter().any(|one| parsed == *one);
     let choices = arg.get_possible_values();
     if !arg.get_action().takes_values() {
-        Kind::Flag
+        ValueKind::Flag
     } else if choices.iter().map(|value| value.get_name()).eq(["on", "off"]) {
-        Kind::Switch
+        ValueKind::Switch
     } else if !choices.is_empty() {
-        Kind::Choice
+        ValueKind::Choice
     } else if is(&[TypeId::of::<u32>(), TypeId::of::<u64>(), TypeId::of::<usize>()]) {
-        Kind::Integer
+        ValueKind::Integer
     } else if is(&[TypeId::of::<f64>()]) {
-        Kind::Number
+        ValueKind::Number
     } else if is(&[TypeId::of::<PathBuf>()]) {
-        Kind::Path
+        ValueKind::Path
     } else {
-        Kind::Text
+        ValueKind::Text
     }
 }
 
@@ -177,9 +177,9 @@ fn methods(option: &str) -> Vec<&'static str> {
     if names.len() == Method::value_variants().len() { Vec::new() } else { names }
 }
 
-fn of_stages(name: &str, heading: &str, kind: Kind) -> bool {
+fn of_stages(name: &str, heading: &str, kind: ValueKind) -> bool {
     let about_the_picture = OF_STAGES.contains(&heading) && !NOT_OF_STAGES.contains(&name);
-    kind != Kind::Path && (about_the_picture || ALSO_OF_STAGES.contains(&name))
+    kind != ValueKind::Path && (about_the_picture || ALSO_OF_STAGES.contains(&name))
 }
 
 #[cfg(test)]
@@ -214,7 +214,7 @@ mod tests {
         let all = describe(&command());
         let find = |name: &str| all.iter().find(|entry| entry.name == name).unwrap();
         let photons = find("photons");
-        assert_eq!((photons.kind, photons.option.as_str(), photons.stage), (Kind::Integer, "--photons", true));
+        assert_eq!((photons.kind, photons.option.as_str(), photons.stage), (ValueKind::Integer, "--photons", true));
         let range = serde_json::json!(photons.range);
         assert_eq!(range, serde_json::json!({"min": 1, "max": 50_000_000}));
         assert_eq!(photons.methods, ["pm", "ppm", "sppm", "appm", "cppm"]);
@@ -222,7 +222,10 @@ mod tests {
             serde_json::json!(find("alpha").range),
             serde_json::json!({"min": 0.0, "above_min": true, "max": 1.0})
         );
-        assert_eq!((find("guide").kind, find("model").stage, find("resume").kind), (Kind::Switch, false, Kind::Path));
+        assert_eq!(
+            (find("guide").kind, find("model").stage, find("resume").kind),
+            (ValueKind::Switch, false, ValueKind::Path)
+        );
         assert_eq!(find("method").default.as_deref(), Some("auto"));
     }
 }

@@ -1,7 +1,7 @@
 //! Which methods take which options, and what is said of an option that has no effect.
 
 use super::render::RenderOptions;
-use super::values::{BandwidthChoice, Switch};
+use super::values::{BandwidthChoice, OnOff};
 use crate::error::{Error, Result};
 use crate::render::{BandwidthRule, KernelChoice, Method, RadiusRule, Settings, Shard};
 use crate::transport::Indirect;
@@ -54,7 +54,7 @@ impl RenderOptions {
             ("cppm_beta", self.cppm_beta.is_some()),
             ("cppm_significance", self.cppm_significance.is_some()),
             ("cppm_plus", self.cppm_plus),
-            ("guide", self.guide == Some(Switch::On)),
+            ("guide", self.guide == Some(OnOff::On)),
             ("indirect", self.indirect == Some(Indirect::Paths)),
         ]
     }

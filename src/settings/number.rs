@@ -11,7 +11,7 @@ use std::str::FromStr;
 
 /// Range of an option's values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Range {
+pub struct ValueRange {
     /// The smallest value, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<Number>,
@@ -26,7 +26,7 @@ pub struct Range {
     pub below_max: bool,
 }
 
-impl ArgExt for Range {}
+impl ArgExt for ValueRange {}
 
 /// An option whose value is a number of a range: attributes of a field in a definition of options.
 pub trait Ranged {
@@ -44,7 +44,7 @@ impl Ranged for Arg {
         T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static,
     {
         let number = |end: &T| end.to_string().parse().ok();
-        let told = Range { min: number(range.start()), max: number(range.end()), ..Range::default() };
+        let told = ValueRange { min: number(range.start()), max: number(range.end()), ..ValueRange::default() };
         self.value_parser(whole(range)).add(told)
     }
 
@@ -53,7 +53,7 @@ impl Ranged for Arg {
             Included(x) | Excluded(x) => Number::from_f64(x),
             Unbounded => None,
         };
-        let told = Range {
+        let told = ValueRange {
             min: number(low),
             above_min: matches!(low, Excluded(_)),
             max: number(high),

@@ -9,7 +9,7 @@ use std::ffi::OsString;
 
 /// Why words are refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Invalid {
+pub struct InvalidOption {
     /// The option that is at fault, by the name of its field; empty where none is.
     pub option: String,
     /// What is wrong with it, or what it may be.
@@ -26,10 +26,10 @@ pub(super) fn command() -> Command {
 ///
 /// # Errors
 /// An unknown option, or a value that is out of range.
-pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<(RenderOptions, RunOptions), Invalid> {
+pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<(RenderOptions, RunOptions), InvalidOption> {
     let parsed = command().try_get_matches_from(words);
     let both = |matches| Ok((RenderOptions::from_arg_matches(&matches)?, RunOptions::from_arg_matches(&matches)?));
-    parsed.and_then(both).map_err(|error| Invalid::of(&error))
+    parsed.and_then(both).map_err(|error| InvalidOption::of(&error))
 }
 
 /// The value of a name, in which `_` stands for `-`, too.
@@ -47,8 +47,8 @@ fn listed(names: impl Iterator<Item = String>) -> String {
     format!("one of {}", names.map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", "))
 }
 
-impl Invalid {
-    fn of(error: &clap::Error) -> Invalid {
+impl InvalidOption {
+    fn of(error: &clap::Error) -> InvalidOption {
         let words = |kind| match error.get(kind) {
             Some(ContextValue::String(text)) => vec![text.clone()],
             Some(ContextValue::Strings(texts)) => texts.clone(),
@@ -65,7 +65,7 @@ impl Invalid {
             }
             _ => error.source().map_or_else(|| error.kind().to_string(), ToString::to_string),
         };
-        Invalid { option: name.replace('-', "_"), reason }
+        InvalidOption { option: name.replace('-', "_"), reason }
     }
 }
 
@@ -84,7 +84,7 @@ mod tests {
             ("--kernel=cone a.glb", "kernel", "one of 'box', 'epanechnikov', 'gaussian'"),
             ("--cppm-grid=9,9 a.glb", "cppm_grid", "there must be 2 to 64 cells"),
         ] {
-            let expected = Invalid { option: option.into(), reason: reason.into() };
+            let expected = InvalidOption { option: option.into(), reason: reason.into() };
             assert_eq!(parse(text).err(), Some(expected), "{text}");
         }
     }

@@ -8,7 +8,7 @@ use super::finish::FinishOptions;
 use super::frames::Frames;
 use super::number::Ranged;
 use super::scene::SceneOptions;
-use super::values::{BandwidthChoice, CropChoice, FrameSeed, GridChoice, MethodChoice, Switch, filter};
+use super::values::{BandwidthChoice, CropChoice, FrameSeed, GridChoice, MethodChoice, OnOff, filter};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
 use crate::estimator::InitialBandwidth;
@@ -98,7 +98,7 @@ pub struct RenderOptions {
     /// pilot finds them to matter; the light is the same, its noise another. Not for path, pm and --cppm-plus [default:
     /// off; auto: on where light is focused]
     #[arg(long, value_enum, help_heading = "Expert")]
-    pub guide: Option<Switch>,
+    pub guide: Option<OnOff>,
     /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves
     /// caustics to the photons [default: photons]
     #[arg(long, value_enum, help_heading = "Expert")]
@@ -183,7 +183,7 @@ impl RenderOptions {
         // Until `auto` has chosen: whatever the default of the library does not take, no candidate takes.
         let method = self.method.0.unwrap_or_default();
         let candidate =
-            Candidate { method, guided: self.guide == Some(Switch::On), indirect: self.indirect.unwrap_or_default() };
+            Candidate { method, guided: self.guide == Some(OnOff::On), indirect: self.indirect.unwrap_or_default() };
         self.settings_of(candidate, self.method.0)
     }
 
@@ -210,8 +210,8 @@ impl RenderOptions {
         let method = candidate.method;
         let guide = match self.guide {
             None => true,
-            Some(Switch::On) => candidate.guided || !method.guides(),
-            Some(Switch::Off) => !candidate.guided,
+            Some(OnOff::On) => candidate.guided || !method.guides(),
+            Some(OnOff::Off) => !candidate.guided,
         };
         let indirect = self.indirect.is_none_or(|asked| !method.gathers() || candidate.indirect == asked);
         // A network combines as many levels as it has learnt.

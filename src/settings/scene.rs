@@ -133,7 +133,7 @@ impl SceneOptions {
             light_units: self.light_units,
             glass: self.glass,
             allow_outside: self.allow_outside,
-            frame: self.frames.and_then(Frames::single).map(|number| gltf::Frame {
+            frame: self.frames.and_then(Frames::single).map(|number| gltf::FrameTime {
                 number,
                 rate: self.frame_rate,
                 of_sequence: self.of_sequence,

@@ -51,7 +51,7 @@ impl Serialize for MethodChoice {
 /// On or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Switch {
+pub enum OnOff {
     /// On
     On,
     /// Off

@@ -259,7 +259,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         if let Some((radiance, density)) =
             eye.scene.lights.emitted(&eye.scene.materials, &self.last, vertex.surface, vertex.wo)
         {
-            let group = eye.scene.lights.group_of(vertex.surface);
+            let group = eye.scene.lights.surface_group(vertex.surface);
             self.run_into((vertex.throughput * radiance, group), vertex.depth, vertex.surface.p, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
@@ -308,7 +308,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         let cos = glow.wo.dot(glow.surface.ng).abs();
         self.mis = self.mis.arrive(self.distance2(glow.distance, scattered), cos).fly(glow.flight);
         self.run_into(
-            (glow.throughput * radiance, lights.group_of(&glow.surface)),
+            (glow.throughput * radiance, lights.surface_group(&glow.surface)),
             glow.depth,
             glow.surface.p,
             &density,
@@ -358,7 +358,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         self.mis = self.mis.fly(flight);
         let lights = &self.shared.eye.scene.lights;
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
-        lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start, group| {
+        lights.for_each_infinite(&last, direction, scattered.is_none(), |radiance, direct, start, group| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
             self.run_into((throughput * radiance, group), 0, direction, &density);
         });

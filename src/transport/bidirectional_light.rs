@@ -111,7 +111,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
         if scattered.is_none() {
-            self.mis = self.mis.received(self.shared.eye.scene.lights.chosen_for(at, self.light));
+            self.mis = self.mis.received(self.shared.eye.scene.lights.choice_ratio(at, self.light));
         }
         self.mis = self.mis.arrive(distance2, cos).fly(flight);
     }

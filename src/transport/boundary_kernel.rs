@@ -16,7 +16,7 @@ use crate::math::{Frame, Vec3, warp};
 use crate::photon::Kernel;
 use crate::random::Purpose;
 use crate::scene::Scene;
-use crate::scene::contact::Along;
+use crate::scene::contact::RaySurfaces;
 use crate::trace::{Hit, Ray};
 use std::f32::consts::TAU;
 
@@ -65,9 +65,9 @@ impl Volume<'_> {
 /// Follows a ray behind `hit` and calls `lost` for all parts of it, as far as it goes, that are not in the medium.
 fn leave(scene: &Scene, ray: Ray, hit: Hit, interior: Interior, medium: u32, lost: &mut impl FnMut(f32, f32)) {
     let reach = ray.tmax;
-    let mut along = Along::new(ray, None);
+    let mut along = RaySurfaces::new(ray, None);
     let mut at = Whereabouts { interior, bodies: 0 };
-    let (mut met, mut outside) = (along.met(scene, &hit, true), None);
+    let (mut met, mut outside) = (along.surface_at(scene, &hit, true), None);
     for _ in 0..MAX_BORDERS {
         let Some((surface, t)) = met else { break };
         let distance = reach - along.ray().tmax + t;

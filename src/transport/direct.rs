@@ -96,18 +96,22 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
         End::Surface(arrival) => {
             reach = arrival.distance;
             let from = vertex.receiver();
-            if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &from, &arrival.surface, -sample.wi) {
+            if let Some((radiance, pdf)) =
+                scene.lights.hit_radiance(&scene.materials, &from, &arrival.surface, -sample.wi)
+            {
                 light = radiance * arrival.transmittance * weight(pdf);
             }
         }
         End::Escaped(left) => {
             let add = |radiance, pdf, _, _| light += radiance * left * weight(pdf);
-            scene.lights.escape(&vertex.receiver(), sample.wi, false, add);
+            scene.lights.for_each_infinite(&vertex.receiver(), sample.wi, false, add);
         }
         End::Medium(_) | End::Lost => {}
     }
     glows(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
-        if let Some((radiance, pdf)) = scene.lights.hit(&scene.materials, &vertex.receiver(), surface, -sample.wi) {
+        if let Some((radiance, pdf)) =
+            scene.lights.hit_radiance(&scene.materials, &vertex.receiver(), surface, -sample.wi)
+        {
             light += radiance * left * weight(pdf);
         }
     });

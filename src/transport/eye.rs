@@ -386,7 +386,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         self.sight = self.arrived(scattered);
         self.length += vertex.distance;
         let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
-        if let Some((radiance, pdf)) = lights.hit(materials, &from, surface, vertex.wo) {
+        if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, surface, vertex.wo) {
             let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
             self.run_into((radiance, vertex.throughput), pdf, scattered, density);
         }
@@ -427,7 +427,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let from =
             if scattered.is_none() { Receiver::anywhere(glow.surface.p + glow.wo * glow.distance) } else { self.last };
         self.sight = self.arrived(scattered);
-        if let Some((radiance, pdf)) = lights.hit(materials, &from, &glow.surface, glow.wo) {
+        if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &glow.surface, glow.wo) {
             let density = || Some(lights.emitted(materials, &from, &glow.surface, glow.wo)?.1);
             self.run_into((radiance, glow.throughput), pdf, scattered, density);
         }
@@ -496,7 +496,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let scene = self.scene;
         self.sight = self.arrived(scattered);
         let last = self.last;
-        scene.lights.escape(&last, direction, scattered.is_none(), |radiance, direct, start, _| {
+        scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |radiance, direct, start, _| {
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
             let density =
                 || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });

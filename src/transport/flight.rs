@@ -89,7 +89,7 @@ impl<V> Split<'_, V> {
     #[inline]
     fn lamp(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let (lamp, cone) = self.scene.lights.point(choice, point)?;
+        let (lamp, cone) = self.scene.lights.sample_point(choice, point)?;
         let lit = match cone {
             Some(cone) => cone.within(span.origin, span.direction, span.distance)?,
             None => [0.0, span.distance],

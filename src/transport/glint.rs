@@ -111,7 +111,7 @@ impl Glints {
     /// Levels, and the weight of this path in each, where it has run into light of some density.
     #[inline]
     pub fn weights(&self, density: &EmissionDensity) -> impl Iterator<Item = (usize, f32)> {
-        let density = PhotonFlags::straight(density.of_rays()).density();
+        let density = PhotonFlags::straight(density.ray_density()).density();
         let Merged { areas, order, count, .. } = self.at;
         let onward = self.onward;
         (0..count).map(move |k| (usize::from(order[k]), 1.0 / (1.0 + areas[k] * density * onward)))
@@ -234,7 +234,7 @@ mod tests {
                     wi: sample.wi,
                     ng: Vec3::Z,
                     flux,
-                    flags: PhotonFlags::straight(density.of_rays()),
+                    flags: PhotonFlags::straight(density.ray_density()),
                     ..Photon::default()
                 };
                 let mut glints = Glints::NONE;

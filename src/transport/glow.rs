@@ -37,7 +37,7 @@ pub(super) fn glows(
     from_medium: bool,
     mut each: impl FnMut(&Surface, f32, Rgb, Flight),
 ) {
-    if let Some(bodiless) = &scene.bodiless {
+    if let Some(pass_through_lights) = &scene.pass_through_lights {
         let Start { origin, direction, token, .. } = *start;
         let mut met = |hit: Hit| {
             let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
@@ -47,6 +47,6 @@ pub(super) fn glows(
                 each(&surface, hit.t, way.left, way.flight);
             }
         };
-        bodiless.each_hit(&Ray { origin, direction, tmax: reach, token }, &mut met);
+        pass_through_lights.each_hit(&Ray { origin, direction, tmax: reach, token }, &mut met);
     }
 }

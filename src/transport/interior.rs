@@ -9,8 +9,8 @@
 
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
-use crate::scene::contact::{self, Place};
-use crate::scene::{OPEN, Scene, Stack};
+use crate::scene::contact::{self, ContactPoint};
+use crate::scene::{EMPTY_STACK, Scene, SolidStack};
 use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 use smallvec::SmallVec;
@@ -34,7 +34,7 @@ struct Boundary {
 pub struct Interior {
     inside: [u32; INNERMOST],
     len: u8,
-    /// Those entered before: a stack of the scene's [`crate::scene::Nestings`], or [`OPEN`]; where there are some,
+    /// Those entered before: a stack of the scene's [`crate::scene::SolidStacks`], or [`EMPTY_STACK`]; where there are some,
     /// `inside` is full.
     outer: u32,
 }
@@ -48,7 +48,7 @@ impl PartialEq for Interior {
 impl Default for Interior {
     /// The open space.
     fn default() -> Interior {
-        Interior { inside: [0; INNERMOST], len: 0, outer: OPEN }
+        Interior { inside: [0; INNERMOST], len: 0, outer: EMPTY_STACK }
     }
 }
 
@@ -100,7 +100,7 @@ impl Interior {
             self.fill(scene);
             return true;
         }
-        if self.outer == OPEN {
+        if self.outer == EMPTY_STACK {
             return false;
         }
         let left = without(scene, self.outer, object_of(instance));
@@ -111,8 +111,8 @@ impl Interior {
     /// Takes one of the others back where there is room.
     #[inline]
     fn fill(&mut self, scene: &Scene) {
-        if self.outer != OPEN {
-            let Stack { outer, last, .. } = scene.nestings.get(self.outer);
+        if self.outer != EMPTY_STACK {
+            let SolidStack { outer, last, .. } = scene.solid_stacks.get(self.outer);
             self.inside.copy_within(..INNERMOST - 1, 1);
             (self.inside[0], self.outer) = (last, outer);
             self.len += 1;
@@ -158,13 +158,13 @@ impl Interior {
     /// No solid is around here.
     #[inline(always)]
     pub fn is_open(&self) -> bool {
-        self.len == 0 && self.outer == OPEN
+        self.len == 0 && self.outer == EMPTY_STACK
     }
 
     /// Where a light path starts on a light that lies on solids, before it enters the first of them: without those.
     #[cold]
-    pub fn before(mut self, scene: &Scene, place: &Place, direction: Vec3, token: u32) -> Interior {
-        for surface in contact::after(scene, place, direction, token) {
+    pub fn before(mut self, scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Interior {
+        for surface in contact::surfaces_after(scene, place, direction, token) {
             if direction.dot(surface.ng) < 0.0 {
                 self.remove(scene, surface.instance);
             }
@@ -183,7 +183,7 @@ impl Interior {
     pub fn host(&self, scene: &Scene) -> Option<u32> {
         // `max_by_key` keeps the last of equals, which belong to one object.
         let inner = self.entries().iter().copied().max_by_key(|&instance| strength(scene, instance));
-        if self.outer == OPEN { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
+        if self.outer == EMPTY_STACK { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
     }
 
     /// Absorption and scattering here.
@@ -224,24 +224,24 @@ fn strength(scene: &Scene, instance: u32) -> (i32, u32) {
 
 /// Which fills the space: the host of a stack or `inner`, which was entered later.
 fn stronger(scene: &Scene, stack: u32, inner: u32) -> u32 {
-    if stack == OPEN {
+    if stack == EMPTY_STACK {
         return inner;
     }
-    let outer = scene.nestings.get(stack).host;
+    let outer = scene.solid_stacks.get(stack).host;
     if strength(scene, outer) > strength(scene, inner) { outer } else { inner }
 }
 
 /// A stack with one more solid.
 fn pushed(scene: &Scene, outer: u32, last: u32) -> Option<u32> {
-    scene.nestings.push(Stack { outer, last, host: stronger(scene, outer, last) })
+    scene.solid_stacks.push(SolidStack { outer, last, host: stronger(scene, outer, last) })
 }
 
 /// A stack without the last solid of an object; `None` where it has none.
 fn without(scene: &Scene, stack: u32, object: u32) -> Option<u32> {
-    if stack == OPEN {
+    if stack == EMPTY_STACK {
         return None;
     }
-    let Stack { outer, last, .. } = scene.nestings.get(stack);
+    let SolidStack { outer, last, .. } = scene.solid_stacks.get(stack);
     if scene.shapes.instances[last as usize].object == object {
         return Some(outer);
     }

@@ -12,7 +12,7 @@ use crate::photon::{ByKind, Kind, Photon, PhotonFlags, ThinningKey, VolumePhoton
 use crate::plan::ClassSet;
 use crate::random::{Domain, GOLDEN, Purpose, SobolPair, Stream, Streams, mix};
 use crate::scene::Scene;
-use crate::scene::contact::Place;
+use crate::scene::contact::ContactPoint;
 use crate::spectrum::{Band, IterationWavelengths, WavelengthSample};
 use crate::stop::Stop;
 use bumpalo::Bump;
@@ -177,9 +177,9 @@ impl<'a> LightPass<'a> {
             }
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
-                lights.aim_or_light(&mut emission, self.region, choice.y as f32, point);
+                lights.aim_with_region(&mut emission, self.region, choice.y as f32, point);
                 let (mixed, unaimed) = lights.lit(&emission, self.region);
-                let (emission, _) = emission.drawn_with(mixed)?;
+                let (emission, _) = emission.reweighted(mixed)?;
                 (emission, guide::UNGUIDED, 1.0, 1.0, unaimed / mixed)
             }
         };
@@ -192,7 +192,7 @@ impl<'a> LightPass<'a> {
         }
         let (origin, direction) = (emission.origin, emission.direction);
         let mut interior = initial_media.light(scene, emission.light, origin);
-        let leaving = Place::on_light(scene, emission.light, origin);
+        let leaving = ContactPoint::on_light(scene, emission.light, origin);
         if let Some(place) = &leaving {
             interior = interior.before(scene, place, direction, token(scene, stream.vertex(0), Purpose::Alpha));
         }
@@ -281,7 +281,7 @@ impl<'a> Deposit<'a> {
             flags: if emitted.delta {
                 PhotonFlags::UNREACHABLE
             } else {
-                PhotonFlags::straight(emitted.density.of_rays())
+                PhotonFlags::straight(emitted.density.ray_density())
             },
             within: false,
             thinned: false,

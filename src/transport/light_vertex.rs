@@ -7,7 +7,7 @@ use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::plan::LightPrefix;
-use crate::scene::contact::Place;
+use crate::scene::contact::ContactPoint;
 
 /// How a light path's vertex scatters.
 // Boxing the large variant would allocate once per vertex.
@@ -68,9 +68,9 @@ impl LightVertex<'_> {
 
     /// The surface it is on, if others lie on that.
     #[inline]
-    pub fn touching(&self) -> Option<Place> {
+    pub fn touching(&self) -> Option<ContactPoint> {
         match &self.scatterer {
-            Scatterer::Surface(surface, _) => Place::touching(surface),
+            Scatterer::Surface(surface, _) => ContactPoint::touching(surface),
             Scatterer::Medium(..) => None,
         }
     }

@@ -112,8 +112,10 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         look(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &from, vertex.surface, vertex.wo) {
-            let of = (self.trail.sight.lit(false), self.scene.lights.group_of(vertex.surface));
+        if let Some((radiance, pdf)) =
+            self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
+        {
+            let of = (self.trail.sight.lit(false), self.scene.lights.surface_group(vertex.surface));
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { eye: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
@@ -132,11 +134,12 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         if let Some(scattered) = scattered {
             trail.scattered(scattered.lobe);
         }
-        if let Some((radiance, pdf)) = self.scene.lights.hit(&self.scene.materials, &self.last, &glow.surface, glow.wo)
+        if let Some((radiance, pdf)) =
+            self.scene.lights.hit_radiance(&self.scene.materials, &self.last, &glow.surface, glow.wo)
         {
             let weight = Self::weight(scattered, pdf);
             let light = glow.throughput * radiance * weight;
-            let of = (trail.sight.lit(false), self.scene.lights.group_of(&glow.surface));
+            let of = (trail.sight.lit(false), self.scene.lights.surface_group(&glow.surface));
             self.add(Technique::Hit { eye: glow.depth }, of, light, weight);
         }
     }
@@ -157,7 +160,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         let class = self.trail.sight.lit(false);
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
         let last = self.last;
-        scene.lights.escape(&last, direction, scattered.is_none(), |light, pdf, _, group| {
+        scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |light, pdf, _, group| {
             let weight = Self::weight(scattered, pdf);
             self.add(technique, (class, group), throughput * light * weight, weight);
         });

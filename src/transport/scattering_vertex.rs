@@ -10,7 +10,7 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::HenyeyGreenstein;
 use crate::random::Draws;
 use crate::scene::Scene;
-use crate::scene::contact::{self, Place};
+use crate::scene::contact::{self, ContactPoint};
 use crate::spectrum::Wavelength;
 
 /// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is
@@ -60,7 +60,7 @@ pub trait ScatterPoint {
 
     /// The surface it is on, if others lie on that.
     #[inline]
-    fn touching(&self) -> Option<Place> {
+    fn touching(&self) -> Option<ContactPoint> {
         None
     }
 
@@ -73,7 +73,7 @@ pub trait ScatterPoint {
     /// [`ScatterPoint::shadow_ray`] to a light.
     #[inline]
     fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample, token: u32) -> ShadowRay {
-        let reaching = light.target.and_then(|target| Place::on_light(scene, light.light, target));
+        let reaching = light.target.and_then(|target| ContactPoint::on_light(scene, light.light, target));
         self.shadow_ray_to(scene, light.wi, light.target, token, false, reaching)
     }
 
@@ -86,7 +86,7 @@ pub trait ScatterPoint {
         target: Option<Vec3>,
         token: u32,
         to_medium: bool,
-        reaching: Option<Place>,
+        reaching: Option<ContactPoint>,
     ) -> ShadowRay {
         let origin = self.spawn(wi);
         let (direction, tmax) = match target {
@@ -122,7 +122,7 @@ impl ScatterPoint for Vertex<'_, '_> {
 
     #[inline]
     fn is_culled(&self, scene: &Scene, wi: Vec3) -> bool {
-        scene.culls(self.surface, -wi) && contact::on_culled(scene, self.surface, -wi, 0).is_none()
+        scene.culls(self.surface, -wi) && contact::visible_on_culled(scene, self.surface, -wi, 0).is_none()
     }
 
     #[inline]
@@ -186,8 +186,8 @@ impl ScatterPoint for Vertex<'_, '_> {
     }
 
     #[inline]
-    fn touching(&self) -> Option<Place> {
-        Place::touching(self.surface)
+    fn touching(&self) -> Option<ContactPoint> {
+        ContactPoint::touching(self.surface)
     }
 
     #[inline]

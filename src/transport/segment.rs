@@ -8,7 +8,7 @@ use crate::math::{Rgb, Vec3};
 use crate::medium::Flight;
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
-use crate::scene::contact::{self, Along, Place};
+use crate::scene::contact::{self, ContactPoint, RaySurfaces};
 use crate::trace::{CAMERA, Hit, Ray};
 
 /// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a
@@ -181,7 +181,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     let crossing = interior.crossing(scene, surface.instance, entering);
     // A ray that has passed the solid's front as if it were not there is not in it, and leaves it unseen.
     if material.has_alpha_per_entry()
-        && if entering { !scene.is_there(surface, token) } else { crossing.interior == *interior }
+        && if entering { !scene.solid_is_present(surface, token) } else { crossing.interior == *interior }
     {
         return Boundary::None(Rgb::ONE, *interior);
     }
@@ -231,7 +231,7 @@ pub struct Start {
     /// The solids around its start.
     pub interior: Interior,
     /// The surface that it leaves, if others lie on that.
-    pub leaving: Option<Place>,
+    pub leaving: Option<ContactPoint>,
     /// Decides about cut-outs.
     pub token: u32,
 }
@@ -246,13 +246,13 @@ pub fn next_surface(scene: &Scene, start: Start) -> End {
 #[inline(always)]
 pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &PrecomputedHit, through: &mut T) -> End {
     let Start { origin, direction, mut interior, leaving, token } = start;
-    let mut along = Along::new(Ray { origin, direction, tmax: f32::INFINITY, token }, leaving);
+    let mut along = RaySurfaces::new(Ray { origin, direction, tmax: f32::INFINITY, token }, leaving);
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
     for crossed in 0..MAX_NULL_CROSSINGS {
         let met = match known {
             PrecomputedHit::Nothing if crossed == 0 => None,
-            PrecomputedHit::Hit(hit) if crossed == 0 => along.met(scene, hit, !interior.is_open()),
+            PrecomputedHit::Hit(hit) if crossed == 0 => along.surface_at(scene, hit, !interior.is_open()),
             _ => along.next(scene, !interior.is_open()),
         };
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
@@ -280,7 +280,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
         }
         distance += t;
         if token & CAMERA != 0 && scene.culls(&surface, direction) {
-            let Some(other) = contact::on_culled(scene, &surface, direction, token) else {
+            let Some(other) = contact::visible_on_culled(scene, &surface, direction, token) else {
                 along.pass(&surface);
                 continue;
             };
@@ -339,7 +339,7 @@ pub struct Between {
     /// Distance to the end; may be infinite.
     pub tmax: f32,
     /// The surface at the end, if others lie on that.
-    pub reaching: Option<Place>,
+    pub reaching: Option<ContactPoint>,
     /// Whether the way starts and ends at a vertex of a medium.
     pub in_medium: [bool; 2],
 }
@@ -365,14 +365,14 @@ pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
 /// The same through boundaries that do not scatter.
 fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
-    let mut along = Along::new(Ray { origin, direction, tmax, token }, leaving);
+    let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
     let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {
             way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
             let Some(place) = reaching else { return way };
-            for surface in &contact::before(scene, &place, direction, token) {
+            for surface in &contact::surfaces_before(scene, &place, direction, token) {
                 match boundary(scene, surface, &interior, direction, token) {
                     Boundary::Scattering(..) => return ShadowRay::BLOCKED,
                     Boundary::None(tint, behind) => (way.left, interior) = (way.left * tint, behind),
@@ -386,7 +386,7 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
         }
         // Towards the lens, so that the lens sees its other side.
         if token & CAMERA != 0 && scene.culls(&surface, -direction) {
-            let Some(other) = contact::on_culled(scene, &surface, -direction, token) else {
+            let Some(other) = contact::visible_on_culled(scene, &surface, -direction, token) else {
                 along.pass(&surface);
                 continue;
             };

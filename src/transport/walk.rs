@@ -15,7 +15,7 @@ use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::Flight;
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
-use crate::scene::contact::Place;
+use crate::scene::contact::ContactPoint;
 use crate::spectrum::{Wavelength, WavelengthSample};
 use bumpalo::Bump;
 
@@ -31,7 +31,7 @@ pub struct PathStart {
     /// The solids the origin is in.
     pub interior: Interior,
     /// The surface that the first ray leaves, if others lie on that.
-    pub leaving: Option<Place>,
+    pub leaving: Option<ContactPoint>,
     /// What the first ray meets, if it has been traced already.
     pub first: PrecomputedHit,
     /// It has come from infinity.
@@ -180,7 +180,7 @@ struct Path<'a> {
     /// The last vertex lies in a medium.
     in_medium: bool,
     /// Where it leaves a surface.
-    leaving: Option<Place>,
+    leaving: Option<ContactPoint>,
     wavelength: Option<Wavelength>,
 }
 
@@ -211,7 +211,7 @@ impl<'a> Path<'a> {
             flight = fly.flight;
             end
         };
-        if self.transport == Transport::Radiance && scene.bodiless.is_some() {
+        if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
             show_glows(scene, &start, &end, (self.in_medium, throughput, depth), scattered, visitor);
         }
         if BESIDES >= SCATTERING
@@ -338,7 +338,7 @@ impl<'a> Path<'a> {
         }
         self.direction = sample.wi;
         self.origin = surface.spawn(sample.wi);
-        (self.in_medium, self.leaving) = (false, Place::touching(surface));
+        (self.in_medium, self.leaving) = (false, ContactPoint::touching(surface));
         self.interior = if sample.transmitted { behind } else { here };
         Some(())
     }

@@ -8,7 +8,7 @@ mod switch;
 
 use caustique::math::{DVec3, Vec3};
 use caustique::plan::switch::Removed;
-use caustique::plan::{Asked, Plan, Search, Switches};
+use caustique::plan::{Plan, PlanRequest, Search, Switches};
 use caustique::scene::Description;
 use support::scenes::{add, build, look_at, matte, quad, square};
 
@@ -32,7 +32,7 @@ fn plan_to(description: Description, search: Search, max_depth: Option<u32>) -> 
     let camera = scene.camera(&square(64)).expect("there is a camera");
     let removed = Removed::default();
     let asked =
-        Asked { method: "any", because: "", search, max_depth, switches: Switches::default(), removed: &removed };
+        PlanRequest { method: "any", because: "", search, max_depth, switches: Switches::default(), removed: &removed };
     Plan::new(&scene, &camera, &asked)
 }
 

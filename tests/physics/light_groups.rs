@@ -104,7 +104,7 @@ fn light_of_no_group_is_left_out_and_layers_bear_the_names() {
         instances: plain
             .instances
             .into_iter()
-            .map(|placed| caustique::scene::description::Placed { light_group: None, ..placed })
+            .map(|placed| caustique::scene::description::PlacedMesh { light_group: None, ..placed })
             .collect(),
         lights: plain.lights.into_iter().map(|light| PunctualLight { light_group: None, ..light }).collect(),
         ..plain

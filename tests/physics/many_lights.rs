@@ -94,7 +94,7 @@ fn irradiance_is_that_of_all_lamps_and_the_nearest_are_asked_most() {
         least = least.min((power_error / error).powi(2));
         // Planted: the sky divided by the probability of choosing it for emission.
         let sky = (0..).zip(scene.lights.emitters()).find(|(_, e)| e.is_infinite()).map_or(0, |(i, _)| i);
-        let chosen = f64::from(scene.lights.chosen_for(&receiver, sky));
+        let chosen = f64::from(scene.lights.choice_ratio(&receiver, sky));
         let wrong = |light: &DirectSample| if light.target.is_none() { chosen } else { 1.0 };
         let values = estimates(&scene, &receiver, 50_000, wrong);
         let (mean, error) = mean_and_error(&values);

@@ -524,7 +524,7 @@ impl<'a> Lab<'a> {
         let square = |d: f32| f64::from(d) * f64::from(d);
         for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
             let density = emitted.as_ref().zip(from_light.first()).map(|(e, met)| EmissionDensity {
-                direct: e.density.start * scene.lights.chosen_for(&met.receiver(), e.light),
+                direct: e.density.start * scene.lights.choice_ratio(&met.receiver(), e.light),
                 ..e.density
             });
             let infinity =
@@ -545,7 +545,7 @@ impl<'a> Lab<'a> {
                     let direction = eye_notes.escaped.expect("an escape");
                     let met = from_eye[from_eye.len() - 1];
                     whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
-                    scene.lights.escape(&met.receiver(), direction, false, |_, direct, start, _| {
+                    scene.lights.for_each_infinite(&met.receiver(), direction, false, |_, direct, start, _| {
                         (whole.light.direct, whole.light.start) = (direct, start);
                     });
                     whole.segment(1.0, None);
@@ -575,7 +575,7 @@ impl<'a> Lab<'a> {
                         None => EmissionDensity {
                             direct: sample.pdf_w,
                             start: sample.pdf_w
-                                / environment.map_or(1.0, |light| scene.lights.chosen_for(&met.receiver(), light)),
+                                / environment.map_or(1.0, |light| scene.lights.choice_ratio(&met.receiver(), light)),
                             onward: scene.lights.entry_pdf_a(met.p, sample.wi),
                             ..infinity
                         },

@@ -5,7 +5,7 @@ use super::world::World;
 use super::write::glb;
 use crate::support::stats::mean_and_error;
 use caustique::plan::switch::Removed;
-use caustique::plan::{Asked, Effect, EffectPlan, Plan, Switches};
+use caustique::plan::{Effect, EffectPlan, Plan, PlanRequest, Switches};
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::gltf::{self, ReadOptions};
 use caustique::scene::{Crop, Description, Scene, View};
@@ -156,7 +156,7 @@ fn means(rendered: &Rendered, window: Option<[u32; 4]>) -> Vec<f64> {
 /// of a set may hold such a sample, and the estimated standard error of all others lacks them, too.
 pub fn finds_all(world: &World, scene: &Scene, shot: &Shot) -> bool {
     let removed = Removed::default();
-    let asked = Asked {
+    let asked = PlanRequest {
         method: shot.method.name(),
         because: "",
         search: shot.method.search(),

@@ -5,7 +5,9 @@ use caustique::geometry::Mesh;
 use caustique::material::Material;
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec3};
 use caustique::plan::ClassSet;
-use caustique::scene::description::{CameraDescription, Description, Placed, Projection, PunctualKind, PunctualLight};
+use caustique::scene::description::{
+    CameraDescription, Description, PlacedMesh, Projection, PunctualKind, PunctualLight,
+};
 use caustique::scene::{Scene, View};
 use caustique::transport::{Eye, Indirect, InitialMedia};
 
@@ -37,7 +39,7 @@ pub fn add(description: &mut Description, name: &str, mesh: Mesh, material: Mate
 
 /// Adds a mesh with its own material, placed.
 pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: Material, to_world: DAffine3) {
-    description.instances.push(Placed {
+    description.instances.push(PlacedMesh {
         name: name.into(),
         mesh: description.meshes.len() as u32,
         material: description.materials.len() as u32,

@@ -5,8 +5,8 @@ use crate::error::usage;
 use crate::keywords::{Keywords, choice};
 use caustique::error::Error;
 use caustique::pipeline::finish;
-use caustique::settings::catalogue::{Entry, Kind, of_python, of_scene};
-use caustique::settings::{FrameSeed, Invalid, RenderOptions, RunOptions, SceneOptions, parse};
+use caustique::settings::catalogue::{OptionDescription, ValueKind, of_python, of_scene};
+use caustique::settings::{FrameSeed, InvalidOption, RenderOptions, RunOptions, SceneOptions, parse};
 use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -17,26 +17,26 @@ const OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
 const COMMON: [&str; 2] = ["seed", "max_depth"];
 
 /// Options of `render`.
-pub fn of_render() -> Vec<Entry> {
+pub fn of_render() -> Vec<OptionDescription> {
     of_python()
 }
 
 /// Options of `plan`: those about the picture and the way to it.
-pub fn of_plan() -> Vec<Entry> {
+pub fn of_plan() -> Vec<OptionDescription> {
     chosen(|entry| !["Output", "Running"].contains(&entry.heading.as_str()))
 }
 
 /// Options of one run of a comparison.
-pub fn of_run() -> Vec<Entry> {
+pub fn of_run() -> Vec<OptionDescription> {
     chosen(|entry| OF_RUN.contains(&entry.heading.as_str()) && !COMMON.contains(&entry.name.as_str()))
 }
 
 /// Options of these names.
-pub fn named(names: &[&str]) -> Vec<Entry> {
+pub fn named(names: &[&str]) -> Vec<OptionDescription> {
     chosen(|entry| names.contains(&entry.name.as_str()))
 }
 
-fn chosen(wanted: impl Fn(&Entry) -> bool) -> Vec<Entry> {
+fn chosen(wanted: impl Fn(&OptionDescription) -> bool) -> Vec<OptionDescription> {
     of_python().into_iter().filter(wanted).collect()
 }
 
@@ -57,7 +57,7 @@ pub fn missing(error: &Error) -> String {
 /// An argument is of another type or out of range.
 pub fn take(
     keywords: &mut Keywords<'_>,
-    options: &[Entry],
+    options: &[OptionDescription],
     scene: &SceneOptions,
 ) -> PyResult<(RenderOptions, RunOptions)> {
     let (mut render, run) = parsed(keywords, options, Vec::new())?;
@@ -86,7 +86,7 @@ pub fn single(method: &str, has_levels: bool) -> PyResult<RenderOptions> {
 
 fn parsed(
     keywords: &mut Keywords<'_>,
-    options: &[Entry],
+    options: &[OptionDescription],
     more: Vec<OsString>,
 ) -> PyResult<(RenderOptions, RunOptions)> {
     let mut words = more;
@@ -98,7 +98,11 @@ fn parsed(
 }
 
 /// The error of an argument that the library refuses.
-fn refused(keywords: &Keywords<'_>, options: &[Entry], Invalid { option, reason }: &Invalid) -> PyErr {
+fn refused(
+    keywords: &Keywords<'_>,
+    options: &[OptionDescription],
+    InvalidOption { option, reason }: &InvalidOption,
+) -> PyErr {
     let entry = options.iter().find(|entry| entry.name == *option);
     let name = entry.and_then(|entry| entry.python.as_deref()).unwrap_or(option);
     let fault = if reason.starts_with("one of") { "does not exist" } else { "is not valid" };
@@ -106,7 +110,7 @@ fn refused(keywords: &Keywords<'_>, options: &[Entry], Invalid { option, reason 
 }
 
 /// The words of the command line that an argument stands for.
-fn words(keywords: &mut Keywords<'_>, entry: &Entry) -> PyResult<Vec<OsString>> {
+fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec<OsString>> {
     let name = entry.python.as_deref().unwrap_or(&entry.name);
     let option = &entry.option;
     let word = |text: OsString| {
@@ -116,17 +120,17 @@ fn words(keywords: &mut Keywords<'_>, entry: &Entry) -> PyResult<Vec<OsString>> 
     };
     let given = match entry.kind {
         _ if keywords.has_taken(name) => None,
-        Kind::Flag => {
+        ValueKind::Flag => {
             // `finish=False` is `--no-combine`.
             let flag = name != "finish";
             keywords.take::<bool>(name)?.filter(|on| *on == flag).map(|_| vec![OsString::from(option)])
         }
-        Kind::Switch => keywords.take::<bool>(name)?.map(|on| word(if on { "on" } else { "off" }.into())),
-        Kind::Integer => keywords.take::<u64>(name)?.map(|number| word(number.to_string().into())),
-        Kind::Number => keywords.take::<f64>(name)?.map(|number| word(format!("{number:?}").into())),
-        Kind::Choice => keywords.take::<String>(name)?.map(|text| word(text.into())),
-        Kind::Path => keywords.take::<PathBuf>(name)?.map(|path| word(path.into())),
-        Kind::Text => match keywords.take::<Bound<'_, PyAny>>(name)? {
+        ValueKind::Switch => keywords.take::<bool>(name)?.map(|on| word(if on { "on" } else { "off" }.into())),
+        ValueKind::Integer => keywords.take::<u64>(name)?.map(|number| word(number.to_string().into())),
+        ValueKind::Number => keywords.take::<f64>(name)?.map(|number| word(format!("{number:?}").into())),
+        ValueKind::Choice => keywords.take::<String>(name)?.map(|text| word(text.into())),
+        ValueKind::Path => keywords.take::<PathBuf>(name)?.map(|path| word(path.into())),
+        ValueKind::Text => match keywords.take::<Bound<'_, PyAny>>(name)? {
             None => None,
             Some(value) => Some(match texts(&value)? {
                 // An option of several values, such as `--filter gaussian 2`.

@@ -23,7 +23,7 @@ use caustique::plan::Plan;
 use caustique::render::auto::Choice;
 use caustique::render::output::shape_of;
 use caustique::render::{Progress, Rendered, Settings};
-use caustique::scene::description::Picture;
+use caustique::scene::description::PictureDefaults;
 use caustique::scene::{Scene, Survey};
 use caustique::stop::Stop;
 use preview::Preview;
@@ -95,7 +95,7 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
         seconds: 0.0,
         estimate: None,
         reason_if_black: String::new(),
-        made_for: Picture::default(),
+        made_for: PictureDefaults::default(),
     };
     let delivery = pipeline::render(order, &mut told)?;
     told.deliver(delivery)
@@ -119,7 +119,7 @@ struct Telling<'a> {
     /// Why the picture is black, should it be.
     reason_if_black: String,
     /// The picture that the scene was made for.
-    made_for: Picture,
+    made_for: PictureDefaults,
 }
 
 impl Watch for Telling<'_> {

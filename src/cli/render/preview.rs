@@ -7,7 +7,7 @@ use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, Attributes, Compression, Frame};
 use caustique::image::png;
 use caustique::render::Clock;
-use caustique::scene::description::Picture;
+use caustique::scene::description::PictureDefaults;
 use serde::Serialize;
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
@@ -80,7 +80,7 @@ pub struct Preview<'a> {
     look: &'a PictureArgs,
     /// The picture's name in tev: the output's path.
     name: String,
-    made_for: Picture,
+    made_for: PictureDefaults,
     clock: Clock,
     /// When the next picture is due, and since when the current one is made (seconds).
     next: f64,
@@ -92,7 +92,7 @@ pub struct Preview<'a> {
 
 impl<'a> Preview<'a> {
     /// A preview of the picture that is written to `output`.
-    pub fn new(target: &'a Target, output: &Path, look: &'a PictureArgs, made_for: Picture) -> Preview<'a> {
+    pub fn new(target: &'a Target, output: &Path, look: &'a PictureArgs, made_for: PictureDefaults) -> Preview<'a> {
         let name = output.display().to_string();
         Preview { target, look, name, made_for, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false }
     }

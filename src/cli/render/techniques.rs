@@ -6,7 +6,7 @@ use caustique::film::{Layer, LayerSet};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::render::TechniquePicture;
-use caustique::scene::description::Picture;
+use caustique::scene::description::PictureDefaults;
 use std::path::Path;
 
 /// Makes the folder.
@@ -24,7 +24,12 @@ pub fn prepare(args: &RenderArgs) -> Result<()> {
 ///
 /// # Errors
 /// The file system.
-pub fn write(args: &RenderArgs, size: (usize, usize), pictures: &[TechniquePicture], made_for: &Picture) -> Result<()> {
+pub fn write(
+    args: &RenderArgs,
+    size: (usize, usize),
+    pictures: &[TechniquePicture],
+    made_for: &PictureDefaults,
+) -> Result<()> {
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     for picture in pictures {
         for (values, kind) in [(&picture.weighted, "weighted"), (&picture.unweighted, "unweighted")] {
@@ -40,7 +45,7 @@ fn one(
     name: &str,
     (width, height): (usize, usize),
     values: &[[f32; 3]],
-    made_for: &Picture,
+    made_for: &PictureDefaults,
 ) -> Result<()> {
     let mut set = LayerSet::new(width, height);
     set.push(Layer::interleaved("", "RGB", values.iter().copied()))?;

@@ -1,6 +1,6 @@
 //! Why a picture is black.
 
-use super::super::{Asked, EffectPlan};
+use super::super::{EffectPlan, PlanRequest};
 use super::rays;
 use crate::camera::Camera;
 use crate::light::Emitter;
@@ -24,7 +24,7 @@ pub(in super::super) fn reason(
     scene: &Scene,
     camera: &Camera,
     effects: &[EffectPlan],
-    asked: &Asked,
+    asked: &PlanRequest,
     warned: bool,
 ) -> String {
     if scene.lights.is_empty() {

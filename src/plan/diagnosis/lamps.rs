@@ -1,7 +1,7 @@
 //! Lamps whose light does not come through, or is out of proportion.
 
 use super::super::names::cut;
-use super::super::{Asked, Effect};
+use super::super::{Effect, PlanRequest};
 use super::rays;
 use crate::light::Emitter;
 use crate::math::{Vec3, luminance, one_minus_cos};
@@ -66,8 +66,8 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
 
 /// Lamps alone, where the file's writer never says what shines from all around. A scene without any light is told when
 /// it is built.
-pub(super) fn no_environment(scene: &Scene, asked: &Asked) -> Option<String> {
-    let dark = scene.world_unsaid && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
+pub(super) fn no_environment(scene: &Scene, asked: &PlanRequest) -> Option<String> {
+    let dark = scene.environment_unknown && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
     (dark && !asked.switches.off.has(Effect::Environment)).then(|| {
         "no environment: Blender's own exporter leaves the world out, so what it shines is missing; export with scripts/blender/export.py, or give it with --env (--env 0,0,0 if it is dark)".into()
     })
@@ -184,7 +184,7 @@ fn within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
 }
 
 /// Lamps without size that shine through glass, where the method does not find them.
-pub(super) fn behind_glass(scene: &Scene, asked: &Asked) -> Vec<String> {
+pub(super) fn behind_glass(scene: &Scene, asked: &PlanRequest) -> Vec<String> {
     if asked.search.finds(Effect::Caustic, &scene.survey) {
         return vec![];
     }

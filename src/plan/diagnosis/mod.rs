@@ -11,12 +11,12 @@ mod lamps;
 mod overlap;
 mod rays;
 
-use super::Asked;
+use super::PlanRequest;
 use crate::camera::Camera;
 use crate::scene::Scene;
 
 /// All that looks like a mistake.
-pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &Asked) -> Vec<String> {
+pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &PlanRequest) -> Vec<String> {
     let mut warnings = glass::thin(scene);
     warnings.extend(culling::culled(scene, camera));
     warnings.extend(glass::wide(scene));

@@ -4,7 +4,7 @@ use super::rays;
 use crate::geometry::{Instance, Mesh};
 use crate::math::Vec3;
 use crate::scene::Scene;
-use crate::scene::contact::Along;
+use crate::scene::contact::RaySurfaces;
 use crate::trace::Ray;
 
 /// Solids that are looked at, and triangles of each whose edges are followed.
@@ -59,7 +59,7 @@ fn crossed(scene: &Scene, instance: &Instance) -> Vec<u32> {
 fn follow(scene: &Scene, object: u32, from: Vec3, to: Vec3, crossed: &mut Vec<u32>) {
     let length = from.distance(to);
     let Some(direction) = (to - from).try_normalize() else { return };
-    let mut along = Along::new(Ray { origin: from, direction, tmax: length, token: 0 }, None);
+    let mut along = RaySurfaces::new(Ray { origin: from, direction, tmax: length, token: 0 }, None);
     for _ in 0..MOST_CROSSED {
         let Some((surface, _)) = along.next(scene, false) else { return };
         let share = surface.p.distance(from) / length;

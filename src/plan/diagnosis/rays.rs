@@ -3,7 +3,7 @@
 use crate::geometry::Surface;
 use crate::math::Vec3;
 use crate::scene::Scene;
-use crate::scene::contact::Along;
+use crate::scene::contact::RaySurfaces;
 use crate::trace::Ray;
 
 /// A ray through more surfaces than this that let it pass is given up.
@@ -40,7 +40,7 @@ pub(super) fn first_opaque_after(
     token: u32,
     mut passed: impl FnMut(&Surface),
 ) -> Option<Surface> {
-    let mut along = Along::new(Ray { origin, direction, tmax, token }, None);
+    let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, None);
     for _ in 0..MOST_SURFACES {
         let (surface, _) = along.next(scene, false)?;
         if !scene.materials.list[surface.material as usize].transmits() {

@@ -9,7 +9,7 @@ use super::curve::{Curve, Sampler};
 use super::document::{Document, get, named};
 use super::extras::{self, SceneExtras};
 use super::pointer::{self, Nowhere};
-use super::{Frame, fault};
+use super::{FrameTime, fault};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
@@ -48,7 +48,7 @@ struct Track {
 ///
 /// # Errors
 /// A frame is asked for, and keys cannot be, or what moves does not exist.
-pub(super) fn pose(document: &mut Document, frame: Option<Frame>, warnings: &mut Vec<String>) -> Result<()> {
+pub(super) fn pose(document: &mut Document, frame: Option<FrameTime>, warnings: &mut Vec<String>) -> Result<()> {
     let faults = Faults { fatal: frame.is_some() };
     let tracks = tracks(document, faults, warnings)?;
     let Some(start) = tracks.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
@@ -98,7 +98,7 @@ impl Faults {
 }
 
 /// Frames a second.
-fn rate(document: &Document, frame: Frame, warnings: &mut Vec<String>) -> Result<f64> {
+fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Result<f64> {
     let index = document.default_scene()?;
     let said: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
     let good = |rate: &f64| rate.is_finite() && *rate > 0.0;

@@ -3,7 +3,7 @@
 
 use crate::math::{DAffine3, DVec3};
 use crate::scene::Description;
-use crate::scene::description::{CameraDescription, Picture, Placed, Projection};
+use crate::scene::description::{CameraDescription, PictureDefaults, PlacedMesh, Projection};
 use smallvec::SmallVec;
 
 /// Aspect ratio of a picture whose shape nothing says.
@@ -56,7 +56,7 @@ struct View {
 }
 
 impl View {
-    fn new(camera: &CameraDescription, picture: &Picture) -> View {
+    fn new(camera: &CameraDescription, picture: &PictureDefaults) -> View {
         let resolved = picture.resolution.map(|[width, height]| f64::from(width) / f64::from(height));
         // Unit vectors: a camera has no size.
         let axes = camera.to_world.matrix3;
@@ -81,7 +81,7 @@ impl View {
     fn shows(
         &self,
         out: &Description,
-        placed: &Placed,
+        placed: &PlacedMesh,
         bounds: &[(DVec3, DVec3)],
         span: &Span,
         left: &mut usize,

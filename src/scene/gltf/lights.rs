@@ -9,7 +9,7 @@ use crate::geometry::Mesh;
 use crate::light::SpotEdge;
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::Description;
-use crate::scene::description::{CameraDescription, GuessedUnits, Placed, Projection, PunctualKind, PunctualLight};
+use crate::scene::description::{CameraDescription, GuessedUnits, PlacedMesh, Projection, PunctualKind, PunctualLight};
 use gltf::json::camera::Type;
 use gltf::json::validation::Checked;
 use serde::Deserialize;
@@ -144,7 +144,7 @@ fn typical_irradiance(light: &PunctualLight, points: &[DVec3]) -> f64 {
 }
 
 /// Some vertices of a scene, in the world, spread evenly over its objects.
-fn sample_vertices(meshes: &[Mesh], instances: &[Placed]) -> Vec<DVec3> {
+fn sample_vertices(meshes: &[Mesh], instances: &[PlacedMesh]) -> Vec<DVec3> {
     let each = (MAX_JUDGED_POINTS / instances.len().max(1)).max(1);
     let step = instances.len().div_ceil(MAX_JUDGED_POINTS).max(1);
     let mut points = Vec::new();

@@ -73,7 +73,7 @@ pub enum Glass {
 
 /// A frame of the animations in a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct FrameTime {
     /// Its number: frame N is N / rate seconds after the start.
     pub number: u32,
     /// Frames a second of files that do not tell theirs; 24 if this does not either.
@@ -92,7 +92,7 @@ pub struct ReadOptions {
     /// Files that the scene names may lie outside its own folder.
     pub allow_outside: bool,
     /// The frame that is shown; otherwise that at the first key of all animations.
-    pub frame: Option<Frame>,
+    pub frame: Option<FrameTime>,
 }
 
 /// Reads the scene file at `path`; buffers, textures and the environment that it names are looked for beside it, and

@@ -16,7 +16,7 @@ use crate::geometry::Mesh;
 use crate::math::{DAffine3, DMat3, DVec3, Rgb};
 use crate::memory;
 use crate::scene::Description;
-use crate::scene::description::{EnvironmentDescription, EnvironmentSource, Picture, Placed};
+use crate::scene::description::{EnvironmentDescription, EnvironmentSource, PictureDefaults, PlacedMesh};
 use crate::scene::environment_file;
 use crate::scene::folder::Folder;
 use serde::Deserialize;
@@ -170,7 +170,7 @@ impl Reader<'_> {
         }
         // The frame that is shown, if one is asked for.
         let frame = self.options.frame.map_or(frame, |frame| i32::try_from(frame.number).ok());
-        self.out.picture = Picture { resolution, exposure, tonemap, film_transparent, crop, frame, frame_rate };
+        self.out.picture = PictureDefaults { resolution, exposure, tonemap, film_transparent, crop, frame, frame_rate };
         Ok(())
     }
 
@@ -188,7 +188,7 @@ impl Reader<'_> {
 
     fn environment(&mut self, place: &str) -> Result<()> {
         let Some(said) = &self.scene.environment else {
-            self.out.world_unsaid = self.document.is_by_blender();
+            self.out.environment_unknown = self.document.is_by_blender();
             return Ok(());
         };
         let strength = said.strength.unwrap_or(1.0);
@@ -329,7 +329,7 @@ impl Reader<'_> {
                 };
                 let (name, light_group) = (name.clone(), said.light_group.clone());
                 let hidden_from_camera = !said.visible.camera;
-                let placed = Placed { name, mesh, material, object, hidden_from_camera, light_group, to_world };
+                let placed = PlacedMesh { name, mesh, material, object, hidden_from_camera, light_group, to_world };
                 self.out.instances.push(placed);
             }
         }

@@ -8,7 +8,7 @@ mod python;
 pub use python::Interpreter;
 
 use super::description::Description;
-use super::gltf::{self, Frame, ReadOptions};
+use super::gltf::{self, FrameTime, ReadOptions};
 use crate::error::{Error, Kind, Result};
 use crate::memory;
 use crate::stop::Stop;
@@ -66,7 +66,7 @@ pub fn read(path: &Path, options: &ReadOptions, stop: &Stop) -> Result<Descripti
     }
     converter.run(&words, options.allow_outside, stop)?;
     // The converter has looked at the frame, and put beside the .glb what it names.
-    let frame = options.frame.map(|frame| Frame { of_sequence: true, ..frame });
+    let frame = options.frame.map(|frame| FrameTime { of_sequence: true, ..frame });
     let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
     let mut description = read.map_err(|mut error| {
         error.place = error.place.replace(&glb.display().to_string(), &path.display().to_string());

@@ -6,14 +6,14 @@ use caustique::error::Error;
 use caustique::math::{DVec3, Vec3};
 use caustique::scene::Description;
 use caustique::scene::description::Projection;
-use caustique::scene::gltf::{Frame, ReadOptions, read_bytes};
+use caustique::scene::gltf::{FrameTime, ReadOptions, read_bytes};
 use glam::DQuat;
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// Reads a frame at 10 frames a second; a frame that is a fraction is reached by another rate.
 fn at(file: &Glb, seconds: f64) -> Result<Description, Error> {
-    let frame = Some(Frame { number: 1, rate: Some(1.0 / seconds.max(1e-12)), of_sequence: false });
+    let frame = Some(FrameTime { number: 1, rate: Some(1.0 / seconds.max(1e-12)), of_sequence: false });
     read_bytes(&file.bytes(), Path::new("pool.glb"), &ReadOptions { frame, ..ReadOptions::default() })
 }
 
@@ -84,7 +84,7 @@ fn frames_meet_their_keys() {
     for number in 1..200u32 {
         let key = number as f32 / 24.0;
         let file = moves("STEP", &[key - 0.01, key], &KEYS[..2]);
-        let frame = Some(Frame { number, rate: Some(24.0), of_sequence: false });
+        let frame = Some(FrameTime { number, rate: Some(24.0), of_sequence: false });
         let options = ReadOptions { frame, ..ReadOptions::default() };
         let scene = read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap();
         assert_eq!(scene.instances[0].to_world.translation.y, 8.0, "frame {number}");
@@ -184,7 +184,7 @@ fn the_first_of_two_actions_is_played() {
 fn frame_rates() {
     let mut file = moves("LINEAR", &[0.5, 100.5], &[[0.5, 0.0, 0.0], [100.5, 0.0, 0.0]]);
     let seconds = |file: &Glb, number: Option<u32>, rate| {
-        let frame = number.map(|number| Frame { number, rate, of_sequence: false });
+        let frame = number.map(|number| FrameTime { number, rate, of_sequence: false });
         let options = ReadOptions { frame, ..ReadOptions::default() };
         let scene = read_bytes(&file.bytes(), Path::new("pool.glb"), &options).map_err(|e| message(&e))?;
         Ok::<_, String>((scene.instances[0].to_world.translation.x, scene.warnings))

@@ -259,7 +259,7 @@ fn environment_and_medium_of_the_scene() {
 #[test]
 fn a_world_that_is_left_out() {
     let mut file = Glb::new();
-    let told = |file: &Glb| (read(file).world_unsaid, read(file).environment.is_some());
+    let told = |file: &Glb| (read(file).environment_unknown, read(file).environment.is_some());
     assert_eq!(told(&file), (true, false));
     file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0, 0, 0]}}});
     assert_eq!(told(&file), (false, false));

@@ -145,7 +145,7 @@ fn glass_on(mesh: impl Fn(&mut Glb, usize), glass: Glass, extensions: Value) -> 
     }
     let options = ReadOptions { glass, ..ReadOptions::default() };
     let scene = read_bytes(&file.bytes(), Path::new("x.glb"), &options).unwrap();
-    let solid = |i: &caustique::scene::description::Placed| scene.materials[i.material as usize].is_solid_glass();
+    let solid = |i: &caustique::scene::description::PlacedMesh| scene.materials[i.material as usize].is_solid_glass();
     (scene.instances.iter().map(solid).collect(), scene.warnings)
 }
 

@@ -3,7 +3,7 @@
 use super::glb::Glb;
 use super::{message, read, try_read};
 use caustique::light::SpotEdge;
-use caustique::scene::description::{Picture, PunctualKind, ToneMap};
+use caustique::scene::description::{PictureDefaults, PunctualKind, ToneMap};
 use caustique::scene::{Crop, View};
 use serde_json::{Value, json};
 
@@ -25,7 +25,7 @@ fn what_the_picture_was_made_for() {
     let crop = Some([0.0, 0.0, 0.5, 1.0]);
     let resolution = Some([640, 200]);
     let (frame, frame_rate) = (Some(12), Some([24000, 1001]));
-    let expected = Picture { resolution, exposure, tonemap, film_transparent: true, crop, frame, frame_rate };
+    let expected = PictureDefaults { resolution, exposure, tonemap, film_transparent: true, crop, frame, frame_rate };
     assert_eq!(description.picture, expected);
     assert!(description.environment_hidden_from_camera);
     let said = |what: &str| description.warnings.iter().filter(|warning| warning.contains(what)).count();

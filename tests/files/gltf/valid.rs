@@ -3,7 +3,7 @@
 use super::everything::everything;
 use super::glb::Glb;
 use super::{message, read, try_read};
-use caustique::scene::gltf::{Frame, ReadOptions, read_bytes};
+use caustique::scene::gltf::{FrameTime, ReadOptions, read_bytes};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn integers_may_have_a_fraction_of_zero() {
     with_fractions(&mut fractions.json);
     assert!(fractions.json.to_string().contains("\"count\":8.0"));
     let mut plain = Vec::new();
-    for frame in [None, Some(Frame { number: 12, rate: None, of_sequence: false })] {
+    for frame in [None, Some(FrameTime { number: 12, rate: None, of_sequence: false })] {
         let options = ReadOptions { frame, ..ReadOptions::default() };
         let described =
             |file: &Glb| format!("{:?}", read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap());
@@ -77,7 +77,7 @@ fn faults_of_animations_do_not_refuse_still_pictures() {
         let told =
             |warning: &String| warning.starts_with(fault) && warning.contains("; what it moves stays as it is (");
         assert!(warnings.iter().any(told), "{fault}: {warnings:?}");
-        let frame = Some(Frame { number: 12, rate: None, of_sequence: false });
+        let frame = Some(FrameTime { number: 12, rate: None, of_sequence: false });
         let options = ReadOptions { frame, ..ReadOptions::default() };
         let error = read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap_err();
         assert!(message(&error).starts_with(&format!("pool.glb: {fault}")), "{error}");

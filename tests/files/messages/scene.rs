@@ -4,7 +4,7 @@ use super::{Said, message};
 use crate::gltf::everything::everything;
 use crate::gltf::glb::{CUBE, Glb};
 use crate::gltf::images::{jpegs, wearing};
-use caustique::scene::gltf::{Frame, ReadOptions, read, read_bytes};
+use caustique::scene::gltf::{FrameTime, ReadOptions, read, read_bytes};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -58,7 +58,7 @@ pub fn changed(base: &Glb, changes: &Value) -> Vec<String> {
     let (mut file, mut options) = (base.clone(), ReadOptions::default());
     for (place, value) in changes.as_object().expect("changes") {
         match &**place {
-            "frame" => options.frame = Some(Frame { number: 12, rate: None, of_sequence: false }),
+            "frame" => options.frame = Some(FrameTime { number: 12, rate: None, of_sequence: false }),
             place if place.starts_with('#') => put_number(&mut file, place, value),
             place => put(&mut file.json, place, value.clone()),
         }

@@ -49,7 +49,7 @@ fn a_good_scene_is_passed_over() {
 /// Lamps light the scene, but what shines from all around may have been left out by the program that wrote the file.
 #[test]
 fn an_environment_that_was_not_exported() {
-    let unsaid = |description: Description| Description { world_unsaid: true, ..description };
+    let unsaid = |description: Description| Description { environment_unknown: true, ..description };
     assert_eq!(
         warning(unsaid(ball(glass(1.5)))),
         "no environment: Blender's own exporter leaves the world out, so what it shines is missing; export with scripts/blender/export.py, \
