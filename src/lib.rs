@@ -59,10 +59,12 @@ pub mod finish;
 
 pub mod render;
 
+pub mod choose;
+
 pub mod pipeline;
 
 #[cfg(feature = "cli")]
-pub mod settings;
+pub mod options;
 
 pub mod peers;
 

@@ -297,10 +297,10 @@ fn the_scan_finds_planted_faults() {
 
 /// Files that name methods: the table of methods and their passes, what auto chooses from, and defaults of comparisons.
 const NAMES_METHODS: [&str; 8] = [
-    "src/render/method.rs",
-    "src/render/choice.rs",
-    "src/render/candidate.rs",
-    "src/render/auto/pilot.rs",
+    "src/render/settings/method.rs",
+    "src/render/pass/choice.rs",
+    "src/render/settings/candidate.rs",
+    "src/choose/pilot.rs",
     "src/report/guests.rs",
     "src/cli/converge/reference.rs",
     "src/cli/converge/runs.rs",
@@ -332,7 +332,7 @@ fn only_the_table_and_choices_name_methods() {
             faults.push(format!("{path}: {}", named.join(", ")));
         }
     }
-    assert!(faults.is_empty(), "ask the method's row in src/render/method.rs instead:\n{}", faults.join("\n"));
+    assert!(faults.is_empty(), "ask the method's row in src/render/settings/method.rs instead:\n{}", faults.join("\n"));
 }
 
 #[test]

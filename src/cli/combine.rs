@@ -6,11 +6,11 @@ use super::{finish, say};
 use caustique::error::Result;
 use caustique::film::{Naming, take_plain_names};
 use caustique::image::exr;
+use caustique::options::FinishOptions;
+use caustique::options::number::threads;
 use caustique::pipeline::tell_stored;
 use caustique::render::Clock;
 use caustique::scene::description::PictureDefaults;
-use caustique::settings::FinishOptions;
-use caustique::settings::number::threads;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -2,8 +2,8 @@
 
 use super::say;
 use caustique::error::{Error, Result};
+use caustique::options::FinishOptions;
 use caustique::pipeline::Ready;
-use caustique::settings::FinishOptions;
 
 /// Opens a finish, see [`caustique::pipeline::finish::open`].
 ///

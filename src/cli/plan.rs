@@ -2,12 +2,12 @@
 
 use super::progress::{Form, duration, percent};
 use super::{print, print_json, printable, scene};
+use caustique::choose::choose;
 use caustique::error::Result;
+use caustique::options::number::threads;
+use caustique::options::{RenderOptions, SceneOptions};
 use caustique::pipeline::{Loaded, Outlook, check, outlook, plan, sized};
 use caustique::plan::{EffectPlan, Plan};
-use caustique::render::auto::choose;
-use caustique::settings::number::threads;
-use caustique::settings::{RenderOptions, SceneOptions};
 use serde_json::json;
 
 /// Say which effects a scene calls for, which will be simulated, and why.

@@ -3,9 +3,9 @@
 use super::progress::{Form, Waiting};
 use super::say;
 use caustique::error::{Error, Kind, Result};
+use caustique::options::SceneOptions;
 use caustique::pipeline::Loaded;
 use caustique::pipeline::load::load;
-use caustique::settings::SceneOptions;
 use caustique::stop::Stop;
 
 /// Reads and builds the scene as the options ask for it.

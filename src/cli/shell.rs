@@ -3,7 +3,7 @@
 
 use super::{print, print_json};
 use caustique::error::{Error, Kind, Result};
-use caustique::settings::catalogue::describe;
+use caustique::options::catalogue::describe;
 use clap::Command;
 use clap_complete::Shell;
 use serde_json::json;

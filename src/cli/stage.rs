@@ -2,8 +2,8 @@
 
 use super::{Cli, Command, usage};
 use caustique::error::{Error, Kind, Result};
+use caustique::options::SceneOptions;
 use caustique::scene::usd;
-use caustique::settings::SceneOptions;
 use clap::FromArgMatches;
 use std::ffi::OsString;
 

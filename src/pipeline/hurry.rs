@@ -2,7 +2,7 @@
 //! once, with as much work for a pixel.
 
 use crate::camera::Camera;
-use crate::render::auto::{small, window_factor};
+use crate::choose::{small, window_factor};
 use crate::render::{Session, Settings, Stage};
 use crate::scene::Scene;
 

@@ -36,13 +36,13 @@ use saver::Saver;
 use shard::Tail;
 
 use crate::camera::Camera;
+use crate::choose::{self, Choice};
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Selection, finished_part, output as film};
 use crate::finish::{Finish, reads_for_picture};
 use crate::image::atomic::is_same_file;
 use crate::image::exr;
 use crate::plan::{Plan, Switches};
-use crate::render::auto::{self, Choice};
 use crate::render::output::shape;
 use crate::render::{Candidate, Control, Progress, Rendered, Session, Settings, Spent, Stage, StopReason, drive};
 use crate::scene::{Scene, View};
@@ -388,7 +388,7 @@ fn choose(
                 Some(Settings { techniques, ..settings })
             };
             watch.waits(Some(Wait::Choosing));
-            let chosen = auto::choose((scene, camera), &mut auto.finish, make, || watch.stops());
+            let chosen = choose::choose((scene, camera), &mut auto.finish, make, || watch.stops());
             watch.waits(None);
             chosen
         }

@@ -2,9 +2,9 @@
 //! pixel, goes on for some seconds, is finished and judged as the render will be, and its decay is carried on.
 
 use crate::camera::Camera;
+use crate::choose::small;
 use crate::error::Result;
 use crate::finish::{Finish, reads_for_error};
-use crate::render::auto::small;
 use crate::render::{Accuracy, LEAST, Session, Settings, Spent, Stage};
 use crate::scene::Scene;
 use serde::Serialize;

@@ -1,10 +1,10 @@
 //! The plan of a render, with what a pilot has measured.
 
 use crate::camera::Camera;
+use crate::choose::{Choice, Trial};
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan, Switches};
 use crate::render::Method;
-use crate::render::auto::{Choice, Trial};
 use crate::scene::Scene;
 
 /// What decides what a plan says.

@@ -57,3 +57,16 @@ impl Spent {
         done
     }
 }
+
+/// Where the time went: core-seconds (processor time of the whole process) per phase.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Phases {
+    /// Pilot pass and initial bandwidths.
+    pub pilot: f64,
+    /// Tracing light paths.
+    pub light: f64,
+    /// Building photon maps.
+    pub map: f64,
+    /// Tracing eye paths and gathering.
+    pub eye: f64,
+}

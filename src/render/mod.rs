@@ -1,61 +1,24 @@
-//! Rendering: the pass loop, when it stops, and what it reports.
+//! Rendering: settings, the passes of each method, the loop over iterations, and the account of a render.
 
-mod accuracy;
-pub mod auto;
-mod bidirectional;
-mod candidate;
-mod choice;
-mod chunks;
+mod account;
 mod clock;
-mod control;
-mod cost;
-mod counting;
-mod drive;
-mod error_coverage;
-mod error_estimate;
-mod forecast;
-mod groups;
-mod guiding;
-mod iterate;
-mod joined;
-mod measures;
-mod method;
-mod metropolis;
-pub mod output;
-mod path;
-mod pm;
-mod region;
-mod rejections;
-mod result;
+mod pass;
 mod session;
 mod settings;
-mod sppm;
-mod state;
-mod techniques;
-mod tiles;
-mod unseen;
-mod volume;
 
-pub use accuracy::{Accuracy, CONFIDENCE};
-pub use bidirectional::bytes_per_whole_tile;
-pub use candidate::Candidate;
-pub use clock::{Clock, Spent, cpu_seconds, peak_memory};
-pub use control::{Control, History, Progress, StopReason};
-pub use drive::{LEAST, drive, render};
-pub use error_coverage::ErrorCoverage;
-pub use error_estimate::ErrorEstimate;
-pub use forecast::photons_per_path;
-pub use joined::Part;
-pub use measures::bytes_of_measures;
-pub use method::{BandwidthRule, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
-pub use pm::PHOTON_BYTES;
-pub use rejections::Rejections;
-pub use result::{Phases, Rendered};
-pub use session::{Session, Stage};
-pub use settings::{
-    DEFAULT_ITERATIONS, DEFAULT_MAP_MEMORY, KernelChoice, Levels, MAX_SHARDS, RadiusRule, Settings, Shard,
+pub use account::output;
+pub use account::{
+    Accuracy, CONFIDENCE, ErrorCoverage, ErrorEstimate, History, Part, PhotonRecord, Rejections, Rendered, StopReason,
+    Unseen,
 };
-pub use state::State;
-pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
-pub use tiles::TILE as WHOLE_TILE;
-pub use unseen::{PhotonCounts, PhotonRecord, Unseen};
+pub use clock::{Clock, Phases, Spent, cpu_seconds, peak_memory};
+pub(crate) use pass::Cost;
+pub use pass::{
+    MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, TechniquePicture, WHOLE_TILE, bytes_of_measures, bytes_per_whole_tile,
+    photons_per_path,
+};
+pub use session::{Control, LEAST, Progress, Session, Stage, State, drive, render};
+pub use settings::{
+    BandwidthRule, Candidate, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY,
+    DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, KernelChoice, Levels, MAX_SHARDS, Method, RadiusRule, Settings, Shard,
+};

@@ -3,8 +3,8 @@
 //! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the
 //! last line is JSON for `scripts/lab`.
 
+use caustique::choose::counted_cost;
 use caustique::render::Candidate;
-use caustique::render::auto::counted_cost;
 use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{Scene, View};

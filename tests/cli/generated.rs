@@ -1,8 +1,8 @@
-//! Files that are made from the definition of a render's options (`src/settings`), compared with it.
+//! Files that are made from the definition of a render's options (`src/options`), compared with it.
 //! `scripts/generate.sh` writes them anew.
 
 use crate::Folder;
-use caustique::settings::catalogue;
+use caustique::options::catalogue;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn compare(path: &str, expected: &str) {
         fs::write(&file, expected).expect("the file can be written");
     }
     let found = fs::read_to_string(&file).unwrap_or_default();
-    assert!(found == expected, "{path} is not what src/settings gives: run scripts/generate.sh");
+    assert!(found == expected, "{path} is not what src/options gives: run scripts/generate.sh");
 }
 
 /// Compares the part of a file between two marks, or writes it.

@@ -6,6 +6,7 @@
 
 use crate::support;
 
+use caustique::choose::{Choice, Weight, choose};
 use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::finish::{Denoiser, Finish};
 use caustique::light::{Guide, Region, SpotEdge};
@@ -15,7 +16,6 @@ use caustique::medium::MediumParameters;
 use caustique::plan::{ClassSet, Effect, PathClass, switch};
 use caustique::random::Domain;
 use caustique::render::Candidate;
-use caustique::render::auto::{Choice, Weight, choose};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::Survey;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};

@@ -1,12 +1,12 @@
 //! A render's options from keyword arguments: each becomes a word of the command line, which the library parses. Names,
-//! ranges and defaults are those of [`caustique::settings`].
+//! ranges and defaults are those of [`caustique::options`].
 
 use crate::error::usage;
 use crate::keywords::{Keywords, choice};
 use caustique::error::Error;
+use caustique::options::catalogue::{OptionDescription, ValueKind, of_python, of_scene};
+use caustique::options::{FrameSeed, InvalidOption, RenderOptions, RunOptions, SceneOptions, parse};
 use caustique::pipeline::finish;
-use caustique::settings::catalogue::{OptionDescription, ValueKind, of_python, of_scene};
-use caustique::settings::{FrameSeed, InvalidOption, RenderOptions, RunOptions, SceneOptions, parse};
 use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! Keyword arguments, taken by name: what is left is unknown, and an error that names the nearest.
 
 use crate::error::usage;
-use caustique::settings::{ValueEnum, one_of};
+use caustique::options::{ValueEnum, one_of};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;

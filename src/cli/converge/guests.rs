@@ -6,11 +6,11 @@ use crate::cli::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::error::{Error, Result};
 use caustique::finish::{Denoiser, DenoiserChoice};
+use caustique::options::SceneOptions;
 use caustique::peers::{Drivers, Renderer};
 use caustique::report::guests::{Denoising, Driving, Guests};
 use caustique::scene::gltf::{Glass, LightUnits};
 use caustique::scene::{Scene, usd};
-use caustique::settings::SceneOptions;
 
 /// The guests that are asked for; `None` where there are none.
 ///

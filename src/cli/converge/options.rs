@@ -2,12 +2,12 @@
 
 use crate::cli::progress::Form;
 use caustique::image::tonemap::ToneMap;
+use caustique::options::number::{Ranged, finite, positive, threads};
+use caustique::options::{MethodChoice, SceneOptions};
 use caustique::peers::Renderer;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::MAX_SIZE;
-use caustique::settings::number::{Ranged, finite, positive, threads};
-use caustique::settings::{MethodChoice, SceneOptions};
 use caustique::stat::sum::MOST_TERMS;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;

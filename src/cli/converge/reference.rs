@@ -8,11 +8,11 @@ use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
+use caustique::options::MethodChoice;
 use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Method, Settings};
 use caustique::report::reference::{Halves, OwnError, Reference};
 use caustique::scene::Scene;
-use caustique::settings::MethodChoice;
 
 /// Where the reference comes from.
 pub enum Source {

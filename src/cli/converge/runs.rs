@@ -5,9 +5,9 @@ use crate::cli::layout;
 use crate::cli::render::RenderArgs;
 use crate::cli::usage;
 use caustique::error::{Error, Kind, Result};
+use caustique::options::{MethodChoice, RenderOptions};
 use caustique::render::{Method, Settings, Spent};
 use caustique::report::entry::Entry;
-use caustique::settings::{MethodChoice, RenderOptions};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 

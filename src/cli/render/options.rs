@@ -1,12 +1,12 @@
-//! Every option of `caustique render`: those of [`caustique::settings`], and files that only the program writes.
+//! Every option of `caustique render`: those of [`caustique::options`], and files that only the program writes.
 
 use super::preview::Target;
 use crate::cli::output::PictureArgs;
 use crate::cli::progress::Form;
 use caustique::error::{Error, Result};
+use caustique::options::{RenderOptions, RunOptions, numbered, takes};
 use caustique::pipeline::Saving;
 use caustique::render::Settings;
-use caustique::settings::{RenderOptions, RunOptions, numbered, takes};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use std::path::PathBuf;

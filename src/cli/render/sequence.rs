@@ -6,7 +6,7 @@ use crate::cli::progress::Turn;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::error::{Error, Kind, Result};
-use caustique::settings::{Frames, is_pattern, numbered};
+use caustique::options::{Frames, is_pattern, numbered};
 
 /// Renders the frames in order, and ends at the first that fails, as Blender does; those before are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {

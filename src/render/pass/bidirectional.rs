@@ -1,0 +1,366 @@
+//! One iteration of the methods made of pairs of walks: light tracing, bidirectional path tracing, bidirectional photon
+//! mapping, vertex connection and merging.
+//!
+//! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its
+//! pixels. Where the film is a window and nothing is merged, the light paths of all other pixels are walked, too: their
+//! light reaches the window as it reaches the whole picture, and so the window's pixels are those of the whole picture
+//! to the bit. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
+//! that have left it, so the sums do not depend on threads; photons are likewise concatenated and wait for the next iteration.
+//!
+//! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone,
+//! the other levels of the second. They share nothing but the photons, those of both light paths.
+
+use super::guiding::learnt;
+use super::iterate::{Iterate, Work};
+use super::measures::{self, Measures};
+use super::photon_counts::PhotonCounts;
+use super::techniques::{TechniquePicture, Watch, Watched};
+use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
+use crate::camera::{Camera, GROUP};
+use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
+use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
+use crate::light::Guide;
+use crate::photon::{ByKind, PhotonMap};
+use crate::plan::{Event, EyeSuffix, Part};
+use crate::random::{Domain, Streams};
+use crate::render::clock::Phases;
+use crate::render::clock::cpu_seconds;
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use crate::spectrum::IterationWavelengths;
+use crate::stat::median;
+use crate::transport::mis::Eta;
+use crate::transport::{
+    Bidirectional, CameraWalkContext, Deposits, Eye, EyeMeasure, InitialMedia, LightPass, LightVertices, MergeLevels,
+    MergePhoton, Splat, Strategies,
+};
+use bumpalo::Bump;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A light path and an eye path for every pixel, and the levels they make.
+struct Pair {
+    light: Domain,
+    eye: Domain,
+    /// First level and number of levels.
+    levels: (usize, usize),
+}
+
+impl Pair {
+    /// Which of its levels is the method's own image, if any.
+    fn own(&self, own: usize) -> Option<usize> {
+        own.checked_sub(self.levels.0).filter(|level| *level < self.levels.1)
+    }
+}
+
+/// What iterations share.
+pub struct Passes<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    settings: &'a Settings,
+    initial_media: &'a InitialMedia,
+    shared: Bidirectional<'a>,
+    guide: Option<Arc<Guide>>,
+    pairs: Vec<Pair>,
+    tiles: Tiles,
+    /// Tiles whose light paths are walked, and what those have left; lists that are kept grow but once.
+    sources: Vec<WholeTile>,
+    left: Vec<Deposits>,
+    /// Measures of the iteration, by pair.
+    measures: Vec<Measures>,
+    /// Photons and the pass that left them.
+    photons: Option<(u64, PhotonMap<MergePhoton>)>,
+    watched: Watched,
+    /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it
+    /// covers.
+    covered: f32,
+}
+
+impl<'a> Passes<'a> {
+    /// Nothing done yet. `settings.levels` must be one level unless the method has levels.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        initial_media: &'a InitialMedia,
+        strategies: Strategies,
+    ) -> Passes<'a> {
+        let levels = settings.levels;
+        let mut pairs = vec![Pair { light: Domain::Light, eye: Domain::EyeIndependent, levels: (0, levels.count) }];
+        if levels.two_paths && levels.count > 1 {
+            pairs[0].levels = (0, 1);
+            let rest = (1, levels.count - 1);
+            pairs.push(Pair { light: Domain::LightCorrelated, eye: Domain::EyeCorrelated, levels: rest });
+        }
+        let tiles = Tiles::new(camera);
+        let sources: Vec<WholeTile> =
+            if strategies.merge { tiles.of_film().collect() } else { tiles.of_whole().collect() };
+        let pixels = light_paths(camera, strategies) as f32;
+        let eye = settings.eye(scene, camera, initial_media);
+        let merged_paths = pixels * pairs.len() as f32;
+        let shared = Bidirectional { eye, initial_media, strategies, light_paths: pixels, merged_paths, only: None };
+        let guide = settings.guided.then(|| learnt(&eye, initial_media, settings, None)).flatten().map(Arc::new);
+        let measures = pairs.iter().map(|pair| Measures::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
+        Passes {
+            scene,
+            camera,
+            settings,
+            initial_media,
+            shared,
+            guide,
+            pairs,
+            tiles,
+            left: sources.iter().map(|_| Deposits::default()).collect(),
+            sources,
+            measures,
+            photons: None,
+            watched: Watched::new(settings, scene, &tiles),
+            covered: 0.0,
+        }
+    }
+
+    fn eye(&self) -> Eye<'a> {
+        self.settings.eye(self.scene, self.camera, self.initial_media)
+    }
+
+    fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
+        let Settings { seed, max_depth, .. } = *self.settings;
+        let paths = light_paths(self.camera, self.shared.strategies);
+        let pass = LightPass::new(seed, i, pair.light, paths, max_depth).guided(guide);
+        // Others put paths together of one wavelength alone, whichever it is. There each light path is its pixel's own, and
+        // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
+        if self.shared.strategies.merge {
+            pass.with(IterationWavelengths::slow(seed, i))
+        } else {
+            pass.drawing(Streams::in_sequence(seed, i, pair.light))
+        }
+    }
+
+    /// The photons that pass `i` leaves, where it was not rendered here.
+    fn photons_of(&self, i: u64) -> PhotonMap<MergePhoton> {
+        let (shared, tiles) = (self.shared, self.tiles);
+        let mut parts = Vec::new();
+        // In the order of `iterate`, so that even photons in one place are summed alike.
+        for pair in &self.pairs {
+            let pass = self.light_pass(i, pair, self.guide.as_deref());
+            let walk = |tile| {
+                let (mut left, mut arena) = (Deposits::default(), Bump::new());
+                for place in tiles.pixels(tile) {
+                    if shared.eye.is_given_up() {
+                        break;
+                    }
+                    arena.reset();
+                    let mut vertices = LightVertices::new_in(&arena);
+                    shared.light_path(&pass, place.index as u32, true, &mut vertices, &mut left, &mut ());
+                }
+                left.photons
+            };
+            parts.par_extend((0..tiles.count()).into_par_iter().map(walk));
+        }
+        PhotonMap::build(parts.concat())
+    }
+
+    /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged; `None`
+    /// where it was given up.
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Option<Work> {
+        let shared = self.shared;
+        if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
+            // Before the first pass of all, too: without photons it would lack the light that only they bring.
+            let photons = self.photons_of(i - 1);
+            if self.settings.stop.gave_up() {
+                return None;
+            }
+            self.photons = Some((i - 1, photons));
+        }
+        let schedule = self.settings.schedule(i);
+        let merged = self.photons.is_some();
+        let expected = self.covered * self.pairs.len() as f32;
+        let levels = |bandwidth: f32, pair: &Pair| {
+            MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
+                let radius2 = schedule.radius2(bandwidth, level);
+                let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
+                let eta = match (merged, shared.strategies.connect) {
+                    (false, _) => Eta::NONE,
+                    (true, true) => Eta::new(radius2, shared.merged_paths).sharing(expected * shrunk),
+                    (true, false) => Eta::MERGE_ONLY,
+                };
+                (radius2, eta)
+            }))
+        };
+        let (seed, tiles) = (self.settings.seed, self.tiles);
+        let map = self.photons.as_ref().map(|(_, map)| map);
+        let merges = map.map_or(0, |map| map.photons().len());
+        let mut rejected = map.map_or(0, PhotonMap::rejected);
+        let stored = map.map_or([0; 2], count_by_kind);
+        let bandwidths: &[Pixel] = pixels;
+        let mut photons: Vec<MergePhoton> = Vec::new();
+        let guide = self.guide.clone();
+        let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
+        for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
+            let own = pair.own(self.settings.levels.own());
+            let streams = Streams::in_sequence(seed, i, pair.eye);
+            let mut on_film = measures.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
+            let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
+            self.sources.par_iter().zip(film).zip(&mut self.left).for_each(|((tile, mut film), left)| {
+                left.clear();
+                let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
+                for Group { keys, places } in tiles.all_groups(*tile) {
+                    if shared.eye.is_given_up() {
+                        return;
+                    }
+                    let mut starts = film.as_ref().map(|_| shared.eye.starts(&places, streams)).unwrap_or_default();
+                    for k in 0..GROUP {
+                        let of_film = places[k].map(|place| place.index);
+                        let Some(index) = (if shared.strategies.merge { of_film } else { keys[k] }) else { continue };
+                        let index = index as u32;
+                        arena.reset();
+                        let mut vertices = LightVertices::new_in(&arena);
+                        shared.light_path(pass, index, false, &mut vertices, left, &mut ());
+                        let (Some((measures, watch)), Some(place), Some(start)) =
+                            (&mut film, &places[k], &mut starts[k])
+                        else {
+                            continue;
+                        };
+                        // One wavelength for both, so that they can be connected.
+                        start.0.wavelength_sample = pass.wavelength(index);
+                        let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
+                        let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
+                        watch.begin(place.at, own);
+                        shared.eye_path(&arena, start, &meets, *watch, &mut measure);
+                        measures.set(place.at, &measure);
+                    }
+                }
+            });
+            if self.settings.stop.gave_up() {
+                return None;
+            }
+            let splats = SplatsByTile::new(&self.left, &tiles);
+            measures.par_tiles().zip(watches.par_iter_mut()).enumerate().for_each(|(tile, (mut measures, watch))| {
+                for splat in splats.of(tile) {
+                    let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
+                    let (_, slot) = tiles.place(splat.pixel);
+                    watch.splat(slot, own, splat, &levels);
+                    let mut measure = measures.get(slot);
+                    splat.apply(&levels, &mut measure);
+                    measures.set(slot, &measure);
+                }
+            });
+            rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
+            photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
+            self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
+        }
+        let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
+        let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
+        let gathered =
+            measures::add(&self.measures, (&shared.eye, i), pixels, |index| tiles.slot(index as u32), groups);
+        if shared.strategies.merge && self.settings.shard.count == 1 {
+            self.photons = Some((i, PhotonMap::build(photons)));
+        }
+        Some(Work { light_paths: walked, photons: merges, rejected, counts: PhotonCounts { stored, gathered } })
+    }
+}
+
+/// Photons by the kind of light that a surface shows of them.
+fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
+    let sight = EyeSuffix::START.then(Event::Broad);
+    let caustics =
+        map.photons().par_iter().filter(|photon| sight.receives(photon.beam).part() == Part::Caustic).count();
+    [map.photons().len() - caustics, caustics].map(|count| count as u64)
+}
+
+/// Light paths of a pass: where nothing is merged, as many as the whole picture has pixels, of which the film may be a
+/// window.
+fn light_paths(camera: &Camera, strategies: Strategies) -> u32 {
+    let (width, height) = if strategies.merge { camera.size() } else { camera.whole()[0] };
+    width * height
+}
+
+/// Bytes kept for a tile of the whole picture whose light paths are walked, without what these send.
+pub fn bytes_per_whole_tile() -> u64 {
+    (size_of::<WholeTile>() + size_of::<Deposits>()) as u64
+}
+
+/// Splats by the tile that they go to, each tile's in the order of the tiles that have left them: whoever adds them, the
+/// sums are the same.
+struct SplatsByTile<'l> {
+    left: &'l [Deposits],
+    /// The tile that has left a splat, and its place there.
+    order: Vec<(u32, u32)>,
+    /// Where in `order` each tile's end.
+    ends: Vec<usize>,
+}
+
+impl<'l> SplatsByTile<'l> {
+    fn new(left: &'l [Deposits], tiles: &Tiles) -> SplatsByTile<'l> {
+        let all =
+            || left.iter().enumerate().flat_map(|(from, left)| left.splats.iter().enumerate().map(move |s| (from, s)));
+        // A counting sort.
+        let mut ends = vec![0; tiles.count() + 1];
+        all().for_each(|(_, (_, splat))| ends[tiles.place(splat.pixel).0 + 1] += 1);
+        for tile in 0..tiles.count() {
+            ends[tile + 1] += ends[tile];
+        }
+        let mut order = vec![(0, 0); ends[tiles.count()]];
+        for (from, (at, splat)) in all() {
+            let next = &mut ends[tiles.place(splat.pixel).0];
+            order[*next] = (from as u32, at as u32);
+            *next += 1;
+        }
+        SplatsByTile { left, order, ends }
+    }
+
+    /// Those of a tile.
+    fn of(&self, tile: usize) -> impl Iterator<Item = &'l Splat> {
+        let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
+        let left = self.left;
+        self.order[start..self.ends[tile]].iter().map(move |&(from, at)| &left[from as usize].splats[at as usize])
+    }
+}
+
+impl Iterate for Passes<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        if !self.settings.method.has_bandwidths() {
+            return self.settings.pixels(self.scene, self.camera);
+        }
+        // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
+        let initial = match self.settings.initial {
+            InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
+            _ => InitialBandwidth::Footprint,
+        };
+        let Settings { widest: [widest, _], seed, .. } = *self.settings;
+        let (none, eye) = (PhotonMap::build(Vec::new()), self.eye());
+        let all = initial_bandwidths(&eye, initial, widest, seed, [&none; 2]);
+        // A footprint is the same number of pixels everywhere; a fixed radius is compared with the median one.
+        let pixels = match initial {
+            InitialBandwidth::Fixed(radius) => {
+                let footprints = initial_bandwidths(&eye, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
+                let mut footprints = footprints.into_flattened();
+                FOOTPRINT_PIXELS * radius / median(&mut footprints, f32::total_cmp).unwrap_or(f32::INFINITY)
+            }
+            _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
+        };
+        self.covered = std::f32::consts::PI * pixels * pixels;
+        all.into_iter().map(self.settings.pixel(self.scene)).collect()
+    }
+
+    fn guide(&self) -> Option<&Guide> {
+        self.guide.as_deref()
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+        let start = cpu_seconds();
+        let mut watched = std::mem::take(&mut self.watched);
+        let work = match watched.begin() {
+            Some(watches) => self.pass(i, pixels, watches),
+            None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
+        };
+        self.watched = watched;
+        // Light and eye paths take turns within a pixel.
+        phases.eye += cpu_seconds() - start;
+        work
+    }
+
+    fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
+        self.watched.collect(&self.tiles, iterations)
+    }
+}

@@ -1,0 +1,240 @@
+//! Learning where light paths are to start: rounds of a few light paths and eye paths before the first iteration.
+//!
+//! A round draws light paths by what the rounds before it have learnt, gathers their photons where eye paths look, and
+//! adds up by cell of the guide how much squared relative error every photon leaves in the picture: its own share of
+//! the pixel, squared, for it is there or not. The pixel's value is what the round itself finds there.
+//!
+//! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once
+//! learnt, does not leave less, there is none.
+
+use super::chunks::chunks;
+use super::cost::{Cost, GUIDED_START};
+use crate::estimator::bandwidth::{SCREEN_CAP, span};
+use crate::light::{Guide, Region};
+use crate::math::{Rgb, Vec3, luminance};
+use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
+use crate::plan::ClassSet;
+use crate::random::{Domain, Purpose, Stream};
+use crate::render::settings::Candidate;
+use crate::render::settings::Settings;
+use crate::transport::{Eye, Indirect, InitialMedia, LightPass, Photons, Probe, light_path};
+use bumpalo::Bump;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+pub(super) const ROUNDS: u64 = 5;
+/// Light paths of a round, over those of an iteration, and bounds of their number.
+const LIGHT_PATHS: f64 = 0.25;
+const LEAST: u32 = 1 << 12;
+const MOST: u32 = 1 << 15;
+/// Eye paths of a round, but one in so many pixels at most.
+const EYE_PATHS: u32 = 1 << 13;
+const PIXELS_PER_EYE_PATH: u64 = 4;
+/// Eye paths per unit of work.
+const CHUNK: u32 = 256;
+/// Photons of either kind that a pixel gathers.
+const NEIGHBOURS: usize = 16;
+/// Added to a pixel's squared value, as the papers' relMSE has it. Of all errors this one still depends on the unit of
+/// radiance: it decides how well light paths are guided, not what is reported.
+const DARK: f32 = 0.01;
+
+/// A guide that leaves more than this of what unguided light paths leave of squared error, times what an iteration
+/// costs, is no gain.
+const WORTH: f64 = 0.9;
+
+/// A photon and the component of the guide that has made it.
+#[derive(Clone, Copy)]
+struct Marked {
+    photon: Photon,
+    cell: u32,
+}
+
+impl Located for Marked {
+    fn position(&self) -> Vec3 {
+        self.photon.p
+    }
+
+    fn normal(&self) -> Vec3 {
+        self.photon.ng
+    }
+
+    fn is_finite(&self) -> bool {
+        self.photon.is_finite()
+    }
+}
+
+/// The guide of a view, learnt; `None` where there is nothing to choose, or nothing to gain by it.
+pub(super) fn learnt(
+    eye: &Eye<'_>,
+    initial_media: &InitialMedia,
+    settings: &Settings,
+    region: Option<Region>,
+) -> Option<Guide> {
+    let seed = settings.seed;
+    let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
+    let mut guide = Guide::new(&eye.scene.lights, eye.indirect == Indirect::Photons)?;
+    for round in 0..ROUNDS {
+        let (maps, walked) = photons(eye, initial_media, (light_paths, region), seed, round, &guide);
+        let error = error(eye, seed, round, &maps, guide.cells());
+        let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
+        let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
+        if round + 1 == ROUNDS && error.ratio() * dearer(eye, settings, &guide) > WORTH {
+            return None;
+        }
+        guide.learn(&error.of_cells, &paths, &work);
+    }
+    Some(guide)
+}
+
+/// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once,
+/// and are longer.
+fn dearer(eye: &Eye<'_>, settings: &Settings, guide: &Guide) -> f64 {
+    let (width, height) = eye.camera.size();
+    let cost = |guide: Option<&Guide>| {
+        let candidate = Candidate { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
+        Cost::count(eye.scene, eye.camera, settings, guide).of(
+            candidate,
+            settings,
+            f64::from(width) * f64::from(height),
+        )
+    };
+    cost(Some(guide)) / cost(None)
+}
+
+/// Light paths of a cell.
+#[derive(Clone, Copy, Default)]
+struct Walked {
+    paths: f64,
+    /// What they cost, in vertices.
+    work: f64,
+}
+
+/// Photons of a round, and the light paths by cell.
+fn photons(
+    eye: &Eye<'_>,
+    initial_media: &InitialMedia,
+    (light_paths, region): (u32, Option<Region>),
+    seed: u64,
+    round: u64,
+    guide: &Guide,
+) -> (ByKind<PhotonMap<Marked>>, Vec<Walked>) {
+    let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
+        .guided(Some(guide))
+        .lighting(region)
+        .wanting(ClassSet::ALL, eye.indirect);
+    let trace = |paths: std::ops::Range<u32>| {
+        let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());
+        let mut walked = vec![Walked::default(); guide.cells()];
+        for index in paths {
+            let path = light_path(eye.scene, &arena, initial_media, &pass, index, &mut photons);
+            let Some((cell, vertices)) = path else { continue };
+            arena.reset();
+            photons.volume.clear();
+            for (marked, photons) in marked.iter_mut().zip(&mut photons.surface) {
+                marked.extend(photons.drain(..).map(|photon| Marked { photon, cell: cell as u32 }));
+            }
+            walked[cell].paths += 1.0;
+            walked[cell].work += GUIDED_START + f64::from(vertices);
+        }
+        (marked, walked)
+    };
+    let parts: Vec<(ByKind<Vec<Marked>>, Vec<Walked>)> = chunks(light_paths).map(trace).collect();
+    let mut walked = vec![Walked::default(); guide.cells()];
+    let mut all = ByKind::<Vec<Marked>>::default();
+    for (marked, part) in parts {
+        kind::append(&mut all, marked);
+        for (sum, part) in walked.iter_mut().zip(part) {
+            sum.paths += part.paths;
+            sum.work += part.work;
+        }
+    }
+    (all.map(PhotonMap::build), walked)
+}
+
+/// Sums over a round's eye paths of the squared relative errors that photons leave.
+struct CellErrors {
+    of_cells: Vec<f64>,
+    /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w
+    /// unguided ones, each 1 / w times as bright.
+    unguided: f64,
+}
+
+impl CellErrors {
+    fn none(cells: usize) -> CellErrors {
+        CellErrors { of_cells: vec![0.0; cells], unguided: 0.0 }
+    }
+
+    fn add(&mut self, other: &CellErrors) {
+        self.of_cells.iter_mut().zip(&other.of_cells).for_each(|(sum, more)| *sum += more);
+        self.unguided += other.unguided;
+    }
+
+    /// What guiding leaves of the error.
+    fn ratio(&self) -> f64 {
+        self.of_cells.iter().sum::<f64>() / self.unguided
+    }
+}
+
+/// What the photons of a round leave where its eye paths look.
+fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> CellErrors {
+    let (width, height) = eye.camera.size();
+    let pixels = u64::from(width) * u64::from(height);
+    let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
+    // Pixels in even steps from a first one drawn anew every round.
+    let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
+    let look = |first: u32| {
+        let mut error = CellErrors::none(cells);
+        let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
+        for index in first..paths.min(first + CHUNK) {
+            arena.reset();
+            let stream = Stream::new(seed, round, Domain::GuideEye, u64::from(index));
+            let pixel = ((f64::from(index) + f64::from(offset)) * pixels as f64 / f64::from(paths)) as u64;
+            let pixel = pixel.min(pixels - 1);
+            let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
+            if let Some(probe) = eye.probe(&arena, &(eye.start(at, stream), stream)) {
+                weigh(eye, maps, &mut nearest, &probe, &mut error);
+            }
+        }
+        error
+    };
+    let parts: Vec<CellErrors> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
+    let mut sum = CellErrors::none(cells);
+    parts.iter().for_each(|part| sum.add(part));
+    sum
+}
+
+/// Adds what the photons around a probe leave in its pixel.
+fn weigh(
+    eye: &Eye<'_>,
+    maps: &ByKind<PhotonMap<Marked>>,
+    nearest: &mut ByKind<Nearest<Marked>>,
+    probe: &Probe,
+    error: &mut CellErrors,
+) {
+    let point = &probe.point;
+    let cap = SCREEN_CAP * span(eye.camera, point.length);
+    let mut light = Vec::with_capacity(2 * NEIGHBOURS);
+    let mut sum = Rgb::ZERO;
+    for (map, nearest) in maps.iter().zip(nearest) {
+        let radius2 = nearest.radius2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
+        let scale = probe.weight / (PI * radius2);
+        map.within(point.p, radius2, |marked, _| {
+            let photon = &marked.photon;
+            if photon.ng.dot(point.ng) > 0.0 {
+                let found = scale * photon.flux;
+                sum += found;
+                light.push((marked.cell, luminance(found), photon.mark.weight()));
+            }
+        });
+    }
+    let value = luminance(sum + probe.direct);
+    let inverse = 1.0 / (value * value + DARK);
+    for (cell, light, weight) in light {
+        let share = f64::from(light * light * inverse);
+        let unguided = share / f64::from(weight);
+        if unguided.is_finite() {
+            error.of_cells[cell as usize] += share;
+            error.unguided += unguided;
+        }
+    }
+}

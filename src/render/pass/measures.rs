@@ -1,0 +1,197 @@
+//! What an iteration has measured of all pixels, until it is done: light of one pixel's paths arrives in others, and an
+//! iteration that is given up counts for none of them. One level takes half the bytes of a measure that has room for
+//! all.
+
+use super::tiles::TILE_PIXELS;
+use crate::estimator::Pixel;
+use crate::math::{Rgb, is_lit};
+use crate::photon::ByKind;
+use crate::render::settings::{Levels, Settings};
+use crate::transport::{Cause, Eye, EyeMeasure, Features, FirstHit};
+use rayon::prelude::*;
+use std::mem::size_of;
+
+/// Pixels to which a task adds an iteration.
+const PIXELS_PER_TASK: usize = 1024;
+
+/// Of a measure, what all levels share.
+#[derive(Clone, Copy, Default)]
+struct Shared {
+    emission: Rgb,
+    direct: Rgb,
+    indirect: Rgb,
+    volume: Rgb,
+    features: Features,
+    first: Option<FirstHit>,
+    broken: Option<Cause>,
+}
+
+/// What photons bring at a level, or what depends on their bandwidth: caustics, indirect light, light from media.
+type OfLevel = [Rgb; 3];
+
+/// Bytes that an iteration keeps of a pixel besides its sums.
+pub fn bytes_of_measures(settings: &Settings) -> usize {
+    let pairs = 1 + usize::from(settings.levels.two_paths);
+    match settings.method.has_chains() {
+        true => size_of::<EyeMeasure>(),
+        false => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
+    }
+}
+
+/// Measures of all pixels, in the order of the units of work.
+pub(super) struct Measures {
+    levels: usize,
+    shared: Vec<Shared>,
+    by_level: Vec<OfLevel>,
+}
+
+impl Measures {
+    /// Those of a render whose pixels have two eye paths or one, by path.
+    pub fn of_paths(pixels: usize, levels: Levels) -> Vec<Measures> {
+        if levels.two_paths {
+            vec![Measures::new(pixels, 1), Measures::new(pixels, levels.count.max(2) - 1)]
+        } else {
+            vec![Measures::new(pixels, levels.count)]
+        }
+    }
+
+    /// Of so many pixels and levels; nothing measured yet.
+    pub fn new(pixels: usize, levels: usize) -> Measures {
+        let by_level = vec![OfLevel::default(); pixels * levels];
+        Measures { levels, shared: vec![Shared::default(); pixels], by_level }
+    }
+
+    /// Those of each tile.
+    pub fn par_tiles(&mut self) -> impl IndexedParallelIterator<Item = SomeMeasures<'_>> {
+        self.par_parts(TILE_PIXELS)
+    }
+
+    /// Those of each unit of work of so many pixels.
+    pub fn par_parts(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = SomeMeasures<'_>> {
+        let levels = self.levels;
+        let by_level = self.by_level.par_chunks_mut(pixels * levels);
+        let part = move |(shared, by_level)| SomeMeasures { levels, shared, by_level };
+        self.shared.par_chunks_mut(pixels).zip(by_level).map(part)
+    }
+
+    /// Those of each unit of work of so many pixels, by one or two eye paths.
+    pub fn par_of_paths(
+        all: &mut [Measures],
+        pixels: usize,
+    ) -> impl IndexedParallelIterator<Item = (SomeMeasures<'_>, Option<SomeMeasures<'_>>)> {
+        let (first, others) = all.split_at_mut(1);
+        let first: Vec<_> = first[0].par_parts(pixels).collect();
+        let mut others: Vec<_> =
+            others.iter_mut().flat_map(|others| others.par_parts(pixels).collect::<Vec<_>>()).map(Some).collect();
+        others.resize_with(first.len(), || None);
+        first.into_par_iter().zip(others)
+    }
+
+    /// The measure of the pixel that is kept at `slot`.
+    #[inline]
+    pub fn get(&self, slot: usize) -> EyeMeasure {
+        unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
+    }
+}
+
+/// Measures of the pixels of a unit of work.
+pub(super) struct SomeMeasures<'m> {
+    levels: usize,
+    shared: &'m mut [Shared],
+    by_level: &'m mut [OfLevel],
+}
+
+impl SomeMeasures<'_> {
+    /// The measure at a slot of them.
+    #[inline]
+    pub fn get(&self, slot: usize) -> EyeMeasure {
+        unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
+    }
+
+    /// Keeps a measure; nothing of it but its first levels may be lit.
+    #[inline]
+    pub fn set(&mut self, slot: usize, measure: &EyeMeasure) {
+        let &EyeMeasure { emission, direct, indirect, volume, features, first, broken, .. } = measure;
+        self.shared[slot] = Shared { emission, direct, indirect, volume, features, first, broken };
+        for (level, into) in self.by_level[slot * self.levels..][..self.levels].iter_mut().enumerate() {
+            *into = [measure.caustic_photons[level], measure.indirect_photons[level], measure.volume_photons[level]];
+        }
+    }
+}
+
+/// Adds iteration `i`, measured by one or two eye paths, to the pixels: the measures that are kept at the pixel's `slot`,
+/// and its light by `groups`. Returns the number of pixels to whose own image photons of each kind have brought light.
+pub(super) fn add<'g>(
+    measures: &[Measures],
+    (eye, i): (&Eye<'_>, u64),
+    pixels: &mut [Pixel],
+    slot: impl Fn(usize) -> usize + Sync,
+    groups: impl Fn(usize) -> &'g [[Rgb; 2]] + Sync,
+) -> ByKind<u64> {
+    let add = |(index, pixel): (usize, &mut Pixel)| {
+        let slot = slot(index);
+        let measure = measures[0].get(slot);
+        pixel.see(i, || eye.seen(&measure));
+        let others = measures.get(1).map(|measures| measures.get(slot));
+        let (own, level) = pixel.own_of(&measure, others.as_ref());
+        let light = [own.indirect_photons[level], own.caustic_photons[level]];
+        pixel.add_with_groups(i, &measure, others.as_ref(), groups(slot));
+        light.map(|light| u64::from(is_lit(light)))
+    };
+    let all = |(part, pixels): (usize, &mut [Pixel])| {
+        let indices = part * PIXELS_PER_TASK..;
+        indices.zip(pixels).map(add).fold([0; 2], |[a, b], [c, d]| [a + c, b + d])
+    };
+    let parts: Vec<ByKind<u64>> = pixels.par_chunks_mut(PIXELS_PER_TASK).enumerate().map(all).collect();
+    parts.iter().fold([0; 2], |[a, b], [c, d]| [a + c, b + d])
+}
+
+#[inline]
+fn unpack(shared: &Shared, by_level: &[OfLevel]) -> EyeMeasure {
+    let Shared { emission, direct, indirect, volume, features, first, broken } = *shared;
+    let shared = EyeMeasure { emission, direct, indirect, volume, features, first, broken, ..EyeMeasure::default() };
+    by_level.iter().enumerate().fold(shared, |mut measure, (level, &[caustic, indirect, volume])| {
+        measure.caustic_photons[level] = caustic;
+        measure.indirect_photons[level] = indirect;
+        measure.volume_photons[level] = volume;
+        measure
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::MAX_LEVELS;
+
+    /// A measure comes back as it was kept, whatever its neighbours are.
+    #[test]
+    fn a_measure_comes_back() {
+        for levels in [1, 4, MAX_LEVELS] {
+            let mut measures = Measures::new(2 * TILE_PIXELS, levels);
+            let measure = |at: usize| {
+                let value = |k: usize| Rgb::new(at as f32, k as f32, 0.5);
+                let mut measure = EyeMeasure { emission: value(1), direct: value(2), ..EyeMeasure::default() };
+                (measure.indirect, measure.volume) = (value(3), value(4));
+                measure.features.depth = at as f32;
+                measure.first = at.is_multiple_of(2).then_some(FirstHit { p: value(5), instance: at as u32 });
+                measure.broken = at.is_multiple_of(3).then_some(Cause::Sum);
+                for level in 0..levels {
+                    measure.caustic_photons[level] = value(10 + level);
+                    measure.indirect_photons[level] = value(20 + level);
+                    measure.volume_photons[level] = value(30 + level);
+                }
+                measure
+            };
+            measures.par_tiles().enumerate().for_each(|(tile, mut measures)| {
+                for slot in 0..TILE_PIXELS {
+                    measures.set(slot, &measure(tile * TILE_PIXELS + slot));
+                    let kept = measures.get(slot);
+                    assert_eq!(format!("{kept:?}"), format!("{:?}", measure(tile * TILE_PIXELS + slot)));
+                }
+            });
+            for at in 0..2 * TILE_PIXELS {
+                assert_eq!(format!("{:?}", measures.get(at)), format!("{:?}", measure(at)));
+            }
+        }
+    }
+}

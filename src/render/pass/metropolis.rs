@@ -1,0 +1,379 @@
+//! Multiplexed Metropolis light transport: Markov chains over the paths of bidirectional path tracing \[Veach and Guibas
+//! 1997; Kelemen et al. 2002; Hachisuka, Kaplanyan and Dachsbacher 2014, "Multiplexed Metropolis Light Transport"\].
+//!
+//! A state is a point of primary sample space ([`Chain`]), a length, and a [`Division`] of a path of that length among
+//! the two walks; its weight is the light that this one technique brings, by the balance heuristic. Proposals keep the
+//! length and may change all else.
+//!
+//! An iteration is a render of its own, so that iterations are independent, tell their variance by their scatter, and
+//! can be divided among machines:
+//!
+//! 1. One pair of walks for every pixel, all techniques, as bidirectional path tracing does. They measure what is seen
+//!    directly and direct light, and G-buffers; and the mean of all other light, `b`.
+//! 2. Chains start at paths found there, drawn in proportion to their light by one stratified sequence. So started they
+//!    are in equilibrium in the mean, whatever their length, and `b` makes the sum unbiased \[Veach 1997, 11.3.1\].
+//! 3. They walk as many steps as there are pixels. Both the state and the proposal are counted, each with the
+//!    probability that it is the next state \[the expected values of Veach 1997, 11.5\].
+
+use super::iterate::{Iterate, Work};
+use super::tiles::{TILE_PIXELS, Tiles};
+use crate::camera::Camera;
+use crate::estimator::Pixel;
+use crate::light::Group;
+use crate::math::{Rgb, UVec2, Vec2};
+use crate::plan::{Part, PathClass};
+use crate::random::{Chain, Domain, Purpose, Stream, Streams, mix};
+use crate::render::clock::Phases;
+use crate::render::clock::cpu_seconds;
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use crate::transport::mis::Eta;
+use crate::transport::{
+    Bidirectional, CameraWalkContext, Deposits, Division, Eye, EyeMeasure, InitialMedia, LightPass, LightVertices,
+    MergeLevels, Record, Splat, Strategies, Technique,
+};
+use bumpalo::Bump;
+use rayon::prelude::*;
+use smallvec::SmallVec;
+
+/// Steps of a chain, where there are pixels enough for many. Each iteration finds new starts in proportion to their
+/// light, so short ones, which are many, are spread better: 512 had 1.1 to 1.2 times the error.
+const STEPS: usize = 64;
+/// Vertex of an eye path whose draws are the chain's own: its place on the film and how paths are divided.
+const OWN: u32 = u32::MAX;
+
+/// Chains of an iteration at least.
+const CHAINS: usize = 16;
+
+/// Light that a path brings to a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Deposit {
+    pixel: u32,
+    part: Part,
+    value: Rgb,
+}
+
+/// What the chains are to look for: all that is not seen directly, nor direct light.
+fn chained(class: PathClass) -> bool {
+    !matches!(class.part(), Part::Emission | Part::Direct)
+}
+
+/// A path that one of the ordinary walks has found.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    /// Index of the pixel that walked it.
+    path: u32,
+    division: Division,
+    importance: f32,
+}
+
+/// What one path brings that chains look for.
+#[derive(Default)]
+struct Found {
+    /// The pixel that its eye path starts in.
+    pixel: u32,
+    deposits: SmallVec<[(Technique, Deposit); 4]>,
+}
+
+/// What a chain's target density is: the sum of the channels.
+fn importance(value: Rgb) -> f32 {
+    let sum = value.element_sum();
+    if sum.is_finite() { sum } else { 0.0 }
+}
+
+impl Found {
+    fn add(&mut self, technique: Technique, (class, pixel): (PathClass, u32), value: Rgb) {
+        if chained(class) && importance(value) > 0.0 {
+            self.deposits.push((technique, Deposit { pixel, part: class.part(), value }));
+        }
+    }
+
+    fn splats(&mut self, splats: &[Splat]) {
+        for splat in splats {
+            let value = splat.value * splat.ratios.weight(Eta::NONE);
+            self.add(Technique::Camera { light: splat.light }, (splat.class, splat.pixel), value);
+        }
+    }
+}
+
+impl Record for Found {
+    fn arrival(&mut self, technique: Technique, of: (PathClass, Group), _: usize, value: Rgb, weight: f32) {
+        self.add(technique, (of.0, self.pixel), value * weight);
+    }
+}
+
+/// A state of a chain, or a proposal.
+#[derive(Default)]
+struct State {
+    deposits: SmallVec<[Deposit; 4]>,
+    importance: f32,
+}
+
+/// What the iterations share.
+pub(super) struct Metropolis<'a> {
+    eye: Eye<'a>,
+    settings: &'a Settings,
+    shared: Bidirectional<'a>,
+    tiles: Tiles,
+    measures: Vec<EyeMeasure>,
+    levels: MergeLevels,
+}
+
+/// The walks of one iteration.
+struct Walks<'i, 'a> {
+    shared: &'i Bidirectional<'a>,
+    pass: LightPass<'i>,
+    levels: &'i MergeLevels,
+    eyes: Streams,
+    lights: Streams,
+    size: UVec2,
+}
+
+/// Where an eye path starts: its pixel, and the point of that, uniform on the unit square.
+type Film = (UVec2, Vec2);
+
+impl Walks<'_, '_> {
+    /// The draws of both walks of a path.
+    fn streams(&self, path: u32) -> (Stream, Stream) {
+        (self.eyes.path(u64::from(path)), self.lights.path(u64::from(path)))
+    }
+
+    /// Both walks of a path; what they find goes to `left`, `found` and `measure`.
+    fn walk<'s>(
+        &self,
+        shared: &Bidirectional<'s>,
+        arena: &'s Bump,
+        ((pixel, within), (eye, light)): (Film, (Stream, Stream)),
+        (left, found): (&mut Deposits, &mut Found),
+        measure: &mut EyeMeasure,
+    ) {
+        let mut vertices = LightVertices::new_in(arena);
+        if shared.only.is_none_or(|only| only.light().is_some_and(|depth| depth > 0))
+            && let Some(emitted) = self.pass.emit_from(shared.eye.scene, shared.initial_media, light)
+        {
+            shared.light_path_of(&self.pass, &emitted, false, &mut vertices, left, &mut ());
+        }
+        if shared.only.is_none_or(|only| only.eye > 0) {
+            let mut start = shared.eye.start_at((pixel.x, pixel.y), within, eye);
+            start.wavelength_sample = self.pass.wavelength_sample_of(light);
+            let meets = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
+            shared.eye_path(arena, &(start, eye), &meets, found, measure);
+        }
+    }
+
+    /// The path that starts in a pixel, by all techniques; what chains can start from goes to `candidates`.
+    fn ordinary(
+        &self,
+        arena: &mut Bump,
+        (path, pixel): (u32, UVec2),
+        left: &mut Deposits,
+        candidates: &mut Vec<Candidate>,
+    ) -> EyeMeasure {
+        arena.reset();
+        let streams = self.streams(path);
+        let mut found = Found { pixel: path, ..Found::default() };
+        let mut measure = EyeMeasure::default();
+        let first = left.splats.len();
+        let within = streams.0.vertex(0).two(Purpose::Pixel);
+        self.walk(self.shared, arena, ((pixel, within), streams), (left, &mut found), &mut measure);
+        found.splats(&left.splats[first..]);
+        candidates.extend(found.deposits.iter().filter_map(|(technique, deposit)| {
+            let division = Division::of(*technique)?;
+            Some(Candidate { path, division, importance: importance(deposit.value) })
+        }));
+        measure
+    }
+
+    /// The path at the chain's place.
+    fn state(&self, arena: &mut Bump, chain: &mut Chain, segments: u32, streams: (Stream, Stream)) -> State {
+        arena.reset();
+        let own = streams.0.vertex(OWN);
+        let (mut left, mut found) = (Deposits::default(), Found::default());
+        chain.during(|| {
+            let eye = ((own.one(Purpose::Division) * (segments + 1) as f32) as u32).min(segments);
+            let film = own.two(Purpose::Film) * self.size.as_vec2();
+            let pixel = film.as_uvec2().min(self.size - 1);
+            found.pixel = pixel.y * self.size.x + pixel.x;
+            let shared = Bidirectional { only: Some(Division { segments, eye }), ..*self.shared };
+            let within = (film - pixel.as_vec2()).clamp(Vec2::ZERO, Vec2::splat(1.0 - f32::EPSILON));
+            let start = ((pixel, within), streams);
+            self.walk(&shared, arena, start, (&mut left, &mut found), &mut EyeMeasure::default());
+        });
+        found.splats(&left.splats);
+        let deposits: SmallVec<[Deposit; 4]> = found.deposits.into_iter().map(|(_, deposit)| deposit).collect();
+        let importance = deposits.iter().map(|deposit| importance(deposit.value)).sum();
+        State { deposits, importance }
+    }
+
+    /// A chain that starts at `candidate` and takes so many steps. What it finds, with weights that sum to one for a
+    /// step, each divided by its importance.
+    fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Vec<Deposit> {
+        let Candidate { path, division: Division { segments, eye }, .. } = *candidate;
+        let (eyes, lights) = self.streams(path);
+        let streams = (eyes.chained(), lights.chained());
+        let mut chain = Chain::new(mix(eyes.vertex(OWN).bits(Purpose::Film) ^ mix(number)));
+        let own = streams.0.vertex(OWN);
+        let place = UVec2::new(path % self.size.x, path / self.size.x).as_vec2();
+        chain.set(own.id(Purpose::Film), (place + eyes.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2());
+        chain.set(own.id(Purpose::Division), Vec2::splat((eye as f32 + 0.5) / (segments + 1) as f32));
+        let mut deposits = Vec::new();
+        let mut leave = |state: &State, weight: f32| {
+            if weight > 0.0 && state.importance > 0.0 {
+                let scale = weight / state.importance;
+                deposits.extend(state.deposits.iter().map(|d| Deposit { value: d.value * scale, ..*d }));
+            }
+        };
+        let mut current = self.state(arena, &mut chain, segments, streams);
+        let mut stayed = 0.0;
+        for _ in 0..steps {
+            if self.shared.eye.is_given_up() {
+                break;
+            }
+            chain.propose();
+            let proposal = self.state(arena, &mut chain, segments, streams);
+            // Rounding may have put out the path that the chain began with; then any that shines is better.
+            let acceptance = match current.importance {
+                0.0 => 1.0,
+                importance => (proposal.importance / importance).min(1.0),
+            };
+            if chain.decide(acceptance) {
+                leave(&current, stayed + 1.0 - acceptance);
+                (current, stayed) = (proposal, acceptance);
+            } else {
+                leave(&proposal, acceptance);
+                stayed += 1.0 - acceptance;
+            }
+        }
+        leave(&current, stayed);
+        deposits
+    }
+}
+
+/// Where chains start: `count` of the candidates, in proportion to their importance, by one stratified sequence whose
+/// first number is `u`; and the sum of all importance.
+fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f64) {
+    let total: f64 = candidates.iter().map(|candidate| f64::from(candidate.importance)).sum();
+    let step = total / count as f64;
+    let (mut found, mut sum) = (Vec::with_capacity(count), 0.0);
+    for candidate in candidates {
+        sum += f64::from(candidate.importance);
+        while found.len() < count && (found.len() as f64 + u) * step < sum {
+            found.push(*candidate);
+        }
+    }
+    // What rounding leaves out.
+    if let Some(last) = candidates.last() {
+        found.resize(count, *last);
+    }
+    (found, total)
+}
+
+impl<'a> Metropolis<'a> {
+    /// Nothing done yet.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        initial_media: &'a InitialMedia,
+    ) -> Metropolis<'a> {
+        let (width, height) = camera.size();
+        let pixels = (width * height) as f32;
+        let eye = settings.eye(scene, camera, initial_media);
+        let strategies = Strategies::BDPT;
+        let shared =
+            Bidirectional { eye, initial_media, strategies, light_paths: pixels, merged_paths: pixels, only: None };
+        let tiles = Tiles::new(camera);
+        let measures = vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS];
+        let levels = MergeLevels::new(std::iter::once((0.0, Eta::NONE)));
+        Metropolis { eye, settings, shared, tiles, measures, levels }
+    }
+
+    /// One pair of walks for every pixel: all that is seen directly, direct light, and what chains can start from. Last,
+    /// light paths that ended because they were not finite.
+    fn walk_all(&mut self, walks: &Walks<'_, '_>) -> (Vec<Candidate>, u64) {
+        let (tiles, width) = (self.tiles, walks.size.x);
+        let left: Vec<(Deposits, Vec<Candidate>)> = self
+            .measures
+            .par_chunks_mut(TILE_PIXELS)
+            .enumerate()
+            .map(|(tile, measures)| {
+                let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Vec::new());
+                for place in tiles.pixels(tile) {
+                    if walks.shared.eye.is_given_up() {
+                        break;
+                    }
+                    let index = place.index as u32;
+                    let pixel = UVec2::new(index % width, index / width);
+                    let measure = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
+                    let EyeMeasure { emission, direct, features, first, broken, .. } = measure;
+                    measures[place.at] =
+                        EyeMeasure { emission, direct, features, first, broken, ..EyeMeasure::default() };
+                }
+                (left, found)
+            })
+            .collect();
+        let (mut candidates, mut lost) = (Vec::new(), 0);
+        for (left, found) in left {
+            lost += left.lost;
+            for splat in left.splats.iter().filter(|splat| !chained(splat.class)) {
+                splat.apply(&self.levels, &mut self.measures[tiles.slot(splat.pixel)]);
+            }
+            candidates.extend(found);
+        }
+        (candidates, lost)
+    }
+}
+
+impl Iterate for Metropolis<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        self.settings.pixels(self.eye.scene, self.eye.camera)
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+        let started = cpu_seconds();
+        let Settings { seed, max_depth, .. } = *self.settings;
+        let (width, height) = self.eye.camera.size();
+        let (shared, levels) = (self.shared, self.levels);
+        let walks = Walks {
+            shared: &shared,
+            pass: LightPass::new(seed, i, Domain::Light, width * height, max_depth),
+            levels: &levels,
+            eyes: Streams::new(seed, i, Domain::EyeIndependent),
+            lights: Streams::new(seed, i, Domain::Light),
+            size: UVec2::new(width, height),
+        };
+        let (candidates, rejected) = self.walk_all(&walks);
+        let count = (pixels.len() / STEPS).max(CHAINS);
+        let steps = pixels.len().div_ceil(count);
+        let u = walks.eyes.path(u64::MAX).vertex(OWN).one_fine(Purpose::Film);
+        let (starts, total) = starts(&candidates, count, u);
+        drop(candidates);
+        let left: Vec<Vec<Deposit>> = starts
+            .par_iter()
+            .enumerate()
+            .map_init(Bump::new, |arena, (number, candidate)| walks.chain(arena, number as u64, candidate, steps))
+            .collect();
+        if self.settings.stop.gave_up() {
+            return None;
+        }
+        // A step stands for as many paths as there are pixels over steps, and light divided by its importance for `b`.
+        let scale = (total / (count * steps) as f64) as f32;
+        for Deposit { pixel, part, value } in left.into_iter().flatten() {
+            let measure = &mut self.measures[self.tiles.slot(pixel)];
+            let into = match part {
+                Part::Caustic => &mut measure.caustic_photons[0],
+                Part::Volume => &mut measure.volume_photons[0],
+                _ => &mut measure.indirect_photons[0],
+            };
+            *into += value * scale;
+        }
+        let (eye, tiles, measures) = (self.eye, self.tiles, &self.measures);
+        pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
+            let measure = &measures[tiles.slot(index as u32)];
+            pixel.see(i, || eye.seen(measure));
+            pixel.add(i, measure, None);
+        });
+        phases.eye += cpu_seconds() - started;
+        Some(Work { light_paths: u64::from(width) * u64::from(height), rejected, ..Work::default() })
+    }
+}

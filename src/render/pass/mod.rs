@@ -1,0 +1,32 @@
+//! The passes of each method, and what they share.
+
+mod bidirectional;
+mod choice;
+mod chunks;
+mod cost;
+mod counting;
+mod forecast;
+mod groups;
+mod guiding;
+mod iterate;
+mod measures;
+mod metropolis;
+mod path;
+mod photon_counts;
+mod pm;
+mod region;
+mod sppm;
+mod techniques;
+mod tiles;
+mod volume;
+
+pub use bidirectional::bytes_per_whole_tile;
+pub(super) use choice::passes;
+pub(crate) use cost::Cost;
+pub use forecast::photons_per_path;
+pub(super) use iterate::Iterate;
+pub use measures::bytes_of_measures;
+pub use photon_counts::PhotonCounts;
+pub use pm::PHOTON_BYTES;
+pub use techniques::{MAX_TECHNIQUES, TechniquePicture};
+pub use tiles::TILE as WHOLE_TILE;

@@ -1,0 +1,82 @@
+//! One iteration of path tracing.
+
+use super::iterate::{Iterate, Work};
+use super::measures::{self, Measures};
+use super::techniques::{TechniquePicture, Watch, Watched};
+use super::tiles::{TILE_PIXELS, Tiles};
+use crate::estimator::Pixel;
+use crate::random::{Domain, Streams};
+use crate::render::clock::Phases;
+use crate::render::clock::cpu_seconds;
+use crate::render::settings::Settings;
+use crate::transport::{Eye, EyeMeasure, path_measure};
+use bumpalo::Bump;
+use rayon::prelude::*;
+
+/// The passes of a render.
+pub(super) struct Paths<'a> {
+    eye: Eye<'a>,
+    settings: &'a Settings,
+    tiles: Tiles,
+    measures: [Measures; 1],
+    watched: Watched,
+}
+
+impl<'a> Paths<'a> {
+    /// Nothing done yet.
+    pub fn new(eye: Eye<'a>, settings: &'a Settings) -> Paths<'a> {
+        let tiles = Tiles::new(eye.camera);
+        let measures = [Measures::new(tiles.count() * TILE_PIXELS, 1)];
+        Paths { eye, settings, tiles, measures, watched: Watched::new(settings, eye.scene, &tiles) }
+    }
+
+    /// Adds iteration `i` (from 1) to all pixels; false where it was given up.
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> bool {
+        let (eye, tiles) = (self.eye, self.tiles);
+        let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
+        let parts = self.measures[0].par_tiles().zip(watches.par_iter_mut());
+        parts.enumerate().for_each(|(tile, (mut measures, watch))| {
+            let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
+            for places in tiles.groups(tile) {
+                if eye.is_given_up() {
+                    return;
+                }
+                let starts = eye.starts(&places, streams);
+                for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                    arena.reset();
+                    watch.begin(place.at, Some(0));
+                    path_measure(&eye, &arena, start, watch, &mut measure);
+                    measures.set(place.at, &measure);
+                }
+            }
+        });
+        if self.settings.stop.gave_up() {
+            return false;
+        }
+        let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
+        measures::add(&self.measures, (&eye, i), pixels, |index| tiles.slot(index as u32), groups);
+        true
+    }
+}
+
+impl Iterate for Paths<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        self.settings.pixels(self.eye.scene, self.eye.camera)
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+        let start = cpu_seconds();
+        let mut watched = std::mem::take(&mut self.watched);
+        let done = match watched.begin() {
+            Some(watches) => self.pass(i, pixels, watches),
+            None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
+        };
+        self.watched = watched;
+        phases.eye += cpu_seconds() - start;
+        done.then_some(Work::default())
+    }
+
+    fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
+        self.watched.collect(&self.tiles, iterations)
+    }
+}

@@ -1,0 +1,209 @@
+//! Classical photon mapping \[Jensen 1996\]: photons traced once, and the nearest of caustics and of all others around
+//! every point that an eye path sees.
+//!
+//! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by
+//! next-event estimation, caustics and all other indirect light from the maps. Eye paths accumulate over iterations,
+//! the maps stay. So the picture tends to their own blurred and blotched one, never to the truth: only more photons
+//! help, and memory bounds their number. The estimated error, which is told from differences between iterations, does
+//! not know of it.
+//!
+//! Of light in media it has single scattering alone, no photons: not for scenes whose media scatter.
+//!
+//! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
+//! number of paths that were traced.
+
+use super::iterate::{Iterate, Work};
+use super::measures::{self, Measures};
+use super::sppm::trace_some;
+use crate::camera::{Camera, band, par_pixels};
+use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
+use crate::estimator::{InitialBandwidth, Pixel};
+use crate::math::Vec3;
+use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel, kind};
+use crate::random::{Domain, Streams};
+use crate::render::clock::Phases;
+use crate::render::clock::cpu_seconds;
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use crate::transport::{Bandwidths, Eye, Indirect, InitialMedia, LevelRadii, LightPass, Photons, Scratch, light_path};
+use bumpalo::Bump;
+
+/// Light paths traced between two looks at the memory.
+const BATCH: u32 = 1 << 16;
+/// Bytes per photon while the map is built: the photon as traced and as sorted, its place on the curve, its share of
+/// the tree.
+pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
+
+/// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by
+/// it. Last, light paths that ended because they were not finite.
+fn trace(
+    scene: &Scene,
+    initial_media: &InitialMedia,
+    pass: &LightPass,
+    most: usize,
+) -> (ByKind<Vec<Photon>>, u32, u64) {
+    let (mut photons, mut traced, mut lost): (ByKind<Vec<Photon>>, _, _) = (ByKind::default(), 0, 0);
+    while traced < pass.paths() {
+        let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
+        let end = paths.end;
+        let batch = trace_some(scene, initial_media, pass, paths);
+        if kind::count(&photons) + kind::count(&batch.surface) > most {
+            break;
+        }
+        kind::append(&mut photons, batch.surface);
+        lost += batch.lost;
+        traced = end;
+    }
+    // The memory ends within a batch: path by path.
+    let mut arena = Bump::new();
+    let mut path = Photons::default();
+    while traced < pass.paths() {
+        light_path(scene, &arena, initial_media, pass, traced, &mut path);
+        arena.reset();
+        if kind::count(&photons) + kind::count(&path.surface) > most {
+            break;
+        }
+        kind::append(&mut photons, std::mem::take(&mut path.surface));
+        path.volume.clear();
+        lost += std::mem::take(&mut path.lost);
+        traced += 1;
+    }
+    let more = pass.paths() as f32 / traced.max(1) as f32;
+    photons.iter_mut().flatten().for_each(|photon| photon.flux *= more);
+    (photons, traced, lost)
+}
+
+/// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this
+/// area holds on average.
+struct Neighbours<'a> {
+    count: usize,
+    nearest: &'a mut ByKind<Nearest>,
+    camera: &'a Camera,
+    least: f32,
+}
+
+impl Bandwidths for Neighbours<'_> {
+    type Place = ();
+    type Counter<'c>
+        = ()
+    where
+        Self: 'c;
+
+    fn place(_: Vec3) {}
+
+    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
+        let cap = (SCREEN_CAP * span(self.camera, length)).max(self.least);
+        let cap2 = cap * cap;
+        let nearest = &mut self.nearest[kind as usize];
+        let radius2 = nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
+        LevelRadii::new(std::iter::once(radius2.max(self.least * self.least)))
+    }
+
+    fn counter(&mut self, _: Kind, (): &()) {}
+}
+
+/// The passes of a render.
+pub(super) struct Pm<'a> {
+    eye: Eye<'a>,
+    settings: &'a Settings,
+    initial_media: &'a InitialMedia,
+    /// Built by the first iteration.
+    maps: Option<PhotonMaps>,
+    /// The light paths of the maps are counted.
+    counted: bool,
+    measures: [Measures; 1],
+}
+
+impl<'a> Pm<'a> {
+    /// Nothing done yet.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        initial_media: &'a InitialMedia,
+    ) -> Pm<'a> {
+        let eye = settings.eye(scene, camera, initial_media);
+        let measures = [Measures::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
+        Pm { eye, settings, initial_media, maps: None, counted: false, measures }
+    }
+
+    /// The maps, how many light paths they are of, and what was left out.
+    fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
+        let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
+        let start = cpu_seconds();
+        let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
+            .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons)
+            .stopped_by(&self.settings.stop);
+        let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
+        let (photons, traced, lost) = trace(self.eye.scene, self.initial_media, &pass, most);
+        phases.light += cpu_seconds() - start;
+        let start = cpu_seconds();
+        let maps = photons.map(PhotonMap::build);
+        phases.map += cpu_seconds() - start;
+        let rejected = lost + maps.iter().map(PhotonMap::rejected).sum::<u64>();
+        (maps, traced, rejected)
+    }
+}
+
+impl Iterate for Pm<'_> {
+    fn pixels(&mut self) -> Vec<Pixel> {
+        self.settings.pixels(self.eye.scene, self.eye.camera)
+    }
+
+    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+        let (maps, traced, rejected) = match self.maps.take() {
+            Some(maps) => (maps, 0, 0),
+            None => self.build(phases),
+        };
+        if self.settings.stop.gave_up() {
+            return None;
+        }
+        let start = cpu_seconds();
+        let (eye, camera) = (&self.eye, self.eye.camera);
+        let count = match self.settings.initial {
+            InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
+            _ => self.settings.method.neighbours(1),
+        };
+        let least = LEAST * eye.scene.lights.sky().radius;
+        let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
+        let scratch = <(Scratch, ByKind<Nearest>)>::default;
+        par_pixels(
+            self.measures[0].par_parts(band(camera.size().0)),
+            camera.size(),
+            scratch,
+            |(scratch, nearest), measures, places| {
+                if eye.is_given_up() {
+                    return;
+                }
+                let starts = eye.starts(places, streams);
+                for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
+                    let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
+                    measures.set(place.at, &eye.measure(scratch, start, &maps, None, neighbours, kernel::Box));
+                }
+            },
+        );
+        if !self.settings.stop.gave_up() {
+            measures::add(&self.measures, (eye, i), pixels, |index| index, |_| &[]);
+        }
+        phases.eye += cpu_seconds() - start;
+        let photons = maps.iter().map(|map| map.photons().len()).sum();
+        self.maps = Some(maps);
+        if self.settings.stop.gave_up() {
+            return None;
+        }
+        // After a pause the maps are made again, of the same paths.
+        let (light_paths, rejected) =
+            if std::mem::replace(&mut self.counted, true) { (0, 0) } else { (u64::from(traced), rejected) };
+        Some(Work { light_paths, photons, rejected, ..Work::default() })
+    }
+
+    fn state(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_allocvec(&self.counted)
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        let Ok(counted) = postcard::from_bytes(state) else { return false };
+        self.counted = counted;
+        true
+    }
+}

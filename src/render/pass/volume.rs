@@ -1,0 +1,71 @@
+//! The photons of a pass, and what media add to them: photons of their own, and bandwidths of their own.
+
+use super::photon_counts::PhotonCounts;
+use crate::camera::GROUP;
+use crate::estimator::{Pixel, Schedule};
+use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
+use crate::random::Stream;
+use crate::render::settings::Settings;
+use crate::spectrum::IterationWavelengths;
+use crate::transport::{PathStart, Volume};
+
+/// Photons of an iteration.
+pub(super) struct Maps {
+    /// On surfaces.
+    pub surface: PhotonMaps,
+    /// In media, if any scatter.
+    pub volume: Option<VolumeMap>,
+    /// The wavelengths they have taken.
+    pub wavelengths: IterationWavelengths,
+    /// Light paths that ended because they were not finite.
+    pub lost: u64,
+}
+
+impl Maps {
+    /// Number of photons.
+    pub fn len(&self) -> usize {
+        let surface: usize = self.surface.iter().map(|map| map.photons().len()).sum();
+        surface + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
+    }
+
+    /// Photons on surfaces, of which none has been gathered yet.
+    pub fn counts(&self) -> PhotonCounts {
+        let stored = self.surface.each_ref().map(|map| map.photons().len() as u64);
+        PhotonCounts { stored, ..PhotonCounts::default() }
+    }
+
+    /// Photons and light paths that were not finite.
+    pub fn rejected(&self) -> u64 {
+        let surface: u64 = self.surface.iter().map(PhotonMap::rejected).sum();
+        self.lost + surface + self.volume.as_ref().map_or(0, |volume| volume.map.rejected())
+    }
+
+    /// The starts of eye paths that take no other wavelengths.
+    #[inline]
+    pub fn tune(&self, mut starts: [Option<(PathStart, Stream)>; GROUP]) -> [Option<(PathStart, Stream)>; GROUP] {
+        for (start, _) in starts.iter_mut().flatten() {
+            start.wavelength_sample = self.wavelengths.nearest(start.wavelength_sample);
+        }
+        starts
+    }
+
+    /// The photons in media for some of the levels of `pixel`.
+    #[inline]
+    pub fn volume(&self, pixel: &Pixel, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
+        let VolumeMap { map, schedule } = self.volume.as_ref()?;
+        Some(Volume::new(map, levels.map(|level| schedule.volume_radius(pixel.volume_bandwidth, level))))
+    }
+}
+
+/// Photons in media, and how far bandwidths have shrunk.
+pub(super) struct VolumeMap {
+    map: PhotonMap<VolumePhoton>,
+    schedule: Schedule,
+}
+
+impl VolumeMap {
+    /// Those of iteration `i`.
+    pub fn new(photons: Vec<VolumePhoton>, i: u64, settings: &Settings) -> VolumeMap {
+        VolumeMap { map: PhotonMap::build(photons), schedule: settings.schedule(i) }
+    }
+}
