@@ -164,7 +164,7 @@ impl CausticTargets {
 
     /// Density of an aimed start in the mixture with a region, and the part of it that all light has: without the
     /// targets.
-    pub fn lit(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
+    pub fn density_with_region(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
         let lit = self.share_lit();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
         let drawn = if let EntryDisc::Region(radius) = emission.entry { radius } else { 0.0 };
@@ -286,7 +286,7 @@ mod tests {
                 let unaimed = match region {
                     Some(region) => {
                         targets.aim_with_region(&sky, &mut emission, region, u, point);
-                        let (mixed, unaimed) = targets.lit(&sky, &emission, region);
+                        let (mixed, unaimed) = targets.density_with_region(&sky, &emission, region);
                         emission.flux *= emission.density.onward / mixed;
                         unaimed / mixed
                     }
@@ -340,7 +340,7 @@ mod tests {
                 // Through the region's own disc, where the density is a third of a half of one over its area at least.
                 let mut lit = lit;
                 targets.aim_with_region(&sky, &mut lit, region, 0.0, point);
-                greatest = greatest.max(1.0 / targets.lit(&sky, &lit, region).0);
+                greatest = greatest.max(1.0 / targets.density_with_region(&sky, &lit, region).0);
             }
             // 1 / (AIMED (1 / area + 1 / whole)).
             let expected = f64::from(1.0 / (AIMED * (1.0 / area + 1.0 / whole)));

@@ -210,7 +210,7 @@ impl Guide {
             None => lights.aim_with_region(&mut emission, region, rest, point),
         }
         let lamp = self.lamps.get(self.lamp_of[emission.light as usize] as usize);
-        let (anywhere, unaimed) = lights.lit(&emission, region);
+        let (anywhere, unaimed) = lights.density_with_region(&emission, region);
         // By components that do not look at targets.
         let untargeted = self.unguided() + lamp.map_or(0.0, |lamp| lamp.own);
         let mut mixed = untargeted * anywhere;

@@ -593,11 +593,11 @@ impl Lights {
     /// Density that an aimed start has with the region in the mixture, and the part of it that paths of all light have:
     /// those through the whole scene and the region, without what is aimed.
     #[inline]
-    pub fn lit(&self, emission: &EmissionSample, region: Option<Region>) -> (f32, f32) {
+    pub fn density_with_region(&self, emission: &EmissionSample, region: Option<Region>) -> (f32, f32) {
         let onward = emission.density.onward;
         match region {
             _ if !emission.infinite => (onward, onward),
-            Some(region) => self.targets.lit(&self.sky, emission, region),
+            Some(region) => self.targets.density_with_region(&self.sky, emission, region),
             None => (onward, onward * self.targets.unaimed(&self.sky, emission)),
         }
     }

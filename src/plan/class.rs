@@ -27,13 +27,13 @@
 //! are between the two, that lobe, if it is sharp, shows a caustic.
 //!
 //! [`EyeSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class
-//! ([`EyeSuffix::receives`]).
+//! ([`EyeSuffix::class_with`]).
 
+mod camera_suffix;
 mod present;
-mod sight;
 
+pub use camera_suffix::{EyeSuffix, LightPrefix};
 pub use present::classes_in;
-pub use sight::{EyeSuffix, LightPrefix};
 
 use super::effect::{Effect, EffectSet, Switches};
 use crate::bsdf::LobeSet;
@@ -141,7 +141,7 @@ impl PathClass {
 
     /// Of a whole path, from the camera to a light, `sizeless` or not.
     pub fn of(events: impl IntoIterator<Item = Event>, sizeless: bool) -> PathClass {
-        events.into_iter().fold(EyeSuffix::START, EyeSuffix::then).lit(sizeless)
+        events.into_iter().fold(EyeSuffix::START, EyeSuffix::then).class_at_light(sizeless)
     }
 
     /// The part of the picture that it belongs to.

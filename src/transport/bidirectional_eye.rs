@@ -113,7 +113,7 @@ impl<R: Record> EyeWalk<'_, R> {
     /// The path has run into a light that sends it `value`.
     #[inline]
     fn run_into(&mut self, (value, group): (Rgb, Group), depth: u32, at: Vec3, density: &EmissionDensity) {
-        let class = self.trail.sight.lit(false);
+        let class = self.trail.sight.class_at_light(false);
         if !self.shared.hits_at(self.depth) || !self.shared.eye.classes.has(class) {
             return;
         }

@@ -165,7 +165,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             // A caustic.
             return;
         }
-        let class = self.sight.lit(false);
+        let class = self.sight.class_at_light(false);
         if !self.classes.has(class) {
             return;
         }
@@ -201,7 +201,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// are switched off.
     #[inline]
     fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
-        let on = |event: Event| self.classes.is_all() || self.classes.has(self.sight.then(event).lit(false));
+        let on = |event: Event| self.classes.is_all() || self.classes.has(self.sight.then(event).class_at_light(false));
         let only = |set: LobeSet, event: Event| if on(event) { set } else { LobeSet::NONE };
         (only(broad, Event::Broad), only(onward, Event::Sharp))
     }
@@ -209,7 +209,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     /// Whether a medium is lit.
     #[inline]
     fn lit_in_medium(&self, sight: EyeSuffix) -> bool {
-        self.classes.has(sight.then(Event::Medium).lit(false))
+        self.classes.has(sight.then(Event::Medium).class_at_light(false))
     }
 
     /// Whether going on by some lobes of the last vertex can come to light of a class that is wanted.
@@ -270,7 +270,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let sight = self.sight.then(Event::Broad);
         let place = B::place(vertex.surface.ng);
         for (kind, beam) in [(Kind::Indirect, LightPrefix::SCATTERED), (Kind::Caustic, LightPrefix::FOCUSED)] {
-            let class = sight.receives(beam);
+            let class = sight.class_with(beam);
             let photons = &self.photons[kind as usize];
             // Where none has come this time, eye paths still leave photons their share.
             let shares = onward.has(LobeSet::SHARP) && photons.paths() > 0;
@@ -305,7 +305,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let sharp = onward & LobeSet::SHARP;
         let shared = kind == Kind::Caustic
             && !sharp.is_empty()
-            && self.classes.has(self.sight.then(Event::Sharp).receives(LightPrefix::FOCUSED));
+            && self.classes.has(self.sight.then(Event::Sharp).class_with(LightPrefix::FOCUSED));
         let mut glints =
             shared.then(|| self.glints.merge(self.kernel, (vertex.shading, ng), (onward, going), &radii, photons));
         let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
@@ -457,7 +457,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
                 }
                 sums
             };
-            let wanted = self.classes.has(sight.then(Event::Medium).receives(LightPrefix::SCATTERED));
+            let wanted = self.classes.has(sight.then(Event::Medium).class_with(LightPrefix::SCATTERED));
             let gathered = self.volume.filter(|_| wanted).map(gather);
             let measure = &mut self.measure;
             let (light, photons) = if sight.is_clear() {

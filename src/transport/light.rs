@@ -178,7 +178,7 @@ impl<'a> LightPass<'a> {
             None => {
                 let mut emission = lights.sample_emission(shapes, materials, choice.x, point, direction)?;
                 lights.aim_with_region(&mut emission, self.region, choice.y as f32, point);
-                let (mixed, unaimed) = lights.lit(&emission, self.region);
+                let (mixed, unaimed) = lights.density_with_region(&emission, self.region);
                 let (emission, _) = emission.reweighted(mixed)?;
                 (emission, guide::UNGUIDED, 1.0, 1.0, unaimed / mixed)
             }

@@ -115,7 +115,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         if let Some((radiance, pdf)) =
             self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
         {
-            let of = (self.trail.sight.lit(false), self.scene.lights.surface_group(vertex.surface));
+            let of = (self.trail.sight.class_at_light(false), self.scene.lights.surface_group(vertex.surface));
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { eye: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
@@ -139,7 +139,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         {
             let weight = Self::weight(scattered, pdf);
             let light = glow.throughput * radiance * weight;
-            let of = (trail.sight.lit(false), self.scene.lights.surface_group(&glow.surface));
+            let of = (trail.sight.class_at_light(false), self.scene.lights.surface_group(&glow.surface));
             self.add(Technique::Hit { eye: glow.depth }, of, light, weight);
         }
     }
@@ -157,7 +157,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }
-        let class = self.trail.sight.lit(false);
+        let class = self.trail.sight.class_at_light(false);
         let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
         let last = self.last;
         scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |light, pdf, _, group| {

@@ -61,7 +61,7 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
 #[inline]
 fn classes<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
-    let class = |event| sight.then(event).receives(beam);
+    let class = |event| sight.then(event).class_with(beam);
     (class(first), second.map(class))
 }
 
@@ -77,7 +77,7 @@ pub(super) fn wanted<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightP
 /// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
 pub(super) fn leads(sight: EyeSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
-    let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).ahead() & on).is_empty();
+    let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
     each.filter(|lobe| set.has(*lobe)).any(ahead)
 }
 

@@ -44,7 +44,7 @@ impl Trail {
     pub fn leads(&self, on: ClassSet) -> bool {
         on.is_all()
             || match self.lobes {
-                None => !(self.sight.then(Event::Medium).ahead() & on).is_empty(),
+                None => !(self.sight.then(Event::Medium).reachable_classes() & on).is_empty(),
                 Some(lobes) => leads(self.sight, lobes, lobes, on),
             }
     }

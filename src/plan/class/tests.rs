@@ -81,7 +81,7 @@ fn halves_tell_the_class_of_the_whole() {
                 let sight = path[..=at].iter().fold(EyeSuffix::START, |sight, event| sight.then(*event));
                 let beam =
                     path[at + 1..].iter().rev().fold(LightPrefix::start(sizeless), |beam, event| beam.then(*event));
-                assert_eq!(sight.receives(beam), whole, "{} {sizeless} at {at}", letters(&path));
+                assert_eq!(sight.class_with(beam), whole, "{} {sizeless} at {at}", letters(&path));
             }
         }
     }
@@ -94,14 +94,16 @@ fn nothing_is_ahead_that_was_not_told() {
             let class = PathClass::of(path.iter().copied(), sizeless);
             let mut sight = EyeSuffix::START;
             for event in &path {
-                assert!(sight.ahead().has(class), "{}", letters(&path));
+                assert!(sight.reachable_classes().has(class), "{}", letters(&path));
                 sight = sight.then(*event);
             }
-            assert!(sight.ahead().has(class), "{}", letters(&path));
+            assert!(sight.reachable_classes().has(class), "{}", letters(&path));
         }
     }
     let caustic = EyeSuffix::START.then(Event::Broad).then(Event::Clear);
-    assert!(!caustic.ahead().has(PathClass::Sds) && !caustic.ahead().has(PathClass::Reflection));
+    assert!(
+        !caustic.reachable_classes().has(PathClass::Sds) && !caustic.reachable_classes().has(PathClass::Reflection)
+    );
 }
 
 /// Parts and effects cut the same classes: no part but that of light which surfaces have scattered before holds more

@@ -264,7 +264,7 @@ impl<'a> Passes<'a> {
 fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
     let sight = EyeSuffix::START.then(Event::Broad);
     let caustics =
-        map.photons().par_iter().filter(|photon| sight.receives(photon.beam).part() == Part::Caustic).count();
+        map.photons().par_iter().filter(|photon| sight.class_with(photon.beam).part() == Part::Caustic).count();
     [map.photons().len() - caustics, caustics].map(|count| count as u64)
 }
 

@@ -191,7 +191,7 @@ fn random_paths_have_one_class_and_one_owner() {
         for (at, _) in path.char_indices().filter(|(_, c)| "SBV".contains(*c)) {
             let sight = path[..=at].chars().map(event).fold(EyeSuffix::START, EyeSuffix::then);
             let beam = path[at + 1..].chars().rev().map(event).fold(LightPrefix::start(*sizeless), LightPrefix::then);
-            assert_eq!(sight.receives(beam), class, "{path} {sizeless} at {at}");
+            assert_eq!(sight.class_with(beam), class, "{path} {sizeless} at {at}");
         }
     }
     println!("{} different paths: {numbers:?}", paths.len());

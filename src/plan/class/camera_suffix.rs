@@ -77,7 +77,7 @@ impl EyeSuffix {
 
     /// The class if it ends on a light, `sizeless` or not.
     #[inline]
-    pub fn lit(self, sizeless: bool) -> PathClass {
+    pub fn class_at_light(self, sizeless: bool) -> PathClass {
         use PathClass as C;
         let caustic = if self.before { C::Sds } else { C::Caustic };
         match (self.first, self.spreads, self.narrowed) {
@@ -102,16 +102,16 @@ impl EyeSuffix {
 
     /// The class if the rest is a path from a light.
     #[inline]
-    pub fn receives(self, beam: LightPrefix) -> PathClass {
+    pub fn class_with(self, beam: LightPrefix) -> PathClass {
         let mut sight = self;
         for _ in 0..beam.spreads() {
             sight = sight.then(if beam.0 & LightPrefix::MEDIUM != 0 { Event::Medium } else { Event::Broad });
         }
         match beam.tail() {
-            Tail::None => sight.lit(false),
-            Tail::Narrow => sight.then(Event::Sharp).lit(false),
-            Tail::Delta => sight.then(Event::Mirror).lit(true),
-            Tail::Glint => sight.then(Event::Sharp).then(Event::Mirror).lit(true),
+            Tail::None => sight.class_at_light(false),
+            Tail::Narrow => sight.then(Event::Sharp).class_at_light(false),
+            Tail::Delta => sight.then(Event::Mirror).class_at_light(true),
+            Tail::Glint => sight.then(Event::Sharp).then(Event::Mirror).class_at_light(true),
         }
     }
 
@@ -122,7 +122,7 @@ impl EyeSuffix {
     }
 
     /// Classes that it can still come to, or is in; rather too many than too few.
-    pub fn ahead(self) -> ClassSet {
+    pub fn reachable_classes(self) -> ClassSet {
         use PathClass as C;
         let caustic = if self.spreads == 1 && self.medium || self.spreads > 1 {
             ClassSet::NONE
